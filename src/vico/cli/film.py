@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from vico.cli.live import city_of
-from vico.cli.options import FilmOptions, StillOptions
 from vico.cli.output import progress_bars
+from vico.cli.viewer_options import FilmOptions, StillOptions
 from vico.clock import seconds_of_day
 from vico.errors import InputError, MissingFileError, OutputExistsError
 from vico.render.quality import RenderQuality

@@ -27,13 +27,12 @@ from vico.cli.motion_verbs import motion
 from vico.cli.options import (
     CommaSeparated,
     CommunityBuildOptions,
-    FilmOptions,
     RayAddress,
     RunOptions,
-    StillOptions,
     WorldBuildOptions,
     with_ray_address,
 )
+from vico.cli.viewer_options import FilmOptions, StillOptions
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
 from vico.version import __version__

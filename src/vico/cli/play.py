@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from vico.cli.evaluation_options import AssistantOptions, EvaluationOptions
-from vico.cli.options import PlayOptions
+from vico.cli.viewer_options import PlayOptions
 from vico.errors import InputError
 from vico.viewer.server import require_server
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from vico.cli.options import LiveOptions, PlayOptions
+from vico.cli.viewer_options import LiveOptions, PlayOptions
 
 _FLAT = tyro.conf.arg(name="")
 

@@ -101,7 +101,8 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
 
 def _rounded(table: NDArray[Any]) -> list[list[float]]:
     """Return the rows of a table, to a tenth of a millimetre."""
-    return np.round(table.astype(np.float64), 4).tolist()  # type: ignore[no-any-return]
+    rows: list[list[float]] = np.round(table.astype(np.float64), 4).tolist()
+    return rows
 
 
 def _far_body(body: SkinnedBody) -> SkinnedBody:

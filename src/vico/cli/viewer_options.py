@@ -1,0 +1,252 @@
+"""Options of the verbs that show a run: pages, stills and films."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+from tyro.conf import Positional
+
+from vico.cli.options import CommaSeparated, RunOptions
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """What `vico live` is asked for; what else a run can be asked for, `vico run --live` is.
+
+    Attributes
+    ----------
+    world
+        World folder.
+    community
+        Community folder, made for that world.
+    out
+        Folder to record into; without it, out/live, which is replaced.
+    robots
+        Names, separated by commas; none for no robots.
+    agent
+        Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
+    assistants
+        How many of them.
+    start
+        Time of day, HH:MM or HH:MM:SS.
+    date
+        Of the first day, YYYY-MM-DD.
+    weather
+        A kind of weather, "changing", or a weather file (.json).
+    events
+        Of the city: none, "changing", or a file of events (.json).
+    steps
+        Seconds to simulate at most.
+    cars, cyclists, pedestrians
+        How many drive, ride and walk around that nobody plays.
+    observe
+        Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
+    speed
+        Simulated seconds a second at most; 0 is as fast as it goes.
+    paused
+        Wait before the first step until somebody lets it go on.
+    interventions
+        What was done to an earlier run (its interventions.jsonl), to be done again.
+    port
+        Where the page is, on this machine alone; 0 takes a free one.
+    seed
+        Decides everything that is left to chance.
+    """
+
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
+    community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]
+    out: Path | None = None
+    robots: CommaSeparated = "husky,go2"
+    agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
+    assistants: int = 0
+    start: str = "08:00"
+    date: str = "2026-06-21"
+    weather: str = "fair"
+    events: str = "none"
+    steps: int = 86_400
+    cars: int = 30
+    cyclists: int = 0
+    pedestrians: int = 30
+    observe: CommaSeparated = "none"
+    speed: float = 1.0
+    paused: bool = False
+    interventions: Path | None = None
+    port: int = 0
+    seed: int = 0
+
+    def run_options(self) -> RunOptions:
+        """Return the same as options of a run."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        given["assistants"] = self.assistants or (1 if self.agent else 0)
+        given |= {"out": self.out or Path("out/live"), "force": self.out is None, "live": True}
+        return RunOptions(**given)
+
+
+@dataclass(frozen=True)
+class PlayOptions:
+    """What `vico play` is asked for.
+
+    Attributes
+    ----------
+    world
+        World folder.
+    community
+        Community folder, made for that world; tasks have people of their own and take none.
+    played
+        Who you are: resident_3, assistant_0 or robot_0. Without it assistant_0, or robot_0 where robots are given.
+    task
+        A task for the assistant, which is judged at the end.
+    advanced
+        The harder form of it.
+    out
+        Folder to record into; without it, out/play, which is replaced.
+    robots
+        Names, separated by commas; none for no robots.
+    start
+        Time of day, HH:MM or HH:MM:SS.
+    date
+        Of the first day, YYYY-MM-DD.
+    weather
+        A kind of weather, "changing", or a weather file (.json).
+    seconds
+        To simulate at most.
+    cars, cyclists, pedestrians
+        How many drive, ride and walk around that nobody plays.
+    view
+        What whom you play sees is rendered and recorded, which a demonstration needs.
+    port
+        Where the page is, on this machine alone; 0 takes a free one.
+    waits
+        With a task: seconds that it waits for you at its page.
+    seed
+        Decides everything that is left to chance, and the task.
+    """
+
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
+    community: Positional[Annotated[Path | None, tyro.conf.arg(metavar="COMMUNITY")]] = None
+    played: Annotated[str, tyro.conf.arg(name="as", metavar="AGENT")] = ""
+    task: Literal["none", "carry", "delivery", "search"] = "none"
+    advanced: bool = False
+    out: Path | None = None
+    robots: CommaSeparated = "none"
+    start: str = "08:00"
+    date: str = "2026-06-21"
+    weather: str = "fair"
+    seconds: int = 36_000
+    cars: int = 30
+    cyclists: int = 0
+    pedestrians: int = 30
+    view: Literal["recorded", "none"] = "recorded"
+    port: int = 0
+    waits: float = 600.0
+    seed: int = 0
+
+    def run_options(self, played: str, steps: int) -> RunOptions:
+        """Return the same as options of a run."""
+        names = ("world", "community", "robots", "start", "date", "weather", "cars", "cyclists", "pedestrians", "port")
+        given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "seed")}
+        given["assistants"] = int(played.removeprefix("assistant_")) + 1 if played.startswith("assistant_") else 0
+        given |= {"observe": played if self.view == "recorded" else "none", "states_every": steps // self.seconds * 300}
+        given |= {"out": self.out or Path("out/play"), "force": self.out is None, "steps": steps}
+        return RunOptions(**given, live=True, speed=1.0)
+
+
+@dataclass(frozen=True)
+class FilmOptions:
+    """What `vico film` is asked for.
+
+    Attributes
+    ----------
+    run
+        Run folder.
+    follow
+        Name of the agent that the camera follows.
+    out
+        File to write (.mp4).
+    size
+        WIDTHxHEIGHT, pixels.
+    start
+        HH:MM:SS, or seconds since the run began; without it, its beginning.
+    stop
+        Likewise; without it, its end.
+    fps
+        Frames a second.
+    view
+        From where.
+    samples
+        Rays a pixel, along each side: 1 is quick, 2 smooth.
+    quality
+        plain, or fine: soft shadows, darker corners, mirroring glass.
+    world
+        The world it ran in, if it is no longer where it was.
+    community
+        Its community, if it is no longer where it was.
+    force
+        Replace the file if it is there.
+    headless
+        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
+    """
+
+    run: Positional[Path]
+    follow: str
+    out: Path = Path("film.mp4")
+    size: str = "1920x1080"
+    start: str = ""
+    stop: str = ""
+    fps: int = 25
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit"] = "behind"
+    samples: int = 2
+    quality: Literal["plain", "fine"] = "fine"
+    world: Path | None = None
+    community: Path | None = None
+    force: bool = False
+    headless: bool = False
+
+
+@dataclass(frozen=True)
+class StillOptions:
+    """What `vico still` is asked for.
+
+    Attributes
+    ----------
+    run
+        Run folder.
+    follow
+        Name of the agent in its middle.
+    at
+        HH:MM:SS, or seconds since the run began; without it, its end.
+    out
+        File to write (.png or .jpg).
+    size
+        WIDTHxHEIGHT, pixels.
+    view
+        From where.
+    samples
+        Rays a pixel, along each side.
+    quality
+        plain, or fine: soft shadows, darker corners, mirroring glass.
+    world
+        The world it ran in, if it is no longer where it was.
+    community
+        Its community, if it is no longer where it was.
+    force
+        Replace the file if it is there.
+    headless
+        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
+    """
+
+    run: Positional[Path]
+    follow: str
+    at: str = ""
+    out: Path = Path("still.png")
+    size: str = "1920x1080"
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit"] = "behind"
+    samples: int = 3
+    quality: Literal["plain", "fine"] = "fine"
+    world: Path | None = None
+    community: Path | None = None
+    force: bool = False
+    headless: bool = False
