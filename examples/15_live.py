@@ -11,6 +11,7 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 import urllib.request
 from contextlib import ExitStack
 from pathlib import Path
@@ -58,8 +59,8 @@ class Client:
 
     def wait_for(self, status: str, step: int = 0) -> int:
         """Wait until the run is paused or has ended, at a step or after it; return the step."""
-        while (told := self._next("control"))["step"] < step or told["status"] != status:
-            pass
+        while (told := self.get("/api/run")["control"])["step"] < step or told["status"] != status:
+            time.sleep(0.05)
         return told["step"]
 
     def frame(self, step: int) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -146,4 +147,11 @@ def test_a_killed_demo_needs_no_force(
     monkeypatch.setattr(demo.replay_verb, "replay", lambda *_, **__: 0)
     assert demo.demo(tmp_path / "demo") == 0
     assert not (tmp_path / "demo" / ".unfinished").exists()
-    assert json.dumps(str(tmp_path))[1:-1] in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert json.dumps(str(tmp_path))[1:-1] in printed
+    # The last line is a command that can be typed as it stands.
+    told, _, command = printed.splitlines()[-1].partition(":  ")
+    *program, verb, world, people = shlex.split(command)
+    assert (told, verb) == ("to walk through it", "play")
+    assert (world, people) == (str(tmp_path / "demo" / "world"), str(tmp_path / "demo" / "community"))
+    assert Path(program[0]).is_file()
