@@ -7,7 +7,6 @@ Needs the extra "viewer". Nothing of vico's code is used by the client: docs/vie
 
 import argparse
 import json
-import signal
 import struct
 import subprocess
 import sys
@@ -126,7 +125,7 @@ def main() -> None:
     where = [str(given.world), str(given.community), "--out", str(given.out)]
     command = [sys.executable, "-m", "vico.cli.main", "live", *where, *QUIET, "--paused", "--speed", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, ExitStack() as stack:
-        stack.callback(server.send_signal, signal.SIGINT)  # it shows its page until Ctrl+C
+        stack.callback(server.terminate)  # it shows its page until somebody ends it; the run itself is over by then
         assert server.stdout is not None
         look(Client(server.stdout.readline().split()[-1], stack))
 

@@ -84,13 +84,20 @@ class Shown:
         return printed
 
 
+def _hears_ctrl_c() -> None:
+    # Where tests run in the background, a shell has them and all they start ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @contextmanager
 def shown(*words: object) -> Iterator[Shown]:
     """Start a command of ``vico`` that opens a page, and wait for its address; skip without the server's packages."""
     for package in ("websockets", "starlette", "uvicorn"):
         pytest.importorskip(package, reason="the page's server needs: pip install 'virtual-community[viewer]'")
     command = [sys.executable, "-m", "vico.cli.main", *map(str, words)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, preexec_fn=_hears_ctrl_c
+    ) as process:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()

@@ -53,6 +53,7 @@ def test_a_run_of_the_command_line_goes_back_and_branches(
             assert client.command("weather", kind="rain", over=0)["ok"]
             branch = client.command("branch", name="wet")
             assert (branch["step"], Path(branch["path"])) == (9, tmp_path / "run.from-4.wet")
+            client.until(lambda s: (told := s.last("run")) and Path(told["path"]).name == "run.from-4.wet")
             head = get_json(page.url, "/api/run")
             assert head["run"]["branch_of"] == {"run": "run.from-4", "step": 9}
             assert [line["command"] for line in head["interventions"]] == ["weather"]

@@ -61,9 +61,9 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
 
 
 def _this_program() -> list[str]:
-    """Return the words that start this program again, as it was started: from where it lies, or as a module."""
+    """Return the words that start this program again: as it was started where that was as ``vico``, or as a module."""
     called = sys.argv[0]
-    return [sys.executable, "-m", "vico.cli.main"] if called.endswith(".py") else [called]
+    return [called] if Path(called).stem == "vico" else [sys.executable, "-m", "vico.cli.main"]
 
 
 def _evening(world: Path, people: Path, out: Path, seed: int) -> str:
