@@ -10,7 +10,6 @@ import json
 import struct
 import subprocess
 import sys
-import time
 import urllib.request
 from contextlib import ExitStack
 from pathlib import Path
@@ -58,9 +57,10 @@ class Client:
 
     def wait_for(self, status: str, step: int = 0) -> int:
         """Wait until the run is paused or has ended, at a step or after it; return the step."""
-        while (told := self.get("/api/run")["control"])["step"] < step or told["status"] != status:
-            time.sleep(0.05)
-        return told["step"]
+        while True:
+            told = self._next("control")  # comes once a second at least; a stream that nobody reads is closed
+            if told["step"] >= step and told["status"] == status:
+                return told["step"]
 
     def frame(self, step: int) -> bytes:
         """Return a step as a binary frame."""
@@ -108,7 +108,7 @@ def look(client: Client) -> None:
     step = client.steps(5)
     print(f"step {step}: {rain(client.frame(step)):.1f} mm of rain an hour")
 
-    branch = client.command("branch", name="dry", step=5)
+    branch = client.command("branch", step=5)
     step = client.steps(5)
     print(f"what if it stayed dry, in {Path(branch['path']).name}")
     print(f"step {step}: {rain(client.frame(step)):.1f} mm of rain an hour")

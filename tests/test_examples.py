@@ -142,5 +142,5 @@ def test_a_program_watches_a_run_and_reaches_into_it(
     printed = run("15_live.py", *where)
     assert "4 residents; the run is paused" in printed
     assert printed.count("step 5: ") == 4
-    assert "step 10: 4.0 mm of rain an hour\nwhat if it stayed dry, in live.dry\nstep 10: 0.0 mm" in printed
-    assert {path.name for path in tmp_path.iterdir()} == {"live", "live.dry"}
+    assert "step 10: 4.0 mm of rain an hour\nwhat if it stayed dry, in live.from-5\nstep 10: 0.0 mm" in printed
+    assert {path.name for path in tmp_path.iterdir()} == {"live", "live.from-5"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from command_line import vico
 from live_toy import live_toy
 from vico.agents.schedule import followers_of
 from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError
-from vico.runner.branches import branched_run
-from vico.runner.control import Control, waited
+from vico.runner.branches import branched_run, free_name
+from vico.runner.control import Control, Switch, waited
 from vico.runner.faults import FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
@@ -104,7 +105,7 @@ def test_an_interrupted_run_with_interventions_goes_on_as_if_it_had_not_been(
     recorder, checkpoint = Recorder.resume(out, sim, sources={}, wanted=12)
     agents.restore(checkpoint.agents)
     control = Control(out, script=DONE)
-    control.restore(checkpoint.notes, out=out)
+    control.restore(checkpoint.notes, out=out, step=checkpoint.step)
     assert len(read_interventions(out)) == 3
     with recorder:
         Runner(sim, agents, hooks=[RecordedRun(recorder, FaultLog(), notes=control.notes)], director=control).run(12)
@@ -122,8 +123,31 @@ def test_a_branch_shares_what_never_changes_and_leaves_the_first_run_whole(chang
     assert {path: path.read_bytes() for path in sorted(changed[0].rglob("*")) if path.is_file()} == before
     with pytest.raises(OutputExistsError, match="another name"):
         branched_run(changed[0], 8, "what if")
+    assert free_name(changed[0], "what if") == "what if-2"
     with pytest.raises(MissingFileError, match="step 7"):
         branched_run(changed[0], 7, "other")
+
+
+def test_a_branch_that_is_there_already_is_refused_and_the_run_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "run.wet").mkdir()
+    control = Control(tmp_path / "run", paused=True)
+    with live_toy(tmp_path / "run", control=control):
+        with pytest.raises(InputError, match="another name"):
+            waited(control.command("branch", {"name": "wet"}), 10)
+        waited(control.command("step", {"steps": 1}), 10)
+        assert not control.over
+
+
+def test_who_asked_for_a_branch_is_told_once_the_run_is_there(tmp_path: Path) -> None:
+    (tmp_path / "run.dry").mkdir()
+    told: Future[dict[str, Any]] = Future()
+    control = Control(tmp_path / "run", paused=True)
+    control.step, control.switch = 10, Switch(5, "dry", told)
+    control.restore({}, out=tmp_path / "run.dry", step=5)
+    assert not told.done()
+    assert control.told()["step"] == 5
+    control.end()
+    assert told.result(0) == {"step": 5, "path": str(tmp_path / "run.dry")}
 
 
 def test_a_run_waits_makes_single_steps_and_goes_on(tmp_path: Path) -> None:

@@ -258,15 +258,15 @@ class Job:
         faults = go_on_from(checkpoint, agents, sim)
         recorder.notes["faults"] = faults.record()
         if control is not None:
-            control.restore(checkpoint.notes, out=out)
+            control.restore(checkpoint.notes, out=out, step=checkpoint.step)
         return Leg(sim, agents, recorder, faults, every)
 
     def _switched(self, leg: Leg, control: Control) -> Leg:
         """Go on from a checkpoint in a sibling of the run's folder; the run so far stays whole."""
         assert control.switch is not None
-        step, name, told = control.switch
+        step, name, _ = control.switch
         out = branched_run(leg.recorder.out, step, name)
-        found = self._resumed(
+        return self._resumed(
             self._simulation(),
             leg.agents,
             leg.every,
@@ -274,8 +274,6 @@ class Job:
             control,
             branch_of={"run": leg.recorder.out.name, "step": step},
         )
-        told.set_result({"step": step, "path": str(out)})
-        return found
 
     def _simulation(self) -> Simulation:
         # Residents act on what they have in view and hear; mostly, the recorder alone looks at pictures.

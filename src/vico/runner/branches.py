@@ -26,6 +26,9 @@ from vico.sim.recording.schema import (
 )
 from vico.sim.recording.segments import segments_of
 
+#: A branch's name is told apart from others by a number where nobody has given one.
+_MOST_ALIKE = 1000
+
 _COPIED = (AGENTS, CAST, SETUP, SETUP_SHAPES, INTERVENTIONS, BOOKMARKS)
 
 
@@ -57,7 +60,7 @@ def branched_run(run: Path, step: int, name: str) -> Path:
     """
     if step not in checkpoint_steps(run):
         raise MissingFileError(f"{run}: no checkpoint of step {step}")
-    out = run.with_name(f"{run.name}.{name.replace(' ', '-')}")
+    out = branch_path(run, name)
     if out.exists():
         raise OutputExistsError(f"{out}: is there already; give the branch another name")
     work = out.with_name(f".{out.name}.partial")
@@ -83,6 +86,17 @@ def branched_run(run: Path, step: int, name: str) -> Path:
         write_json(work / MANIFEST, read_manifest(run) | {"status": "stopped"})
         os.replace(work, out)
     return out
+
+
+def branch_path(run: Path, name: str) -> Path:
+    """Return where a branch of a run is kept."""
+    return run.with_name(f"{run.name}.{name.replace(' ', '-')}")
+
+
+def free_name(run: Path, name: str) -> str:
+    """Return a name that no branch of a run has yet: the one given, or with a number after it."""
+    names = (name, *(f"{name}-{number}" for number in range(2, _MOST_ALIKE)))
+    return next(one for one in names if not branch_path(run, one).exists())
 
 
 def _share(folder: Path, into: Path) -> None:

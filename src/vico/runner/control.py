@@ -14,6 +14,7 @@ from vico.agents.base import Action
 from vico.errors import InputError, VicoError
 from vico.runner.arguments import Arguments
 from vico.runner.bookmarks import add_bookmark, bookmarks_of
+from vico.runner.branches import branch_path, free_name
 from vico.runner.loop import Runner
 from vico.runner.pace import Pace
 from vico.sim.interventions import (
@@ -111,6 +112,7 @@ class Control:
         self._pending: dict[str, Action] = {}
         self._steps_left = 0
         self._waiting: deque[_Waiting] = deque()
+        self._arriving: tuple[Future[dict[str, Any]], dict[str, Any]] | None = None
         self._something = threading.Condition()
 
     # Asked by others.
@@ -152,6 +154,7 @@ class Control:
     def before_step(self, runner: Runner) -> Mapping[str, Action]:
         """Do what is waiting, hold the run up while it is paused or too fast; return what agents do in its place."""
         self.step = runner.sim.metrics.steps
+        self._arrive()
         self._follow_script(runner)
         while True:
             self._do_waiting(runner)
@@ -179,6 +182,7 @@ class Control:
 
     def end(self) -> None:
         """Say that the run has ended: whoever waits is told so."""
+        self._arrive()
         with self._something:
             self._ended = True
             waiting, self._waiting = list(self._waiting), deque()
@@ -189,14 +193,25 @@ class Control:
         """Return what a checkpoint has to keep of it."""
         return {"interventions": self._lines, "pending": dict(self._pending)}
 
-    def restore(self, notes: Mapping[str, Any], *, out: Path) -> None:
-        """Go on from a checkpoint of a run in a folder, with what had been done to it by then."""
-        self.out, self.switch = out, None
+    def restore(self, notes: Mapping[str, Any], *, out: Path, step: int) -> None:
+        """Go on from a checkpoint of a run in a folder, with what had been done to it by then.
+
+        Who asked for it is told so once the run is there, before its next step.
+        """
+        if self.switch is not None:
+            self._arriving = self.switch.told, {"step": step, "path": str(out)}
+        self.out, self.switch, self.step = out, None, step
         self._lines, self._pending = int(notes.get("interventions", 0)), dict(notes.get("pending", {}))
         done = read_interventions(out)[: self._lines]
         write_interventions(out, done)
         self._script = deque(line for line in self._script if line not in done)
         self._pace.forget()
+
+    def _arrive(self) -> None:
+        if self._arriving is not None:
+            told, reply = self._arriving
+            self._arriving = None
+            told.set_result(reply)
 
     # Commands.
 
@@ -291,16 +306,15 @@ class Control:
             first = next(iter(checkpoint_steps(self.out)), None)
             known = "there is none" if first is None else f"the first is of step {first}"
             raise InputError(f"back: no checkpoint at or before step {step}; {known}")
-        return Switch(before[-1], given.text("name") or f"from-{before[-1]}", Future())
+        return self._elsewhere(before[-1], given, f"from-{before[-1]}")
 
     def branch(self, runner: Runner, given: Arguments) -> Switch:
         """Have the run go on in a folder of its own, from here or from an earlier checkpoint."""
-        name = given.text("name")
         if given.has("step"):
-            switch = self.back(runner, given)
-            return switch._replace(name=name or switch.name)
+            return self.back(runner, given)
+        switch = self._elsewhere(self.step, given, f"branch-{self.step}")
         self._save(runner)
-        return Switch(self.step, name or f"branch-{self.step}", Future())
+        return switch
 
     def bookmark(self, runner: Runner, given: Arguments) -> dict[str, Any]:
         """Remember a step with a text."""
@@ -317,6 +331,12 @@ class Control:
     def things(self, runner: Runner, given: Arguments) -> dict[str, Any]:
         """Tell what can be dropped."""
         return {"things": things_to_drop()}
+
+    def _elsewhere(self, step: int, given: Arguments, usual: str) -> Switch:
+        name = given.text("name")
+        if name and branch_path(self.out, name).exists():
+            raise InputError(f"there is a branch {name!r} already; give it another name")
+        return Switch(step, name or free_name(self.out, usual), Future())
 
     def _save(self, runner: Runner) -> None:
         if not runner.save():
