@@ -127,7 +127,9 @@ def test_both_renderers_take_the_same_pictures(
     assert same.mean() > 0.995
     assert len(np.unique(wanted.segmentation)) > (2 if cameras is INSIDE else 15)
     assert 8 not in got.segmentation
-    assert np.percentile(np.abs(wanted.depth - got.depth)[same], 99) < 1e-3
+    # A card lays corners on a grid of 1/256 pixel: slanted ground far away is off by as much.
+    slope = np.maximum(*(np.abs(np.gradient(wanted.depth[0], axis=axis)) for axis in (0, 1)))
+    assert np.percentile((np.abs(wanted.depth - got.depth)[0] - slope / 128)[same[0]], 99) < 1e-3
     assert np.percentile(np.abs(wanted.normals - got.normals)[same], 99) < 1e-2
     assert np.abs(wanted.rgb.astype(int) - got.rgb).mean() < 0.5
 
