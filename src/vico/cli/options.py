@@ -258,6 +258,8 @@ class RunOptions:
         Names, separated by commas; none for no robots.
     robot_places
         File (.json) of where robots start: {"robot_0": [x, y, yaw]}; metres and radians. Without it by the seed.
+    assistant_places
+        Likewise, where assistants start.
     physics
         Engine that moves robots: mujoco, or genesis (an extra).
     cars
@@ -336,6 +338,7 @@ class RunOptions:
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
     robot_places: Path | None = None
+    assistant_places: Path | None = None
     physics: Literal["mujoco", "genesis"] = "mujoco"
     cars: int = 30
     cyclists: int = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
 
 #: Steps between checkpoints unless a run says otherwise.
 STATES_EVERY = 300
+
+# Metres that are free around who is played, at least, where they start.
+_PLAYED_ROOM = {"robot": 1.2, "assistant": 0.6}
 
 # Options that decide nothing of what is in the run folder; the others are kept in its run.json.
 _NOT_KEPT = ("out", "resume", "workers", "force", "json", *LIVE)
@@ -169,6 +173,7 @@ class Job:
         """Read what is needed, and look at what is in the output folder."""
         found = None if options.force else _cut_short(out)
         check_output(out, world, community, force=options.force or found is not None)
+        place = read_world(world)
         config = SimConfig(
             seed=options.seed,
             assistants=options.assistants,
@@ -179,7 +184,8 @@ class Job:
             events=named_or_read(options.events),
             opening_hours=options.opening_hours,
             robots=_names(options.robots),
-            robot_places=read_json(options.robot_places) if options.robot_places is not None else {},
+            robot_places=_places("robot", options.robot_places, place, played),
+            assistant_places=_places("assistant", options.assistant_places, place, played),
             physics=options.physics,
             errands=True,
             cars=options.cars,
@@ -195,7 +201,6 @@ class Job:
             worn=_worn(options.wear),
             periods={} if played is None else {played.agent: PERIOD},
         )
-        place = read_world(world)
         people = read_community(community, place)
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
         return cls(options, out, place, people, config, sources, found, talk, played)
@@ -466,6 +471,15 @@ def _worn(text: str) -> dict[str, str]:
             raise InputError(f"run: --wear {entry!r}: give NAME=FILE.glb, a file that is there")
         found[name] = str(Path(path).resolve())
     return found
+
+
+def _places(kind: str, given: Path | None, world: World, played: PlayedAgent | None) -> Mapping[str, Sequence[float]]:
+    """Return where robots or assistants start: as a file says, and who is played where there is something to see."""
+    if given is not None or played is None or not played.agent.startswith(f"{kind}_"):
+        return read_json(given) if given is not None else {}
+    from vico.viewer.lively import lively_spot
+
+    return {played.agent: lively_spot(world, clearance=_PLAYED_ROOM[kind])}
 
 
 def _names(text: str) -> tuple[str, ...]:

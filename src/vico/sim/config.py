@@ -34,6 +34,8 @@ class SimSettings:
         How many of the community's residents take part, in the community's order; None for all.
     assistants
         Avatars under test, without home or schedule.
+    assistant_places
+        Where assistants start, by name, as `robot_places`; the others start where the seed says.
     robots
         Model names; robot ``i`` is the agent ``robot_i``.
     physics
@@ -85,6 +87,7 @@ class SimSettings:
     seed: int = 0
     residents: int | None = None
     assistants: int = 0
+    assistant_places: Mapping[str, Sequence[float]] = field(default_factory=dict)
     robots: tuple[str, ...] = ()
     physics: str = "mujoco"
     robot_places: Mapping[str, Sequence[float]] = field(default_factory=dict)
@@ -144,7 +147,8 @@ class SimConfig(SimSettings):
         if not 16 <= self.image <= 1024:
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
         object.__setattr__(self, "outputs", checked_outputs(self.outputs))
-        object.__setattr__(self, "robot_places", _checked_places(self.robot_places))
+        for name in ("assistant_places", "robot_places"):
+            object.__setattr__(self, name, _checked_places(name, getattr(self, name)))
         RenderQuality.of(self.quality)
         if self.renderer not in RENDERERS:
             raise InputError(f"simulation: renderer {self.renderer!r}; it has to be one of {', '.join(RENDERERS)}")
@@ -156,10 +160,11 @@ class SimConfig(SimSettings):
         return asdict(self)
 
 
-def _checked_places(places: Any) -> dict[str, tuple[float, ...]]:
-    """Return where robots are to start, as floats: equal places are equal configurations."""
+def _checked_places(field_name: str, places: Any) -> dict[str, tuple[float, ...]]:
+    """Return where somebody is to start, as floats: equal places are equal configurations."""
     if not isinstance(places, Mapping):
-        raise InputError('robot_places: give a table of places by name, such as {"robot_0": [x, y, yaw]}')
+        example = f'{{"{field_name.removesuffix("_places")}_0": [x, y, yaw]}}'
+        raise InputError(f"{field_name}: give a table of places by name, such as {example}")
     found: dict[str, tuple[float, ...]] = {}
     for name, values in places.items():
         try:
@@ -167,6 +172,6 @@ def _checked_places(places: Any) -> dict[str, tuple[float, ...]]:
         except (TypeError, ValueError):
             place = ()
         if len(place) != 3 or not all(math.isfinite(value) for value in place):
-            raise InputError(f"robot_places: {name}: {values!r}; give x, y (ENU metres) and yaw (radians)")
+            raise InputError(f"{field_name}: {name}: {values!r}; give x, y (ENU metres) and yaw (radians)")
         found[str(name)] = place
     return found

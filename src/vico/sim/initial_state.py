@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vico.rules import TRAM_SECTIONS
-from vico.seeds import rng
 from vico.sim import spawn, systems
 from vico.sim.appointments import Appointment
 from vico.sim.avatars import Avatars
@@ -75,8 +74,7 @@ def initial_state(
     events.names = state.names
     events.begin(0, state.second, events.names)
     spawn.place_residents(state, days, config.start)
-    for i in range(len(residents), len(people)):
-        spawn.place_anywhere(i, state, rng(config.seed, "spawn", people.names[i]))
+    spawn.place_assistants(len(residents), config.assistant_places, state, config.seed)
     take_umbrella(slice(None), state)
     state.homes = np.full(len(people), -1, np.int32)
     state.homes[: len(residents)] = [base.place_index.get(resident.home, -1) for resident in residents]
