@@ -8,12 +8,13 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "vico"
 
 # What lies below all rooms: single modules, and the room `io`, which uses nothing of ours but these.
-GROUND = {"errors", "version", "seeds", "threads", "exact", "rules", "clock", "crowd", "pixels"}
+GROUND = {"errors", "version", "seeds", "threads", "exact", "rules", "clock", "crowd", "pixels", "quaternions"}
 
 # Room -> the rooms (or single modules) of ours it may import. docs/architecture.md explains the order.
 ALLOWED = {
     "io": set(),
     "jobs": {"io"},
+    "kinematics": {"io"},
     "geo": {"io"},
     "world": {"geo.frame", "geo.overlay", "io"},
     "assets": {"world", "io"},
@@ -21,10 +22,11 @@ ALLOWED = {
     "worldgen": {"geo", "world", "assets", "render", "llm", "jobs", "io"},
     "community": {"world", "llm", "io"},
     "render": {"world", "assets", "io"},
-    "sim": {"world", "community", "render", "assets", "io"},
+    "sim": {"world", "community", "render", "assets", "kinematics", "io"},
     "envs": {"sim", "world", "community", "io.compiled"},
     "agents": {
         "envs",
+        "kinematics",
         "llm",
         "io.compiled",
         "io.data_files",

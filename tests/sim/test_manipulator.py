@@ -5,10 +5,10 @@ import pytest
 
 from robot_field import ENGINES, field, people
 from vico.assets.shapes import box
+from vico.kinematics.arm import hand_pose, reach_pose
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.arm import hand_pose, reach_pose
 from vico.sim.robots.work import Stage
 from vico.sim.simulation import Simulation
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import placards, umbrellas
 from vico.assets.models.movable import movable_grip
+from vico.quaternions import matrix_of
 from vico.sim.animation import Hands, Hold, clip_index, hand_frames
 from vico.sim.bodies import Drawn
 from vico.sim.holding import bearable_rain, carries_umbrella
-from vico.sim.quaternions import matrix_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_PEDESTRIAN_UMBRELLA, FIRST_UMBRELLA
 from vico.sim.umbrellas import lean_apart

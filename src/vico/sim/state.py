@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.quaternions import matrix_of, quaternion_of, upright
 from vico.sim.animation import LONGEST_BLEND
 from vico.sim.bodies import OBJECT, Bodies
-from vico.sim.quaternions import matrix_of, quaternion_of, upright
 
 # Entity numbers of what lives in a run; a world's own numbers all lie below.
 FIRST_RESIDENT = 1_000_000

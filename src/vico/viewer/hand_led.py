@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vico.agents.base import Action, Observation
 from vico.agents.human import PERIOD, Held
 from vico.assets.robots import MobileManipulator, RobotModel
-from vico.sim.robots.arm import Chain, hand_pose, solve
+from vico.kinematics.arm import Chain, hand_pose, solve
 from vico.sim.robots.manipulator import FINGER_SPEED, JOINT_SPEED
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vico.assets.robots import RobotModel
 from vico.errors import InputError
 from vico.io.compiled import compiled
-from vico.sim.quaternions import matrix_of
+from vico.quaternions import matrix_of
 
 #: How a joint is driven, as Genesis counts it: towards a position, towards a speed, by a force.
 POSITION, VELOCITY, FORCE = range(3)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, LIMB, TOUCH, RobotModel
+from vico.quaternions import matrix_of
 from vico.sim.physics.genesis_runtime import view
 from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID, ground_grid, robot_spec
 from vico.sim.physics.records import Capacity, StaticScene
-from vico.sim.quaternions import matrix_of
 
 #: Genesis takes the larger of two frictions, and 0.01 at least. Tyres and feet, which go before the ground in MuJoCo,
 #: have more than the ground here; solids and people have none of their own.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
+from vico.quaternions import matrix_of
 from vico.sim.physics.engine import Actuate
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.genesis_index import GenesisIndex
@@ -20,7 +21,6 @@ from vico.sim.physics.genesis_runtime import genesis, state_of, view
 from vico.sim.physics.mujoco_scene import CompiledScene
 from vico.sim.physics.mujoco_views import place_bodies
 from vico.sim.physics.records import Capacity, Party, StaticScene
-from vico.sim.quaternions import matrix_of
 
 #: Steps in which Genesis solves a frame: 1/200 s each in fine frames, 1/100 s in coarse ones. Fine ones in which
 #: nothing has to be held are solved in one.

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.quaternions import matrix_of
 from vico.sim.physics.engine import PhysicsEngine
 from vico.sim.physics.records import RigidObject
-from vico.sim.quaternions import matrix_of
 from vico.sim.state import MovableObjects
 
 #: Things enter physics within the first distance of a robot's base, and leave beyond the second, metres.

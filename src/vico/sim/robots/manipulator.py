@@ -6,8 +6,8 @@ import numpy as np
 
 from vico.assets.robots import MobileManipulator, RobotModel
 from vico.io.compiled import compiled
+from vico.kinematics.arm import Chain
 from vico.sim.physics.records import Motion
-from vico.sim.robots.arm import Chain
 from vico.sim.robots.controller import Array, MotorController
 from vico.sim.robots.tracking import planar_motion
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.exact import apply_matrix
+from vico.kinematics.arm import hand_pose, reach_pose
+from vico.kinematics.ways import CARRY, downward, way_down, way_to_carry
+from vico.quaternions import matrix_of
 from vico.sim.bodies import Bodies
 from vico.sim.physics.records import Base
-from vico.sim.quaternions import matrix_of
-from vico.sim.robots.arm import hand_pose, reach_pose
-from vico.sim.robots.arm_ways import CARRY, downward, way_down, way_to_carry
 from vico.sim.robots.decks import deck_spot, way_beside_deck
 from vico.sim.robots.manipulator import ARM_GOAL, ARM_NOW
 from vico.sim.robots.path_follower import RobotStatus

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import MobileManipulator
-from vico.sim.robots.arm import Chain
+from vico.kinematics.arm import Chain
 from vico.sim.robots.ways_of_many import OnTheirWays
 
 Array = NDArray[np.float64]

@@ -53,7 +53,7 @@ def hand_pose(chain, angles, origins, directions, out):  # type: ignore[no-untyp
 
 
 @compiled
-def _damped_step(jacobian, error, change):  # type: ignore[no-untyped-def]
+def damped_step(jacobian, error, change):  # type: ignore[no-untyped-def]
     """Write J^T (J J^T + d^2)^-1 error: by Cholesky's factors, in one order everywhere."""
     n = jacobian.shape[1]
     lower, half = np.zeros((6, 6)), np.empty(6)
@@ -109,7 +109,7 @@ def solve(chain, angles, goal, steps):  # type: ignore[no-untyped-def]
                     pose[a, 3] - origins[k, a]
                 )
                 jacobian[3 + i, k] = directions[k, i]
-        _damped_step(jacobian, error, change)
+        damped_step(jacobian, error, change)
         most = np.abs(change).max()
         share = min(1.0, _LONGEST / most) if most > 0.0 else 0.0
         for k in range(n):

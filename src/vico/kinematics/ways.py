@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.quaternions import matrix_of, quaternion_of
-from vico.sim.robots.arm import Chain, hand_pose, reach_pose, solve
+from vico.kinematics.arm import Chain, hand_pose, reach_pose, solve
+from vico.quaternions import matrix_of, quaternion_of
 
 Array = NDArray[np.float64]
 
