@@ -77,6 +77,18 @@ def field(*walls: tuple[float, float, float, float], height: HeightField | None 
     )
 
 
+def drawn_field(*, table: float = 0.0) -> World:
+    """Return a level field that can be looked at; at (3, 0) with a table of a height, metres."""
+    world = field()
+    world.__dict__["_models"] = {}
+    world._layers |= {"ground": [box((60, 60, 1), (0, 0, -0.5)).of_entity(2)], "rooms": []}
+    if table:
+        top = box((0.5, 0.8, 0.04), (3.0, 0.0, table - 0.02)).of_entity(77)
+        world._layers["ground"].append(top)
+        world._layers["collision"].append(top)
+    return world
+
+
 def people(*points: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.0)) -> Bodies:
     n = len(points)
     quarter = np.full(n, 0.25)

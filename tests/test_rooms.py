@@ -40,7 +40,7 @@ ALLOWED = {
         "world.heights",
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
-    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "jobs", "io"},
+    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "kinematics", "llm", "jobs", "io"},
     "datasets": {"challenges", "runner", "sim", "world", "assets", "jobs", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from vico.assets.robots import MobileManipulator, robot_model
 from vico.kinematics.arm import Chain, hand_pose
 from vico.kinematics.inverse import free_reach
-from vico.kinematics.limbs import Jaw, Limbs, ball_places, limbs_of, with_held
+from vico.kinematics.limbs import Jaw, Limbs, ball_places, box_points, limbs_of, with_held
 from vico.kinematics.planning import Arm, free_way, is_free, way_is_free
 from vico.kinematics.room import Room, limb_gap, room_of, seen_nothing
 from vico.kinematics.ways import downward
@@ -146,7 +146,7 @@ def test_there_is_no_way_into_what_is_closed_nor_from_within_a_thing() -> None:
 def test_what_is_held_needs_room_too() -> None:
     c = chain()
     limbs = limbs_of(c, RADII, jaw=Jaw(), opening=0.08)
-    held = with_held(limbs, np.array([-0.1, -0.08, 0.12]), np.array([0.1, 0.08, 0.42]))
+    held = with_held(limbs, box_points(np.array([0.1, 0.08, 0.15]), 0.05) + np.array([0.0, 0.0, 0.27]), 0.015)
     assert len(held.link) > len(limbs.link)
     goal = downward(np.array([0.55, 0.0, 0.35]), np.array([0.0, 1.0]), 0.0)
     table = room_of(board((0.4, -0.4, 0.15), (0.5, 0, 0), (0, 0.8, 0)), POSTS)

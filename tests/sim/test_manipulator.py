@@ -69,6 +69,43 @@ def test_eleven_numbers_move_arm_fingers_and_base() -> None:
     assert yaw[-1] - yaw[9] == pytest.approx(0.5 * 2.0, abs=0.1)
 
 
+@pytest.mark.parametrize("then", ["stop", "go_to", "velocity"])
+def test_an_arm_stays_where_motor_commands_brought_it(then: str) -> None:
+    sim = make("manipulator")
+    arm = np.array([0.3, 0.4, 0.2, 1.0, -0.3, 0.5, 0.1])
+    for _ in range(4):
+        sim.step({"robot_0": {"type": "control", "vector": [*arm, 0.1, 0.1, 0.0, 0.0]}})
+    actions = {
+        "stop": {"type": "stop"},
+        "go_to": {"type": "go_to", "target": [3.0, 0.0, 0.0]},
+        "velocity": {"type": "control", "space": "velocity", "vector": [0.3, 0.0, 0.0]},
+    }
+    for _ in range(3):
+        sim.step({"robot_0": actions[then]})
+        assert sim.state.robots.joint_positions()[0][:7] == pytest.approx(arm, abs=0.05)
+
+
+def test_what_motor_commands_took_hold_of_is_known_to_be_in_the_hand() -> None:
+    sim = make("manipulator")
+    thing = parcel(sim, 2.5, 0.8)
+    sim.step({"robot_0": {"type": "pick", "object": thing}})
+    assert until_done(sim, 30)
+    robots = sim.state.robots
+    held = [*robots.joint_positions()[0][:7], 0.0, 0.0, 0.0, 0.0]
+    sim.step({"robot_0": {"type": "control", "vector": held}})
+    robots.run.work[0].arrays.held[:] = 0.0  # nobody remembers it
+    sim.step({"robot_0": {"type": "control", "vector": held}})
+    assert robots.in_hand(0) == thing
+    # It is not in the robot's own way, and is put down like any other.
+    sim.step({"robot_0": {"type": "place", "target": [0.0, 2.0, 0.0]}})
+    assert until_done(sim, 40)
+    sim.advance(1.0)
+    assert sim.state.objects.position[0] == pytest.approx([0.0, 2.0, 0.0], abs=0.03)
+    empty = [*robots.joint_positions()[0][:7], 0.1, 0.1, 0.0, 0.0]
+    sim.step({"robot_0": {"type": "control", "vector": empty}})
+    assert robots.in_hand(0) == 0
+
+
 def test_the_arms_kinematics_are_those_of_physics_and_are_inverted() -> None:
     robots = RobotPopulation(field(), ["manipulator"], [[0, 0, 0]], packs=False)
     robots.advance(0.1, Bodies.none())

@@ -77,25 +77,30 @@ def limbs_of(chain: Chain, radii: Array, *, jaw: Jaw, opening: float) -> Limbs:
     return _limbs(found)
 
 
-def with_held(limbs: Limbs, low: Array, high: Array) -> Limbs:
+def with_held(limbs: Limbs, points: Array, radius: float) -> Limbs:
     """Return limbs with a held thing on the last link.
 
     Parameters
     ----------
-    low, high
-        Corners of a box around it in the frame of the last joint, metres.
+    points
+        All over the thing, in the frame of the last joint, metres, shape ``(m, 3)``.
+    radius
+        Of the balls there, metres.
     """
-    size = high - low
-    radius = max(float(np.sort(size)[1]) / 4, 0.02)
-    counts = np.maximum(np.ceil(size / (2 * radius)).astype(int), 1)
-    steps = [low[k] + (np.arange(counts[k]) + 0.5) * size[k] / counts[k] for k in range(3)]
     last = int(limbs.link[-1])
-    points = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
     return Limbs(
         np.concatenate([limbs.link, np.full(len(points), last)]),
         np.concatenate([limbs.centre, points]),
         np.concatenate([limbs.radius, np.full(len(points), radius)]),
     )
+
+
+def box_points(half: Array, spacing: float) -> Array:
+    """Return points on the faces of a box about the origin, no farther apart than told, shape ``(m, 3)``."""
+    counts = np.maximum(np.ceil(2.0 * half / spacing).astype(int), 1)
+    steps = [np.linspace(-half[k], half[k], counts[k] + 1) for k in range(3)]
+    points = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    return points[(np.abs(np.abs(points) - half) < 1e-9).any(axis=1)]
 
 
 def _along(start: Array, end: Array, radius: float) -> list[Array]:

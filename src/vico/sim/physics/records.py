@@ -228,6 +228,14 @@ class Contacts:
             np.add.at(found, self.link[mine, side], self.force[mine])
         return found
 
+    def objects_at(self, robot: int, link: int) -> set[int]:
+        """Return the slots of the objects that a link of a robot touches."""
+        found: set[int] = set()
+        for a, b in ((0, 1), (1, 0)):
+            mine = (self.party[:, a] == Party.ROBOT) & (self.owner[:, a] == robot) & (self.link[:, a] == link)
+            found.update(self.owner[mine & (self.party[:, b] == Party.OBJECT), b].tolist())
+        return found
+
     def touching(self, robot: int, link: int, slot: int) -> bool:
         """Whether a link of a robot touches the object in a slot."""
         for a, b in ((0, 1), (1, 0)):

@@ -41,6 +41,7 @@ _DONE = {Kind.PICK: "picked", Kind.PLACE: "placed", Kind.OFFER: "handed_over"}
 _ARM_LENGTH, _HELD_OUT = 0.45, 0.95
 _LOW = 0.05  # metres below where things are carried that make a hand low
 _GRIP_TIME, _STALE, _SETTLED = 1.2, 25.0, 0.02
+_REACH = 1.5  # metres from the base's middle in which what is in the hand can be
 _PEOPLE = 0.9  # metres ahead of the base in which nobody may be
 
 
@@ -72,6 +73,7 @@ def begin(run: RobotRun, robot: int, kind: Kind, target: Array, entity: int = 0)
         If the robot has no arm.
     """
     work, row, _ = _work(run, robot, kind.name.lower())
+    abandon(run, robot)
     a = work.arrays
     a.kind[row], a.entity[row], a.target[row] = kind, entity, target
     a.stage[row] = Stage.RAISE if kind == Kind.PLACE and not _is_raised(run, robot, work) else Stage.GO
@@ -130,11 +132,15 @@ def place_on(run: RobotRun, robot: int, entity: int) -> None:
 
 
 def abandon(run: RobotRun, robot: int) -> None:
-    """Leave a task: the arm stays where it is, and holds what it holds."""
+    """Leave a task, or motor commands: the arm stays where it is, and holds what it holds."""
     found = work_of(run, robot)
     if found is not None:
         work, row, memory = found
         work.arrays.kind[row] = Kind.NOTHING
+        if run.arrays.mode[robot] == RobotMode.MOTORS:
+            rest = work.model.rest
+            memory[ARM_NOW] = run.arrays.command[robot, : len(rest)] - rest
+            work.arrays.held[row] = _felt(run, robot, work)
         memory[ARM_GOAL] = memory[ARM_NOW]
 
 
@@ -144,6 +150,8 @@ def in_hand(run: RobotRun, robot: int) -> int:
     if found is None:
         return 0
     work, row, _ = found
+    if run.arrays.mode[robot] == RobotMode.MOTORS:
+        return int(_felt(run, robot, work)[0])
     held = work.arrays.held[row]
     thing = _object(run, int(held[0])) if held[0] else None
     # Of a thing that is being handed over its taker says so.
@@ -152,6 +160,21 @@ def in_hand(run: RobotRun, robot: int) -> int:
         if objects.holder[k] or _depth_below_hand(run, robot, work, objects, k) is None:
             held[:] = 0.0
     return int(held[0])
+
+
+def _felt(run: RobotRun, robot: int, work: Work) -> tuple[float, float]:
+    """Return what all fingers touch and is between them, and how far its underside is below the grip; else zeros."""
+    links, contacts = run.engine.link_names(robot), run.engine.contacts()
+    fingers = [contacts.objects_at(robot, links.index(name)) for name in work.model.sensors.contacts]
+    if not fingers or not set.intersection(*fingers):
+        return 0.0, 0.0
+    objects = run.objects
+    near = np.hypot(*(objects.position[:, :2] - run.position(robot)[:2]).T) < _REACH
+    for k in np.flatnonzero(near & (objects.holder == 0)).tolist():
+        depth = _depth_below_hand(run, robot, work, objects, k)
+        if depth is not None:
+            return float(objects.entity[k]), depth
+    return 0.0, 0.0
 
 
 def can_grasp(run: RobotRun, robot: int, size: Array) -> bool:

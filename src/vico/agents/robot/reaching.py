@@ -1,0 +1,264 @@
+"""Ways of an arm to a thing, to where it is put down, and to where it is carried, planned round what was seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.robot.body import ArmBody
+from vico.agents.robot.grasps import Grasp, ThingBox
+from vico.kinematics.inverse import free_reach
+from vico.kinematics.limbs import Limbs, with_held
+from vico.kinematics.planning import Arm, free_way, is_free, way_is_free
+from vico.kinematics.room import Room, room_of
+from vico.kinematics.ways import straight_way
+
+Array = NDArray[np.float64]
+
+#: Metres a thing is lifted, and that hands keep off what stands around on their way.
+LIFT, GAP = 0.16, 0.02
+# Metres above a spot from which a thing comes down to it: as high as the arm reaches.
+_LIFTS = (LIFT, 0.09, 0.04)
+# Where hands come near things on purpose, the grid of what was seen is coarser than the room there is.
+_CLOSE = -0.03
+_NEARER = (0.0, -0.01, -0.02, _CLOSE)
+# Where things are carried: hand in the base's frame, the first that can be reached.
+_CARRY = ((0.46, -0.17, 0.78), (0.50, 0.0, 0.70), (0.42, -0.25, 0.70))
+_CLEAR = 0.06  # metres that pads are long below their middle, and more
+_BALL = 0.018  # metres: radius of the balls that a held thing is made of
+_TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))  # of what is held, about the vertical
+
+
+class Reach(NamedTuple):
+    """Ways of an arm, angles, each shape ``(m, 7)``.
+
+    Attributes
+    ----------
+    over
+        From where it is to before the pose.
+    there
+        Straight to the pose.
+    away
+        From it: with a thing up, without one back.
+    opening
+        Of each finger on the way there, metres.
+    number
+        Of the grasp, among those that were given.
+    """
+
+    over: Array
+    there: Array
+    away: Array
+    opening: float
+    number: int
+
+
+def room_around(body: ArmBody, points: Array) -> Room:
+    """Return the room that an arm has among points in its base's frame, on ground as level as the base."""
+    return room_of(points, body.posts, ground=-body.stand - 0.04)
+
+
+def reach_thing(
+    body: ArmBody, rooms: tuple[Room, Room], now: Array, grasps: Sequence[Grasp], *, skip: Collection[int] = ()
+) -> Reach | None:
+    """Return ways to the first of some grasps that can be reached, and up with the thing; None without one.
+
+    Parameters
+    ----------
+    rooms
+        With the thing itself, for the way over, and without it, for the last bit.
+    now
+        Angles of the arm, rad.
+    skip
+        Grasps that are not tried.
+    """
+    for number, grasp in enumerate(grasps):
+        if number in skip:
+            continue
+        arm = Arm(body.chain, body.limbs(grasp.opening), rooms[0], GAP)
+        there = _there(arm, body, now, grasp.before, grasp.pose, last=rooms[1])
+        if there is None:
+            continue
+        lifted = grasp.pose.copy()
+        lifted[2, 3] += LIFT
+        away = straight_way(body.chain, there[1][-1], grasp.pose, lifted)
+        if away is None:
+            away = there[1][::-1]
+        return Reach(*there, away, grasp.opening, number)
+    return None
+
+
+def reach_spot(body: ArmBody, room: Room, now: Array, spot: Array, held: Held) -> Reach | None:
+    """Return ways that bring a held thing's underside to a spot, and the empty hand back up; None without one.
+
+    Parameters
+    ----------
+    spot
+        In the base's frame, metres, shape ``(3,)``.
+    """
+    limbs = held.on(body.limbs(held.opening))
+    arm = Arm(body.chain, limbs, room, GAP)
+    # Swung about, things turn in the jaw: ways on which they stay level come first.
+    for level, lift in product((True, False), _LIFTS):
+        for number, turn in enumerate(_TURNS):
+            pose = held.pose_over(spot, turn)
+            above = pose.copy()
+            above[2, 3] += lift
+            there = _there(arm, body, now, above, pose, level=level)
+            if there is not None:
+                return Reach(*there, _retreat(body, there[1], pose, held.above), held.opening, number)
+    return None
+
+
+def carry_way(body: ArmBody, room: Room, now: Array, held: Held | None, *, opening: float) -> Array | None:
+    """Return a way to where things are carried, or folded without one, shape ``(m, 7)``; None if none is free.
+
+    Parameters
+    ----------
+    opening
+        Of each finger, metres.
+    """
+    limbs = body.limbs(opening)
+    arm = Arm(body.chain, held.on(limbs) if held else limbs, room, GAP)
+    if held is None:
+        return _way(arm, now, body.rest)
+    for place in _CARRY:
+        for turn in _TURNS:
+            goal = np.column_stack([held.turned(turn), place])
+            way = _level_way(arm, body, now, goal)
+            if way is not None:
+                return way
+    for place in _CARRY:
+        goals = [np.column_stack([held.turned(turn), place]) for turn in _TURNS]
+        found = free_reach(arm, goals, now, posture=body.rest)
+        way = None if found is None else _way(arm, now, found[0])
+        if way is not None:
+            return way
+    return None
+
+
+class Held(NamedTuple):
+    """A thing in the jaw.
+
+    Attributes
+    ----------
+    points
+        All over it, in the frame of the last joint, metres, shape ``(m, 3)``.
+    below, above
+        From the middle between the pads down to its underside, and how much of it is beside the pads, metres.
+    opening
+        Of each finger, metres.
+    rotation
+        Of the hand as it closed, in the base's frame, shape ``(3, 3)``: turned about the vertical alone, the thing
+        stands as it stood.
+    """
+
+    points: Array
+    below: float
+    above: float
+    opening: float
+    rotation: Array
+
+    def on(self, limbs: Limbs) -> Limbs:
+        """Return limbs with the thing."""
+        return with_held(limbs, self.points, _BALL)
+
+    def turned(self, turn: float) -> Array:
+        """Return the rotation of the hand with the thing turned about the vertical, rad, shape ``(3, 3)``."""
+        c, s = math.cos(turn), math.sin(turn)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ self.rotation
+
+    def pose_over(self, spot: Array, turn: float) -> Array:
+        """Return the pose of the hand with which the thing's underside is at a spot."""
+        return np.column_stack([self.turned(turn), spot + np.array([0.0, 0.0, self.below])])
+
+
+def held_thing(body: ArmBody, angles: Array, box: ThingBox, opening: float) -> Held:
+    """Return what a hand holds.
+
+    Parameters
+    ----------
+    angles
+        Of the arm as it closed.
+    box
+        Round the thing as it stood then.
+    opening
+        Of each finger since, metres.
+    """
+    pose = body.hand(angles)
+    joint = pose[:, 3] - body.chain.grip * pose[:, 2]
+    points = (box.points(_BALL, 3.0 * _BALL) - joint) @ pose[:, :3]
+    return Held(
+        points,
+        float(pose[2, 3] - box.low),
+        float(max(box.high - pose[2, 3], 0.0)) + _CLEAR,
+        opening,
+        pose[:, :3].copy(),
+    )
+
+
+def _there(
+    arm: Arm, body: ArmBody, now: Array, before: Array, pose: Array, *, last: Room | None = None, level: bool = False
+) -> tuple[Array, Array] | None:
+    """Return a free way to before a pose and the straight one to it; None if either is not free.
+
+    Parameters
+    ----------
+    last
+        Room that the straight way has, if that is another one.
+    level
+        Whether the hand is to go straight to before the pose, too.
+    """
+    comes = arm if last is None else arm._replace(room=last)
+    if level:
+        over = _level_way(arm, body, now, before)
+        straight = None if over is None else straight_way(body.chain, over[-1], before, pose)
+        return (over, straight) if straight is not None and over is not None and _comes(comes, straight) else None
+    found = free_reach(arm, [before], now, posture=body.rest)
+    if found is None:
+        return None
+    straight = straight_way(body.chain, found[0], before, pose)
+    if straight is None or not _comes(comes, straight):
+        return None
+    over = _way(arm, now, found[0])
+    return None if over is None else (over, straight)
+
+
+def _comes(arm: Arm, straight: Array) -> bool:
+    """Return whether a hand may go the last bit to what it is after."""
+    return way_is_free(arm._replace(gap=_CLOSE), straight)
+
+
+def _level_way(arm: Arm, body: ArmBody, now: Array, goal: Array) -> Array | None:
+    """Return a straight way of the hand to a pose, on which a thing hardly tilts; None if it is not free."""
+    way = straight_way(body.chain, now, body.hand(now), goal)
+    if way is None:
+        return None
+    gap = next((gap for gap in (arm.gap, *_NEARER) if is_free(arm._replace(gap=gap), now)), None)
+    return way if gap is not None and way_is_free(arm._replace(gap=gap), np.vstack([now, way])) else None
+
+
+def _way(arm: Arm, now: Array, goal: Array) -> Array | None:
+    """Return a free way; from where something is too near, one that keeps off less."""
+    start = now
+    for gap in (arm.gap, *_NEARER):
+        nearer = arm._replace(gap=gap)
+        if is_free(nearer, start):
+            return free_way(nearer, start, goal)
+    return None
+
+
+def _retreat(body: ArmBody, there: Array, pose: Array, tall: float) -> Array:
+    """Return angles that bring an empty hand off what it put down: back along itself as far as it stands high."""
+    for away in np.arange(max(LIFT, tall), 0.03, -0.02).tolist():
+        back = pose.copy()
+        back[:, 3] -= pose[:, 2] * away
+        out = straight_way(body.chain, there[-1], pose, back)
+        if out is not None:
+            return out
+    return there[::-1]

@@ -1,0 +1,54 @@
+"""What a robot sees around its base: points, and whose they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.perception import points_from_depth
+from vico.agents.robot.body import Stance
+
+Array = NDArray[np.float64]
+
+# Points farther away say nothing about what an arm can do, metres.
+_FARTHEST = 6.0
+
+
+class Look(NamedTuple):
+    """One picture, as points.
+
+    Attributes
+    ----------
+    points
+        In the base's frame, metres, shape ``(n, 3)``.
+    entity
+        What each belongs to, shape ``(n,)``.
+    """
+
+    points: Array
+    entity: NDArray[np.int64]
+
+    def of(self, entity: int) -> Array:
+        """Return the points of one thing, shape ``(m, 3)``."""
+        return self.points[self.entity == entity]
+
+    def without(self, *entities: int) -> Array:
+        """Return the points of everything else."""
+        return self.points[~np.isin(self.entity, entities)]
+
+
+def look(observation: Mapping[str, Any], *, step: int = 1) -> Look:
+    """Return what an observation's depth and segmentation show, near the base.
+
+    Parameters
+    ----------
+    step
+        Use every `step`-th row and column.
+    """
+    depth = np.where(observation["depth"] < _FARTHEST, observation["depth"], 0.0)
+    points, pixels = points_from_depth(depth, observation["intrinsics"], observation["extrinsics"], step=step)
+    entity = np.asarray(observation["segmentation"], np.int64).reshape(-1)[pixels]
+    return Look(Stance.of(observation).inside(points), entity)
