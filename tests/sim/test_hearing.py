@@ -93,3 +93,18 @@ def test_the_event_tells_who_missed_it(capsys: pytest.CaptureFixture[str]) -> No
     event = next(event for event in result.events if event.kind == "message")
     assert (event.data["hearers"], event.data["missed"]) == ([], {"assistant_1": "noise"})
     assert result.observations["assistant_1"]["events"] == []
+
+
+def test_robots_are_heard_by_people_near_and_by_each_other_wherever_they_are() -> None:
+    places = {"robot_0": (-20.0, -22.0, 0.0), "robot_1": (20.0, 25.0, 0.0)}
+    config = SimConfig(assistants=2, robots=("husky", "husky"), robot_places=places, observe=(), weather="clear")
+    sim = Simulation(toy_city.world(), None, config)
+    people = sim.state.people
+    people.room[:] = people.place[:] = -1
+    people.position[:, :2] = [[-20.0, -18.0], [20.0, 20.0]]
+    result = sim.step({"robot_0": {"type": "communicate", "text": "Here is your parcel."}})
+    told = {name: result.observations[name]["events"] for name in ("assistant_0", "assistant_1", "robot_1")}
+    assert [message["text"] for message in told["assistant_0"]] == ["Here is your parcel."]
+    assert told["assistant_0"][0]["speaker"] == "robot_0"
+    assert told["assistant_1"] == []
+    assert [message["text"] for message in told["robot_1"]] == ["Here is your parcel."]

@@ -58,25 +58,63 @@ class Heard(NamedTuple):
 def hearers_of(state: SimulationState, i: int, reach: float) -> Heard:
     """Return who hears what person `i` says to everybody within `reach` metres in the same space."""
     p = state.people
-    eyes = eye_height(state).tolist()
-    voice = _NORMAL if reach <= _NORMAL_RANGE else _RAISED
-    outdoors = p.room[i] < 0 and p.vehicle[i] != Vehicle.BUS
+    outdoors = bool(p.room[i] < 0 and p.vehicle[i] != Vehicle.BUS)
     away = np.linalg.norm(p.position - p.position[i], axis=1)
-    near = [(p.names[j], j) for j in np.flatnonzero(away <= reach).tolist() if j != i and state.same_space(i, j)]
-    places = [(name, p.position[j], eyes[j]) for name, j in near]
+    near = [j for j in np.flatnonzero(away <= reach).tolist() if j != i and state.same_space(i, j)]
+    eyes = eye_height(state).tolist()
+    places = [(p.names[j], p.position[j], eyes[j]) for j in near]
     if state.robots is not None and (outdoors or p.room[i] >= 0):
         positions, heights = state.robots.bodies().position, state.robots.camera_heights()
         close = np.linalg.norm(positions - p.position[i], axis=1) <= reach
         close &= state.robots.rooms == p.room[i]
         places += [(state.robots.names[k], positions[k], float(heights[k])) for k in np.flatnonzero(close).tolist()]
-    mouth = p.position[i] + _up(eyes[i])
+    quiet = None if outdoors else _BUS if p.room[i] < 0 else _ROOM
+    return _heard(state, p.position[i] + _up(eyes[i]), places, reach, quiet)
+
+
+def hearers_of_robot(state: SimulationState, robot: int, reach: float) -> Heard:
+    """Return who hears what a robot says: people within `reach` metres in the same space, and all other robots.
+
+    Robots hear each other by radio, wherever they are.
+    """
+    assert state.robots is not None
+    p, position, room = state.people, state.robots.bodies().position[robot], int(state.robots.rooms[robot])
+    near = np.linalg.norm(p.position - position, axis=1) <= reach
+    near &= (p.room == room) & (p.vehicle != Vehicle.BUS)
+    eyes = eye_height(state).tolist()
+    places = [(p.names[j], p.position[j], eyes[j]) for j in np.flatnonzero(near).tolist()]
+    mouth = position + _up(float(state.robots.camera_heights()[robot]))
+    found = _heard(state, mouth, places, reach, None if room < 0 else _ROOM)
+    found.hearers.extend(name for k, name in enumerate(state.robots.names) if k != robot)
+    return found
+
+
+def _heard(
+    state: SimulationState,
+    mouth: NDArray[np.float64],
+    places: list[tuple[str, NDArray[np.float64], float]],
+    reach: float,
+    quiet: float | None,
+) -> Heard:
+    """Return who understands a voice.
+
+    Parameters
+    ----------
+    places
+        Names of who is near, where they stand, and how high they hear, metres.
+    reach
+        As far as whoever speaks wants to be heard, metres.
+    quiet
+        How loud it is there, dB; None outdoors, where that is not everywhere the same.
+    """
+    voice, outdoors = _NORMAL if reach <= _NORMAL_RANGE else _RAISED, quiet is None
     found = Heard([], {})
     vehicles = _driven(state) if outdoors and places else []
     for name, feet, height in places:
         ear = feet + _up(height)
         level = voice - 20.0 * math.log10(max(float(np.linalg.norm(ear - mouth)), 1.0))
         behind = outdoors and not is_clear(mouth, ear, opaque_grid(state.world))
-        noise = _noise(state, vehicles, ear) if outdoors else _BUS if p.room[i] < 0 else _ROOM
+        noise = _noise(state, vehicles, ear) if quiet is None else quiet
         if level - (_CORNER if behind else 0.0) - noise >= UNDERSTOOD:
             found.hearers.append(name)
         else:

@@ -8,9 +8,9 @@ import numpy as np
 
 from vico.rules import EARSHOT
 from vico.sim.actions.fields import Field
-from vico.sim.actions.model import ActionType, Situation, Values
+from vico.sim.actions.model import ActionType, Actors, Situation, Values
 from vico.sim.bodies import RESIDENT
-from vico.sim.hearing import hearers_of
+from vico.sim.hearing import hearers_of, hearers_of_robot
 from vico.sim.holding import free_hand
 from vico.sim.moves import gesture, wrapped
 from vico.sim.simulation_state import SimulationState
@@ -35,6 +35,14 @@ def communicate(values: Values, i: int, state: SimulationState) -> None:
             _face(j, i, state)
     if near:
         _face(i, near[0], state)
+
+
+def communicate_as_robot(values: Values, robot: int, state: SimulationState) -> None:
+    """Say something to people near, as `communicate` does, and to all other robots by radio."""
+    assert state.robots is not None
+    heard = hearers_of_robot(state, robot, values.get("range", EARSHOT))
+    position = state.robots.bodies().position[robot]
+    state.events.say(state.robots.names[robot], values["text"], position, heard.hearers, heard.missed)
 
 
 def _face(i: int, j: int, state: SimulationState) -> None:
@@ -76,6 +84,17 @@ SPEECH = (
         communicate,
         fields={"text": Field("text", slot="text"), "range": _RANGE},
         when=Situation.AWAKE,
+    ),
+)
+#: What robots do under that name.
+ROBOT_SPEECH = (
+    ActionType(
+        "communicate",
+        "Have a robot say something to people near it, and to all other robots by radio; it goes on with what it does.",
+        communicate_as_robot,
+        fields={"text": Field("text"), "range": _RANGE},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
     ),
 )
 REPORTS = (
