@@ -22,7 +22,7 @@ HELPERS = "assistant_"
 CALL_DISTANCE, HAND_OVER_DISTANCE = 10.0, 1.4
 #: So long one waits for a helper who spoke to come near, seconds.
 WAITS_FOR = 60.0
-#: Who is helped walks home briskly, metres a second; the old as much faster than they do else.
+#: Who is helped walks home briskly, metres a second; the old as much slower as they do else.
 PACE_HOME = 1.4
 # Home is to be reached by then, so that nobody runs; and a stay for ever after.
 _BY = "23:59:00"
@@ -159,15 +159,27 @@ class Requester:
         )
 
     def _homeward(self, time: float) -> ScheduleFollower:
-        now = clock_of(int(time % DAY))
-        home = self._resident.home
-        plan = (
-            _Item("commute", now, _BY, "walk home", None),
-            # Who comes home sits down, and leaves the hall to others.
-            _Item("meal", _BY, "23:59:59", "have a rest at home", home, tag="meal_home"),
-        )
-        briskly = PACE_HOME * walk_speed(self._resident.age) / WALK_SPEED
-        return ScheduleFollower(_WayHome(self._resident, plan), self._map, seed=self._seed, paces=(briskly, briskly))
+        return way_home(self._resident, self._map, time=time, pace=PACE_HOME, seed=self._seed)
+
+
+def way_home(resident: Dweller, public_map: PublicMap, *, time: float, pace: float, seed: int) -> ScheduleFollower:
+    """Return who goes home from wherever they are, and stays there.
+
+    Parameters
+    ----------
+    time
+        Now, seconds since the first midnight.
+    pace
+        Of a grown-up, metres a second; the old are as much slower as they are else.
+    """
+    now = clock_of(int(time % DAY))
+    plan = (
+        _Item("commute", now, _BY, "walk home", None),
+        # Who comes home sits down, and leaves the hall to others.
+        _Item("meal", _BY, "23:59:59", "have a rest at home", resident.home, tag="meal_home"),
+    )
+    own = pace * walk_speed(resident.age) / WALK_SPEED
+    return ScheduleFollower(_WayHome(resident, plan), public_map, seed=seed, paces=(own, own))
 
 
 def first_name(name: str) -> str:
@@ -187,4 +199,13 @@ def is_called(name: str, text: str) -> bool:
     return re.search(rf"(?<![\w-]){re.escape(first)}(?![\w-])", text.casefold()) is not None
 
 
-__all__ = ["CALL_DISTANCE", "HAND_OVER_DISTANCE", "HELPERS", "WAITS_FOR", "Requester", "first_name", "is_called"]
+__all__ = [
+    "CALL_DISTANCE",
+    "HAND_OVER_DISTANCE",
+    "HELPERS",
+    "WAITS_FOR",
+    "Requester",
+    "first_name",
+    "is_called",
+    "way_home",
+]

@@ -14,6 +14,7 @@ CHALLENGES = {
     "assistant": "vico.challenges.assistant.challenge:ASSISTANT",
     "commute": "vico.challenges.commute.challenge:COMMUTE",
     "influence": "vico.challenges.influence:INFLUENCE",
+    "robot": "vico.challenges.robot.challenge:ROBOT",
 }
 #: The method, of any challenge, that asks a language model.
 ASKS_A_MODEL = "llm"

@@ -9,7 +9,7 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, InfluenceOptions
+from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, InfluenceOptions, RobotOptions
 
 # The fields of a record are options of the verb itself, not of a part of it.
 _FLAT = tyro.conf.arg(name="")
@@ -89,6 +89,17 @@ def evaluate_commute(options: Annotated[CommuteOptions, _FLAT]) -> int:
     from vico.cli import evaluate as verb
 
     return verb.commute(options)
+
+
+@evaluation.command(name="robot")
+def evaluate_robot(options: Annotated[RobotOptions, _FLAT]) -> int:
+    """Judge robots with an arm and a deck that bring things, and go along with people, by real contact.
+
+    Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
+    """
+    from vico.cli import evaluate as verb
+
+    return verb.robot(options)
 
 
 @leaderboard.command(name="add")

@@ -25,7 +25,13 @@ from vico.challenges.tables.markdown import fault_lines, not_played_lines, resul
 from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
 from vico.cli import leaderboard
-from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, EvaluationOptions, InfluenceOptions
+from vico.cli.evaluation_options import (
+    AssistantOptions,
+    CommuteOptions,
+    EvaluationOptions,
+    InfluenceOptions,
+    RobotOptions,
+)
 from vico.cli.live import city_of, told
 from vico.cli.output import check_output, print_json
 from vico.errors import InputError, OutputError, OutputExistsError
@@ -90,6 +96,15 @@ def commute(options: CommuteOptions) -> int:
     if not options.hours >= 0:
         raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
     return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
+
+
+def robot(options: RobotOptions) -> int:
+    """Judge robots that bring things, and go along with people."""
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    setting: Setting = {"steps": options.steps, "period": options.period}
+    return judge("robot", categories, setting, options.common, methods=("heuristic",))
 
 
 def judge(

@@ -166,3 +166,25 @@ class CommuteOptions:
 
     common: Common
     hours: float = 0.0
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """What `vico eval robot` is asked for.
+
+    Attributes
+    ----------
+    common
+        What every evaluation is asked for.
+    category
+        Of the tasks.
+    steps
+        Seconds of an episode at most.
+    period
+        Seconds between two actions of a robot: 0.05 is 20 Hz.
+    """
+
+    common: Common
+    category: Literal["carry", "deliver", "all"] = "all"
+    steps: int = 1500
+    period: float = 0.05

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, TypedDict
@@ -26,6 +26,8 @@ class EnvOptions(TypedDict, total=False):
     residents: int | None
     assistants: int
     robots: tuple[str, ...]
+    robot_places: Mapping[str, Sequence[float]]
+    assistant_places: Mapping[str, Sequence[float]]
     errands: bool
     cars: int
     cyclists: int

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
+from vico.agents.robot.driving import Drive
 from vico.agents.robot.grasps import ThingBox, grasps_of, thing_box
 from vico.agents.robot.reaching import Held, Reach, carry_way, held_thing, reach_spot, reach_thing, room_around
 from vico.agents.robot.sight import Look, look
@@ -27,8 +28,8 @@ _BESIDE = 0.9  # cosine of the angle by which the side it comes from may be anot
 _STRAIGHT, _TURN, _GAIN = 0.25, 0.7, 1.5
 # Ground that is left between the base and what was seen ahead of it, metres.
 _ROOM_AHEAD = 0.06
-# Seconds: for fingers to close, for a way, for each other stage, without getting nearer.
-_GRIP_TIME, _COMES, _STALE, _STUCK = 1.6, 180.0, 20.0, 1.0
+# Seconds: for fingers to close, for each stage, without getting nearer.
+_GRIP_TIME, _STALE, _STUCK = 1.6, 20.0, 1.0
 # Newtons on both fingers that are a grip, and metres that fingers stay apart if there is something in between.
 _FELT, _APART = 4.0, 0.004
 # Angles, rad, that count as there.
@@ -93,6 +94,7 @@ class ArmWorker:
         self.held: Held | None = None
         self.outcome = self.why = ""
         self.forces = 0.0
+        self._drive = Drive(period=period)
         self._entity = 0  # of what is picked, or held
         self._target = np.zeros(3)
         self._beside: Array | None = None
@@ -113,9 +115,16 @@ class ArmWorker:
         """Whether it is at work."""
         return self.work is not Work.NOTHING
 
-    def pick(self, entity: int, position: Array) -> None:
-        """Begin to pick a thing up that is about at a position, ENU metres."""
+    def pick(self, entity: int, position: Array, *, beside: Array | None = None) -> None:
+        """Begin to pick a thing up that is about at a position, ENU metres.
+
+        Parameters
+        ----------
+        beside
+            Unit vector from the thing to the side it is to come from, shape ``(2,)``; None for wherever it is.
+        """
         self._begin(Work.PICK, position, entity)
+        self._beside = None if beside is None else np.array(beside, np.float64)
 
     def place(self, spot: Array, *, beside: Array | None = None) -> None:
         """Begin to put down what is held, with its underside at a spot, ENU metres.
@@ -158,8 +167,8 @@ class ArmWorker:
             self._set, self._knows = angles.copy(), True
         self._timer += self.period
         self.forces = max(self.forces, float(np.min(observation["sensors"]["contacts"])))
-        if self._timer > (_COMES if self.stage is Stage.COME else _STALE + _TAKES * (self.work is Work.OFFER)):
-            return self._fail("no way there" if self.stage is Stage.COME else f"no end of {self.stage}")
+        if self._timer > _STALE + _TAKES * (self.work is Work.OFFER) and self.stage is not Stage.COME:
+            return self._fail(f"no end of {self.stage}")
         return _STAGES[self.stage](self, observation, angles)
 
     def _come(self, observation: Mapping[str, Any], angles: Array) -> Action:
@@ -167,16 +176,19 @@ class ArmWorker:
         at = Stance.of(observation).position
         away = at[:2] - self._target[:2]
         distance = float(np.hypot(*away))
-        told = {event.get("kind") for event in observation["events"]}
         side = away / max(distance, 1e-6) if self._beside is None else self._beside
-        is_there = distance <= _NEAR and float(side @ away) > _BESIDE * distance
-        if is_there or (self._timer > self.period and told & {"arrived", "blocked"}):
-            self._next(Stage.ALIGN)
-            return self._hold()
-        if self._timer > self.period * 1.5:
-            return {"type": "wait"}
-        goal = self._target[:2] + side * (_NEAR - 0.35)
-        return {"type": "go_to", "target": [float(goal[0]), float(goal[1]), float(at[2])]}
+        if not self._drive.busy:
+            if distance <= _NEAR and float(side @ away) > _BESIDE * distance:
+                self._next(Stage.ALIGN)
+                return self._hold()
+            self._drive.begin(self._target[:2] + side * (_NEAR - 0.35), near=_NEAR - 0.35)
+        action = self._drive.act(observation)
+        if self._drive.busy:
+            return action
+        if not self._drive.arrived:
+            return self._fail("no way there")
+        self._next(Stage.ALIGN)
+        return self._hold()
 
     def _align(self, observation: Mapping[str, Any], angles: Array) -> Action:
         """Turn to the target and stand so far off it that the arm reaches it, as near as the ground is free."""
@@ -400,6 +412,7 @@ class ArmWorker:
             "reach": None if reach is None else {**reach._asdict()},
             "way": None if self._way is None else self._way.copy(),
             "point": self._point,
+            "drive": self._drive.state(),
             "box": None if self._box is None else {**self._box._asdict()},
         }
 
@@ -414,6 +427,7 @@ class ArmWorker:
         self._knows = bool(state["knows"])
         self._timer, self._stuck, self.forces = (float(value) for value in state["numbers"])
         self._skip = set(state["skip"])
+        self._drive.restore(state["drive"])
         self._reach = None if state["reach"] is None else Reach(**state["reach"])
         self._way = None if state["way"] is None else np.array(state["way"])
         self._box = None if state["box"] is None else ThingBox(**state["box"])

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vico.challenges.assistant.model import Category
 from vico.challenges.assistant.thresholds import CANDIDATES
 from vico.community.model import Resident
 from vico.world.model import Record
@@ -32,7 +31,7 @@ class Question:
     """
 
     text: str
-    category: Category
+    category: str
     requester: Resident | None = None
 
 

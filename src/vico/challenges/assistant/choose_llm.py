@@ -9,7 +9,6 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from vico.challenges.assistant.choose import Question, seeded_chooser
-from vico.challenges.assistant.model import Category
 from vico.community.model import Resident
 from vico.errors import LlmBudgetError, LlmReplyError, VicoError
 from vico.llm import LanguageModel, Usage
@@ -21,9 +20,10 @@ log = logging.getLogger(__name__)
 _ROUNDS = 2  # how often a reply may be mended
 _PATIENCE = 3  # questions in a row without an answer after which it is not asked any more
 
-_KINDS: dict[Category, str] = {
+_KINDS = {
     "carry": "somebody who is out is found, hands things over, and is followed home with them",
     "delivery": "things are fetched from one place and brought to another",
+    "deliver": "robots fetch a thing from one spot outdoors and bring it to another",
     "search": "a thing that was lost is looked for where it was lost",
 }
 

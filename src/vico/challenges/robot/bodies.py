@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.agents.robot.body import ArmBody
+from vico.agents.robot.team import Deck, Team
 from vico.assets.robots import MobileManipulator, RobotModel
 from vico.errors import InputError
 from vico.kinematics.arm import Chain
@@ -39,3 +40,17 @@ def arm_body(model: RobotModel) -> ArmBody:
         stand=model.stand,
         radius=model.half_width,
     )
+
+
+def team_of(manipulator: RobotModel, carrier: RobotModel) -> Team:
+    """Return what two robots know of each other's bodies.
+
+    Raises
+    ------
+    InputError
+        If the first has no arm, or the second no deck.
+    """
+    deck = carrier.deck
+    if deck is None:
+        raise InputError(f"{carrier.title} has no deck; take husky")
+    return Team(arm_body(manipulator), Deck(np.array(deck.centre), deck.length, deck.width))

@@ -1,0 +1,87 @@
+"""What two robots know of each other, and what they say: plain sentences that people could say to them, too."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.robot.body import ArmBody, Stance
+
+Array = NDArray[np.float64]
+
+_NUMBER = r"(-?\d+(?:\.\d+)?)"
+_HERE = re.compile(rf"^I stand at {_NUMBER} {_NUMBER} {_NUMBER}, heading {_NUMBER}\.$")
+_COME = re.compile(rf"^Come to {_NUMBER} {_NUMBER}\.$")
+# Things lie so far from the edge of a deck that the arm reaches over, metres.
+_FROM_EDGE = 0.17
+
+
+class Deck(NamedTuple):
+    """A carrier's deck: its middle in the frame of the base, length along x and width along y, metres."""
+
+    centre: Array
+    length: float
+    width: float
+
+
+class Team(NamedTuple):
+    """A robot with an arm, and one that carries."""
+
+    arm: ArmBody
+    deck: Deck
+
+
+class DeckSpot(NamedTuple):
+    """Where to put something on a deck, ENU metres, and the unit vector to the side from which it is reached."""
+
+    spot: Array
+    beside: Array
+
+
+def deck_spot(deck: Deck, carrier: Stance, near: Array) -> DeckSpot:
+    """Return where a deck is reached from the side that is nearer to a point, ENU metres."""
+    across = carrier.rotation[:, 1]
+    side = 1.0 if float((near - carrier.position)[:2] @ across[:2]) > 0.0 else -1.0
+    inside = np.array([0.0, side * (deck.width / 2 - _FROM_EDGE), 0.0])
+    beside = side * across[:2] / max(float(np.hypot(*across[:2])), 1e-6)
+    return DeckSpot(carrier.outside(deck.centre + inside), beside)
+
+
+def says_where(stance: Stance) -> str:
+    """Return the sentence in which a carrier tells where it stands."""
+    x, y, z = stance.position.tolist()
+    yaw = math.atan2(stance.rotation[1, 0], stance.rotation[0, 0])
+    return f"I stand at {x:.2f} {y:.2f} {z:.2f}, heading {yaw:.3f}."
+
+
+def says_come(x: float, y: float) -> str:
+    """Return the sentence that calls a carrier to a point, ENU metres."""
+    return f"Come to {x:.2f} {y:.2f}."
+
+
+def told_where(text: str) -> Stance | None:
+    """Return where a carrier stands that said so, upright; None of any other sentence."""
+    found = _HERE.match(text)
+    if found is None:
+        return None
+    x, y, z, yaw = (float(value) for value in found.groups())
+    c, s = math.cos(yaw), math.sin(yaw)
+    return Stance(np.array([x, y, z]), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def told_come(text: str) -> tuple[float, float] | None:
+    """Return where a carrier is called to; None of any other sentence."""
+    found = _COME.match(text)
+    return None if found is None else (float(found[1]), float(found[2]))
+
+
+def heard_from(observation: Mapping[str, Any], speaker: str) -> list[str]:
+    """Return what one has said since the last observation, in order."""
+    return [
+        str(event["text"]) for event in observation["events"] if event.get("speaker") == speaker and "text" in event
+    ]

@@ -1,0 +1,229 @@
+"""Playing a robot episode: a task, a world with its people, two robots that see only what they may, a verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vico.agents.base import Agent
+from vico.agents.robot import METHODS, make_robots
+from vico.agents.robot.depositor import Depositor
+from vico.agents.schedule import followers_of
+from vico.agents.wrappers import usage_of
+from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
+from vico.assets.robots import robot_model
+from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
+from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
+from vico.challenges.robot.bodies import team_of
+from vico.challenges.robot.judge import RobotJudge
+from vico.challenges.robot.model import RobotTask
+from vico.challenges.robot.thresholds import PACE_HOME, PERIOD, RESIDENTS, WAITS
+from vico.clock import seconds_of_day
+from vico.community import build_community
+from vico.community.folder import digest_of
+from vico.community.model import Community
+from vico.envs import Simulation, make
+from vico.errors import InputError, SchemaError
+from vico.runner.faults import FaultLog
+from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
+from vico.runner.gather import Gatherer
+from vico.runner.loading import AgentSeat
+from vico.runner.loop import Hook, Runner, Step
+from vico.runner.recording import RecordedOnce, recorded_in
+from vico.world.folder import World
+from vico.world.public import PublicMap
+
+#: The robots, in the order of their names.
+TEAM = ("manipulator", "husky")
+MANIPULATOR, CARRIER = "robot_0", "robot_1"
+
+
+@lru_cache(maxsize=2)
+def world_and_people(folder: Path) -> tuple[World, Community]:
+    """Read a world, and make the people among whom its episodes take place: always the same ones."""
+    world = world_in(folder)
+    return world, build_community(world, residents=RESIDENTS, seed=0)
+
+
+def play_robot_task(
+    world: World,
+    community: Community,
+    task: RobotTask,
+    *,
+    method: str,
+    setting: Setting | None = None,
+    terms: Terms | None = None,
+    recording: Path | None = None,
+    progress: Progress | None = None,
+) -> EpisodeRecord:
+    """Play one task through and judge it.
+
+    Parameters
+    ----------
+    method
+        Name of a pair of robots (see `vico.agents.robot.METHODS`), or ``my_module:MyRobot``, which plays both.
+    setting
+        ``period``: seconds between two actions of a robot.
+    terms
+        On which terms robots from elsewhere take part.
+    recording
+        Folder to which the run is recorded; None records nothing.
+
+    Raises
+    ------
+    SchemaError
+        If the task was made for another world, or for other people.
+    InputError
+        If there is no such method.
+    """
+    began = time.perf_counter()
+    _check_made_for(task, world, community)
+    setting = setting or {}
+    period = float(setting.get("period", PERIOD))
+    starts = {MANIPULATOR: task.manipulator, CARRIER: task.carrier}
+    env = make(
+        world,
+        community,
+        seed=task.seed,
+        start=task.start,
+        robots=TEAM,
+        robot_places={name: (*start.position, start.yaw) for name, start in starts.items()},
+        cars=for_size(CARS, world),
+        pedestrians=for_size(PEDESTRIANS, world),
+        observe=(MANIPULATOR, CARRIER),
+        periods=dict.fromkeys(starts, period),
+        max_steps=round(task.steps / period),
+        setup=lambda simulation: set_up(simulation, task),
+    )
+    sim = env.sim
+    terms = terms or Terms()
+    robots = _robots(method, task, world, terms, period)
+    residents = _residents(task, community, env.public_map)
+    truth, system = sim.ground_truth, sim.state.robots
+    assert system is not None
+    judge = RobotJudge(task, world, truth, system, lambda: sim.state.second)
+    agents = Gatherer(residents | robots, trusted=residents, deadline=terms.deadline, workers=terms.workers)
+    runner = Runner(sim, agents, hooks=[judge])
+    if progress is not None:
+        runner.hooks.append(_Reported(progress, task, sim))
+    with ExitStack() as stack:
+        stack.callback(agents.close)
+        if recording is not None:
+            recorded: RecordedOnce = stack.enter_context(
+                recorded_in(recording, sim, runner.faults, wanted=round(task.steps / period))
+            )
+            runner.hooks.append(recorded)
+        end = sim.state.second + task.steps
+        runner.run(100 * task.steps, until=lambda: judge.over or sim.state.second >= end)
+    return _record(task, method, setting, judge, sim, runner.faults, robots, time.perf_counter() - began)
+
+
+def set_up(simulation: Simulation, task: RobotTask) -> None:
+    """Put the thing where it is at the start, and whoever waits with it."""
+    kind = movable_kinds()[task.thing.kind]
+    shape, prototype = movable_surfaces(kind.kind, task.thing.colour), movable_prototype(kind.kind, task.thing.colour)
+    if task.waits_at is None:
+        simulation.scenario.add_object(
+            task.thing.name, prototype, shape, task.thing.position, size=kind.size, yaw=task.thing.yaw
+        )
+        return
+    simulation.scenario.place_agent(task.person.agent, (*task.waits_at.position, 0.0), yaw=task.waits_at.yaw)
+    simulation.scenario.hand_object(task.thing.name, prototype, shape, task.person.agent, size=kind.size)
+
+
+class _Reported(Hook):
+    """Tells how far an episode is."""
+
+    def __init__(self, progress: Progress, task: RobotTask, sim: Simulation) -> None:
+        self._progress, self._label = progress, f"{task.world}, {task.category}, seed {task.seed}"
+        self._sim, self._steps, self._start = sim, task.steps, sim.state.second
+
+    def stepped(self, step: Step) -> None:
+        """Tell it."""
+        self._progress(self._label, int(self._sim.state.second - self._start), self._steps)
+
+
+def _check_made_for(task: RobotTask, world: World, community: Community) -> None:
+    if task.world_digest != world.digest:
+        raise SchemaError(
+            f"task: made for another world ({task.world!r}, {task.world_digest[:12]}) than {world.manifest.name!r} "
+            f"({world.digest[:12]}); give that world, or generate the task for this one"
+        )
+    if task.community_digest != (digest := digest_of(community)):
+        raise SchemaError(
+            f"task: made for another community ({task.community_digest[:12]}) than this one ({digest[:12]}); give that "
+            "community, or generate the task for this one"
+        )
+
+
+def _residents(task: RobotTask, community: Community, public_map: PublicMap) -> dict[str, Agent]:
+    residents: dict[str, Agent] = dict(followers_of(community, public_map, seed=task.seed))
+    if task.category == "carry":
+        name = task.person.agent
+        who = community.resident_by_id[name]
+        residents[name] = Depositor(who, public_map, pace=PACE_HOME, waits=WAITS, seed=task.seed)
+    return residents
+
+
+def _robots(method: str, task: RobotTask, world: World, terms: Terms, period: float) -> dict[str, Agent]:
+    """Make the robots of an episode; those that can't be made fail at each of its steps."""
+    told = task.instruction() | {"period": period}
+    if method in METHODS:
+        team = team_of(robot_model(TEAM[0]), robot_model(TEAM[1]))
+        return dict(make_robots(method, told, PublicMap.from_world(world), team, seed=task.seed))
+    made: dict[str, Agent] = {}
+    for i, name in enumerate((MANIPULATOR, CARRIER)):
+        try:
+            made |= foreign_agents(method, [AgentSeat(name, task.seed, [told], i, len(TEAM))], world, terms)
+        except InputError as error:
+            made[name] = AbsentAgent(str(error))
+    return made
+
+
+def _record(
+    task: RobotTask,
+    method: str,
+    setting: Setting,
+    judge: RobotJudge,
+    sim: Simulation,
+    faults: FaultLog,
+    robots: Mapping[str, Any],
+    seconds: float,
+) -> EpisodeRecord:
+    """Condense an episode."""
+    done = judge.done_at
+    played = round(sim.state.second) - seconds_of_day(task.start)
+    metrics = {
+        "SR": 100.0 if done is not None else 0.0,
+        "Ts": float(task.steps if done is None else min(done, task.steps)),
+        "force": judge.story.force,
+        "drops": float(judge.story.drops),
+    }
+    if task.category == "carry":
+        metrics["together"] = judge.together()
+    parts = [Part(task.thing.name, done is not None, judge.cause(), None if done is None else int(done))]
+    return EpisodeRecord(
+        challenge="robot",
+        category=task.category,
+        method=method,
+        setting=dict(setting) | {"steps": task.steps},
+        world=task.world,
+        seed=task.seed,
+        metrics=metrics,
+        parts=parts,
+        steps=played,
+        limit=task.steps,
+        wall_seconds=seconds,
+        state_hash=sim.state_hash(),
+        tokens=sum(usage_of(robot).tokens for robot in robots.values()),
+        cost=sum(usage_of(robot).cost for robot in robots.values()),
+        fault_counts=faults.by_kind(),
+        faults=faults.first,
+    )
+
+
+__all__: Sequence[str] = ["CARRIER", "MANIPULATOR", "TEAM", "play_robot_task", "set_up", "world_and_people"]
