@@ -35,9 +35,9 @@ _OUTLINES = 4
 OBJECT_HALF, OBJECT_MASS = 0.15, 1.0
 _FRICTION = [0.6, 0.005, 0.0001]
 #: How much harder friction is than contact, by whether it has to hold things. Held things creep out of a grasp where
-#: friction is soft, 4-7 mm a minute at 10, ten times that at 1; wheels and feet follow commands alike, at 60% of the
-#: cost.
-FRICTION = {True: 10.0, False: 1.0}
+#: friction is soft, 5 kg 24 mm a minute at 10 and less than 1 mm at 100; wheels and feet follow commands alike at 1, at
+#: 60 % of the cost.
+FRICTION = {True: 100.0, False: 1.0}
 
 
 def standing_pose(
