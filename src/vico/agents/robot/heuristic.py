@@ -31,8 +31,8 @@ _TURN, _ROUND, _RING, _PLACES = 0.7, 9.5, 4.0, 6
 _AT_SOURCE, _AT_PERSON, _AT_GOAL, _TRIES = 2.5, 4.0, 2.0, 5
 # Where the carrier is called to, from the robot with the arm, and how far off it may be, metres.
 _ASIDE, _BY = 2.2, 6.0
-# Things are put down so far ahead, and within so much of the middle of the destination, metres.
-_AHEAD, _WITHIN = 0.75, 2.2
+# Things are put down so far ahead, within so much of the middle of the destination, and come to from about it, metres.
+_AHEAD, _WITHIN, _ABOUT = 0.75, 2.2, 1.6
 # Seconds of standing that end going along.
 _STANDS, _SPEED = 4.0, 0.03
 
@@ -78,7 +78,7 @@ class Manipulator:
         self.entity = 0
         self.seen: Array | None = None
         self._clock = self._looked = self._said = 0.0
-        self._tries = self._place = 0
+        self._tries = self._place = self._around = 0
         self._turned = self._stood = 0.0
         self._began = False
         self._carrier_at: Stance | None = None
@@ -218,9 +218,14 @@ class Manipulator:
     def _bring(self, observation: Observation, info: Info) -> Action:
         if not self._began:
             self._began = True
-            self.drive.begin(np.array(self.told["destination"]["centre"]), near=_AT_GOAL)
+            self.drive.begin(self._goal(), near=_AT_GOAL)
         action = self.drive.act(observation)
-        if not self.drive.busy:
+        if self.drive.busy:
+            return action
+        if not self.drive.arrived and self._around < _PLACES:
+            self._around += 1  # the middle itself may be no ground for a robot
+            self._began = False
+        else:
             self._next(Stage.PLACE)
         return action
 
@@ -273,6 +278,12 @@ class Manipulator:
     def _turn(self) -> Action:
         return {"type": "control", "space": "velocity", "vector": [0.0, 0.0, _TURN]}
 
+    def _goal(self) -> Array:
+        """Return the middle of the destination, or one place after the other about it, ENU metres."""
+        middle = np.array(self.told["destination"]["centre"][:2], np.float64)
+        turn = 2.0 * math.pi * self._around / _PLACES
+        return middle + (self._around > 0) * _ABOUT * np.array([math.cos(turn), math.sin(turn)])
+
     def _spot(self, here: Stance) -> Array:
         """Return where to put the thing down: ahead, and near the middle of the destination."""
         middle = np.array(self.told["destination"]["centre"][:2])
@@ -300,7 +311,7 @@ class Manipulator:
             "entity": self.entity,
             "seen": None if self.seen is None else self.seen.copy(),
             "seconds": [self._clock, self._looked, self._said, self._turned, self._stood],
-            "counts": [self._tries, self._place],
+            "counts": [self._tries, self._place, self._around],
             "began": self._began,
             "carrier": None if at is None else [at.position.copy(), at.rotation.copy()],
             "to_say": list(self._waits_to_say),
@@ -313,7 +324,7 @@ class Manipulator:
         self.stage, self.entity, self._began = Stage(state["stage"]), int(state["entity"]), bool(state["began"])
         self.seen = None if state["seen"] is None else np.array(state["seen"])
         self._clock, self._looked, self._said, self._turned, self._stood = (float(v) for v in state["seconds"])
-        self._tries, self._place = (int(value) for value in state["counts"])
+        self._tries, self._place, self._around = (int(value) for value in state["counts"])
         at = state["carrier"]
         self._carrier_at = None if at is None else Stance(np.array(at[0]), np.array(at[1]))
         self._waits_to_say = [str(text) for text in state["to_say"]]
