@@ -76,7 +76,8 @@ def hand_of_robot() -> Hand:
 
 
 @cache
-def _ready() -> tuple[float, ...]:
+def ready_angles() -> tuple[float, ...]:
+    """Return the arm's angles with the hand down in front of the base, rad."""
     found = reach_pose(
         hand_of_robot().chain, downward(READY, np.array([0.0, 1.0]), 0.0), robot_model("manipulator").rest[:7]
     )
@@ -86,7 +87,7 @@ def _ready() -> tuple[float, ...]:
 
 def first_angles(chance: np.random.Generator, options: ManipulationOptions) -> Array:
     """Draw the arm's angles, rad, shape ``(7,)``."""
-    rest = np.array(_ready()) if options.start == "ready" else robot_model("manipulator").rest[:7]
+    rest = np.array(ready_angles()) if options.start == "ready" else robot_model("manipulator").rest[:7]
     chain = hand_of_robot().chain
     return np.clip(rest + chance.uniform(-NOISE, NOISE, 7), chain.low, chain.high)
 
@@ -137,7 +138,7 @@ def held_box(chance: np.random.Generator, options: ManipulationOptions) -> Episo
         turn = yaw + across * math.pi / 2
         for sign in (1.0, -1.0):
             along = sign * np.array([math.cos(turn), math.sin(turn)])
-            arm = reach_pose(hand.chain, downward(grip, along, 0.0), np.array(_ready()))
+            arm = reach_pose(hand.chain, downward(grip, along, 0.0), np.array(ready_angles()))
             if arm is not None:
                 opening = float(thing.half[across]) - PAD
                 held = replace(drawn, position=position, goal=position.copy(), arm=arm, opening=opening)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.challenges.learning.manipulation.draws import OPENING, ready_angles
 from vico.challenges.learning.manipulation.readings import Readings
 
 #: Entries and how many numbers each has. Positions and vectors are along the axes of the robot's base, metres.
@@ -27,6 +28,35 @@ FULL = {
 #: Numbers are cut off here.
 BOUND = 10.0
 _NEWTONS = 100.0
+
+
+# What the numbers of an entry are about, and how far they differ from that.
+_USUAL: dict[str, tuple[object, object]] = {
+    "joint_rates": (0.0, [0.6] * 7 + [0.1]),
+    "robot": ([0.0, 0.0, 0.1], 0.1),
+    "object": ([0.6, 0.0, 0.1], [0.1, 0.15, 0.25]),
+    "hand_to_object": (0.0, 0.2),
+    "object_to_goal": (0.0, 0.2),
+    "hand_to_goal": (0.0, 0.25),
+    "half_sides": (0.075, 0.03),
+    "jaw_in_object": (0.0, 0.7),
+    "fingers": (0.0, 0.7),
+    "pressure": (0.0, 0.3),
+}
+
+
+def usual(observation: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return by what a network's inputs are shifted and divided, float32, shape ``(size,)`` each.
+
+    Fixed numbers: with running means a policy changes while nothing is learnt, which an adaptive learning rate takes
+    for learning too fast.
+    """
+    sizes = FULL if observation == "full" else PAPER
+    known = {**_USUAL, "joints": ([*ready_angles(), OPENING], [0.7] * 7 + [0.05])}
+    both = [
+        [np.broadcast_to(np.asarray(known[name][k], np.float32), size) for name, size in sizes.items()] for k in (0, 1)
+    ]
+    return np.concatenate(both[0]), np.concatenate(both[1])
 
 
 def size_of(observation: str) -> int:

@@ -64,8 +64,8 @@ class ArrayPolicy:
         x = np.asarray(observation, np.float32)
         if x.shape[-1:] != (self.inputs,):
             raise SchemaError(
-                f"policy: an observation of shape {x.shape} for a network of {self.inputs} inputs; make the environment "
-                "with the task and observation that it was trained on"
+                f"policy: an observation of shape {x.shape} for a network of {self.inputs} inputs; make the "
+                "environment with the task and observation that it was trained on"
             )
         x = (x - self.mean) / self.deviation
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
