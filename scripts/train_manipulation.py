@@ -190,7 +190,7 @@ class Training:
         self.rows.append({name: round(value, 6) for name, value in row.items()})
         if self.done % self.given.tell_every == 0:
             words = " ".join(f"{name} {value:.4g}" for name, value in row.items() if not name.startswith("loss"))
-            print(f"{self.task}: {words}", file=sys.stderr, flush=True)
+            sys.stderr.write(f"{self.task}: {words}\n")
 
     def save(self) -> None:
         """Write curve, weights, what they are, and the checkpoint, in this order."""
@@ -251,9 +251,9 @@ def main() -> int:
             training = Training(given, part, out)
             training.run()
             about = read_json(out / "policy.json")
-            print(f"{out / 'policy.npz'}: {about['iterations']} iterations, sha256 {about['sha256']}")
+            sys.stdout.write(f"{out / 'policy.npz'}: {about['iterations']} iterations, sha256 {about['sha256']}\n")
     except VicoError as error:
-        print(error, file=sys.stderr)
+        sys.stderr.write(f"{error}\n")
         return 2
     return 0
 

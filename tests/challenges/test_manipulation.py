@@ -217,7 +217,7 @@ def test_rewards_of_the_paper_are_its_four_terms() -> None:
     assert paper(r, terms)[0] == pytest.approx(-0.02 * sum(away))
     far = r._replace(hand=r.thing + 50.0)
     assert paper(far, ("object",))[0] == pytest.approx(-0.2)
-    up = r.thing + [0.0, 0.0, 4.0 * float(r.height_half[0])]
+    up = r.thing + np.array([0.0, 0.0, 4.0 * float(r.height_half[0])])
     gripped = r._replace(thing=up, pressure=np.full((1, 2), 10.0))
     assert paper(gripped, ("grasp",))[0] == 5.0
     assert paper(gripped._replace(pressure=np.array([[10.0, 0.0]])), ("grasp",))[0] == 0.0
