@@ -1,6 +1,6 @@
 """How many steps a second manipulation environments take: one, a plain loop over several, and batches.
 
-    python benchmarks/manipulation.py [--envs 256] [--steps 50] [--repeats 5] [--table benchmarks/results/manipulation.md]
+    python benchmarks/manipulation.py [--envs 256] [--steps 50] [--repeats 5] [--table FILE]
 
 A step is one of control (a twentieth of a second, five of physics) with sampled actions, observation and reward
 included. *Plain loop*: as many single environments in a Python list. Seconds are those of the clock; the share of a

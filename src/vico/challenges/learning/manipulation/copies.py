@@ -151,13 +151,13 @@ class Copies:
         actions = np.asarray(actions, np.float64)
         if actions.shape != (len(self), ACTIONS):
             raise InputError(f"env: actions have shape {actions.shape}; it has to be {(len(self), ACTIONS)}")
-        refused = ~np.isfinite(actions).all(axis=1)
+        refused: Bools = ~np.asarray(np.isfinite(actions).all(axis=1))
         before, state = self.targets.copy(), self.state.copy()
         self._aim(np.where(refused[:, None], 0.0, actions))
         if self.options.oracle_grasp:
             self._fasten()
         self._step(before)
-        broken = refused | ~self._is_sound(state)
+        broken: Bools = np.logical_or(refused, ~self._is_sound(state))
         causes = {
             int(k): "the action holds NaN or infinity" if refused[k] else "the motion broke down"
             for k in np.nonzero(broken)[0]
@@ -201,7 +201,7 @@ class Copies:
         lets_go = holds & (closing > np.where(holds, self.fastened, 0.0) + _LETS_GO)
         self.fastened[lets_go] = np.nan
         takes = ~holds & (self.pressure > PRESSING).all(axis=1) & (closing < jaw)
-        for k in np.nonzero(takes)[0]:
+        for k in np.nonzero(takes)[0].tolist():
             self.fastened[k] = jaw[k]
             self.models[k].eq_data[self._weld, :_WELD] = self._weld_data(k)
         self._activate()

@@ -214,7 +214,7 @@ class ManipulationBatch(gymnasium.vector.VectorEnv[Numbers, Numbers, NDArray[Any
         """
         if not self._begun:
             raise InputError("env: no episode has begun; call reset() before step()")
-        done = self.copies.advance(actions)
+        done = self.copies.advance(np.asarray(actions, np.float64))
         reward, found = reward_of(self.task, self.options, done), evaluation_of(self.task, done)
         ended = done.broken | (found["success"] & self.options.terminate_on_success)
         cut = ~ended & (self.copies.steps >= self.options.max_steps)
