@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from vico.challenges.learning.manipulation import ArrayPolicy, make_manipulation, make_manipulation_vec, read_policy
+from vico.challenges.learning.manipulation.controller import ArmController, ArmMoment
 from vico.challenges.learning.manipulation.decomposed import PLACES, DecomposedPolicy
 from vico.challenges.learning.manipulation.observation import size_of, usual
 from vico.challenges.learning.manipulation.policy import write_policy
@@ -110,13 +111,32 @@ def test_one_policy_lifts_until_another_places() -> None:
     np.testing.assert_allclose(first, lift.act(told), atol=1e-6)
     up = seen.copy()
     up[:, PLACES["object"]] += np.array([0.0, 0.0, 0.15], np.float32)
-    up[:, PLACES["pressure"]] = 0.5
+    up[:, PLACES["pressing"]] = 1.0
     np.testing.assert_array_equal(both.act(up), place.act(up))
     assert both.places.tolist() == [True]
     both.act(seen)  # it lies on the ground again
     assert both.places.tolist() == [False]
     with pytest.raises(InputError, match="lift has 31 inputs, not 42"):
         DecomposedPolicy(network((31, 8)), place)
+
+
+def test_a_policy_on_a_robot_elsewhere_does_what_it_does_in_its_environment() -> None:
+    env, policy = make_manipulation("place"), network(seed=3)
+    seen, _ = env.reset(seed=1)
+    controller = ArmController(policy.act, env.options)
+    stand = np.array([0.0, 0.0, env.copies.scene.stand])
+    controller.reset(np.append(env.readings.targets[0], env.readings.targets[0, 7]))
+    for _ in range(30):
+        r, state = env.readings, env.copies.state[0]
+        positions, rates = state[1 : 1 + env.copies.scene.model.nq], state[1 + env.copies.scene.model.nq :]
+        joints, speeds = positions[env.copies.scene.joints], rates[env.copies.scene.joint_rates]
+        moment = ArmMoment(
+            joints, speeds, r.thing[0] - stand, r.thing_rotation[0], r.half[0], r.goal[0] - stand, r.pressure[0] > 0.5
+        )
+        np.testing.assert_allclose(controller.observation(moment)[0], seen, atol=1e-6)
+        targets = controller.targets(moment)
+        seen = env.step(policy.act(seen))[0]
+        np.testing.assert_allclose(targets, [*env.readings.targets[0], env.readings.targets[0, 7]], atol=1e-5)
 
 
 def test_what_networks_are_told_is_of_the_order_of_one() -> None:

@@ -12,6 +12,7 @@ from mujoco import rollout
 from numpy.typing import NDArray
 
 from vico.challenges.learning.manipulation.draws import Episode
+from vico.challenges.learning.manipulation.motors import ACTIONS, motors_of
 from vico.challenges.learning.manipulation.options import PHYSICS_STEP, SUBSTEPS, ManipulationOptions
 from vico.challenges.learning.manipulation.readings import PRESSING, Bools, Readings, poses_in
 from vico.challenges.learning.manipulation.rewards import NEAR
@@ -20,10 +21,6 @@ from vico.challenges.learning.manipulation.tasks import ManipulationTask
 from vico.errors import InputError, SchemaError
 from vico.seeds import rng
 
-#: Of an action: the arm's joints and the jaw.
-ACTIONS = 8
-# Targets run ahead of joints by no more, rad, and fingers past what they press on, metres: 150 Nm and 60 N.
-_AHEAD, _PAST = 0.1, 0.03
 # Targets this much wider than the jaw when it was fastened to a box let go of it, metres.
 _LETS_GO = 0.005
 _CTRL, _ACTIVE = mujoco.mjtState.mjSTATE_CTRL, mujoco.mjtState.mjSTATE_EQ_ACTIVE
@@ -94,9 +91,7 @@ class Copies:
         self.steps, self.at_goal = np.zeros(n, np.int64), np.zeros(n, np.int64)
         self.was_lifted = np.zeros(n, bool)
         self.seeds, self.episodes = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        arm = self.scene.controller
-        self._low, self._high = np.append(arm.low, 0.0), np.append(arm.high, arm.opening)
-        self._scale = np.append(np.full(7, options.joint_step), options.finger_step)
+        self._motors = motors_of(self.scene.controller, options)
 
     def __len__(self) -> int:
         return len(self.state)
@@ -153,7 +148,7 @@ class Copies:
             raise InputError(f"env: actions have shape {actions.shape}; it has to be {(len(self), ACTIONS)}")
         refused: Bools = ~np.asarray(np.isfinite(actions).all(axis=1))
         before, state = self.targets.copy(), self.state.copy()
-        self._aim(np.where(refused[:, None], 0.0, actions))
+        self.targets = self._motors.moved(self.targets, self._joints()[0], np.where(refused[:, None], 0.0, actions))
         if self.options.oracle_grasp:
             self._fasten()
         self._step(before)
@@ -165,14 +160,6 @@ class Copies:
         self.state[broken], self.targets[broken] = state[broken], before[broken]
         self.steps += 1
         return Advanced(self._counted(), broken, causes)
-
-    def _aim(self, actions: Array) -> None:
-        """Move targets by actions, within bounds and not far ahead of the joints."""
-        joints, _ = self._joints()
-        wanted = self.targets + np.clip(actions, -1.0, 1.0) * self._scale
-        ahead = np.append(np.full(7, _AHEAD), _PAST)
-        wanted = np.clip(wanted, joints - ahead, joints + ahead)
-        self.targets = np.clip(wanted, self._low, self._high)
 
     def _step(self, before: Array) -> None:
         """Have MuJoCo move everything on, while the servos' targets go from where they were to where they are."""

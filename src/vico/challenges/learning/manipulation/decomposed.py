@@ -18,7 +18,7 @@ _ENDS = list(accumulate(FULL.values()))
 PLACES = {name: slice(end - FULL[name], end) for name, end in zip(FULL, _ENDS, strict=True)}
 # Metres above where it stood that a lifted box is to be, that it counts as lifted from, and as dropped below.
 _GOAL, _LIFTED, _DROPPED = 0.2, 0.12, 0.03
-_PRESSING, _NEAR = 0.005, 0.1
+_NEAR = 0.1
 
 
 class DecomposedPolicy:
@@ -55,7 +55,7 @@ class DecomposedPolicy:
         if len(self._start) != len(seen):
             self._start, self.places = box.copy(), np.zeros(len(seen), bool)
         lifted = box[:, 2] - self._start[:, 2]
-        held = (seen[:, PLACES["pressure"]] > _PRESSING).all(axis=1)
+        held = (seen[:, PLACES["pressing"]] > 0.5).all(axis=1)
         there = np.linalg.norm(away, axis=1) < _NEAR
         dropped = self.places & ~held & ~there & (lifted < _DROPPED)
         # What was dropped lies somewhere else now.

@@ -12,7 +12,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from vico.challenges.learning.manipulation.copies import ACTIONS, Advanced, Copies
+from vico.challenges.learning.manipulation.copies import Advanced, Copies
+from vico.challenges.learning.manipulation.motors import ACTIONS
 from vico.challenges.learning.manipulation.observation import BOUND, observe, size_of
 from vico.challenges.learning.manipulation.options import RATE, ManipulationOptions
 from vico.challenges.learning.manipulation.readings import Bools, Readings

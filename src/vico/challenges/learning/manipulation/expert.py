@@ -11,9 +11,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.challenges.learning.manipulation.copies import ACTIONS
 from vico.challenges.learning.manipulation.environment import ManipulationEnv
-from vico.challenges.learning.manipulation.readings import Readings
+from vico.challenges.learning.manipulation.motors import ACTIONS
+from vico.challenges.learning.manipulation.readings import Readings, hand_poses
 from vico.challenges.learning.manipulation.scene import PAD, Array
 from vico.kinematics.ways import downward, way_down
 
@@ -67,14 +67,14 @@ class ScriptedExpert:
             self.stage = Stage.CARRY
             self._plan_carry(r)
             return
-        thing, half = r.thing[0], self.env.copies.half[0]
+        half = self.env.copies.half[0]
         grip = r.grasp_point[0] - [0.0, 0.0, self._stand]
         goals = []
         for axis in np.argsort(half[:2]).tolist():
             along = r.thing_rotation[0, :2, axis]
             goals += [downward(grip, sign * along, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
         found = way_down(self._chain, r.joints[0, :7].copy(), goals, holds=False)
-        if found is None or not np.isfinite(thing).all():
+        if found is None:
             self.stage = Stage.DONE
             return
         way, down = found
@@ -83,8 +83,6 @@ class ScriptedExpert:
         self._opening = float(half[int(np.abs(across).argmax())]) - PAD + _ROOM
 
     def _hand_y(self, angles: Array) -> Array:
-        from vico.challenges.learning.manipulation.readings import hand_poses
-
         pose = np.empty((1, 3, 4))
         hand_poses(self._chain, angles[None].copy(), pose)
         return np.asarray(pose[0, :2, 1])

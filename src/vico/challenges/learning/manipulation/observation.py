@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.challenges.learning.manipulation.draws import OPENING, ready_angles
-from vico.challenges.learning.manipulation.readings import Readings
+from vico.challenges.learning.manipulation.readings import PRESSING, Readings
 
 #: Entries and how many numbers each has. Positions and vectors are along the axes of the robot's base, metres.
 PAPER = {
@@ -23,11 +23,10 @@ FULL = {
     "half_sides": 3,
     "jaw_in_object": 3,
     "fingers": 3,
-    "pressure": 2,
+    "pressing": 2,
 }
 #: Numbers are cut off here.
 BOUND = 10.0
-_NEWTONS = 100.0
 
 
 # What the numbers of an entry are about, and how far they differ from that.
@@ -41,7 +40,7 @@ _USUAL: dict[str, tuple[object, object]] = {
     "half_sides": (0.075, 0.03),
     "jaw_in_object": (0.0, 0.7),
     "fingers": (0.0, 0.7),
-    "pressure": (0.0, 0.3),
+    "pressing": (0.5, 0.5),
 }
 
 
@@ -68,8 +67,8 @@ def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
     """Return the observation of each copy, float32, shape ``(n, size)``.
 
     ``robot`` is the base's position where it stood at first. ``object`` is seen from the base. ``jaw_in_object`` is
-    the way the jaw opens along the box's own axes, ``fingers`` the way they point, ``pressure`` the force of each pad
-    in units of 100 N.
+    the way the jaw opens along the box's own axes, ``fingers`` the way they point, ``pressing`` whether each pad
+    presses on the box, which is what the robot's contacts tell.
     """
     r = readings
 
@@ -86,5 +85,5 @@ def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
         seen(r.goal - r.hand),
     ]
     if observation == "full":
-        parts += [r.half, r.jaw_in_thing, seen(r.hand_rotation[:, :, 2]), r.pressure / _NEWTONS]
+        parts += [r.half, r.jaw_in_thing, seen(r.hand_rotation[:, :, 2]), r.pressure > PRESSING]
     return np.clip(np.concatenate(parts, axis=1), -BOUND, BOUND).astype(np.float32)

@@ -33,7 +33,7 @@ class ManipulationOptions:
         of the paper.
     observation
         ``"paper"``: 31 numbers as the paper lists them. ``"full"``: these, and size and turn of the box to the hand
-        and how hard the fingers press, 42 numbers.
+        and which fingers press on it, 42 numbers.
     surface
         What boxes stand on: ``"ground"``, ``"table"``, or ``"any"``, each every second time.
     base

@@ -31,7 +31,6 @@ _IMPRATIO = 10.0
 # How a contact sensor sums several contacts up: mju reduce "netforce".
 _NET_FORCE = 3
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_SAID: list[str] = []
 
 
 @dataclass(frozen=True)
@@ -200,4 +199,8 @@ def listen() -> None:
     Motion that breaks down is noticed by its numbers.
     """
     if mujoco.get_mju_user_warning() is None:
-        mujoco.set_mju_user_warning(_SAID.append)
+        mujoco.set_mju_user_warning(_ignore)
+
+
+def _ignore(message: str) -> None:
+    """Say nothing: MuJoCo calls from C, on any thread."""
