@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -238,6 +239,26 @@ def test_the_staged_reward_is_greatest_at_the_end_of_what_is_asked(task: str) ->
     assert rewards[-1] > 2.0 * max(idle)
 
 
+def test_stages_of_the_reward_never_take_back_what_an_earlier_one_gave() -> None:
+    env = make_manipulation("reach", surface="ground")
+    env.reset(seed=0)
+    r, staged = env.readings, MANIPULATION["reach"].staged
+    down = r.thing_rotation[0, :, 1], np.array([0.0, 0.0, -1.0])
+    square = np.column_stack([np.cross(*down), *down])[None]
+    width = r.half[:, 1] + 0.02
+    over = r.grasp_point + np.array([0.0, 0.0, 0.12])
+    path = [
+        r,
+        r._replace(hand=over),  # above, but neither square nor wide enough
+        r._replace(hand=over, hand_rotation=square),
+        r._replace(hand=over, hand_rotation=square, joints=np.append(r.joints[0, :7], width)[None]),
+    ]
+    path += [path[-1]._replace(hand=over - np.array([0.0, 0.0, z])) for z in (0.04, 0.08, 0.12)]
+    rewards = [float(staged(one)[0]) for one in path]
+    assert all(a < b + 1e-9 for a, b in pairwise(rewards)), rewards
+    assert rewards[-1] == pytest.approx(1.0)
+
+
 def test_pushing_a_box_to_its_goal_is_no_pick_and_place() -> None:
     env = make_manipulation("pick_place", surface="ground")
     env.reset(seed=0)
@@ -269,7 +290,27 @@ def test_observations_hold_what_the_page_lists() -> None:
     assert at == len(seen) == 42
     np.testing.assert_allclose(parts["joints"], r.joints[0], atol=1e-6)
     np.testing.assert_allclose(parts["hand_to_object"], (r.thing - r.hand)[0], atol=1e-6)
-    np.testing.assert_allclose(parts["half_sides"], r.half[0], atol=1e-6)
+    level = sorted([*parts["half_sides"][:2], parts["half_sides"][2]]), sorted(r.half[0])
+    np.testing.assert_allclose(*level, atol=1e-6)
+    assert parts["half_sides"][2] == pytest.approx(r.half[0, 2])
+    assert parts["half_sides"][0] == pytest.approx(r.gripped_half[0])
+    assert parts["jaw"][1] == pytest.approx(np.cos(4.0 * np.arccos(r.squareness[0])), abs=0.02)
+
+
+def test_turning_the_jaw_to_the_left_raises_its_angle_to_a_box_on_any_face() -> None:
+    env = make_manipulation("lift")
+    env.reset(seed=0)
+    r = env.readings
+    faces = [np.eye(3), np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.diag([1.0, -1.0, -1.0])]
+    for face in faces:
+        turns = []
+        for angle in (0.1, 0.3):
+            jaw = np.array([np.cos(angle), np.sin(angle), 0.0])
+            hand = np.column_stack([np.cross(jaw, [0, 0, -1.0]), jaw, [0, 0, -1.0]])
+            turns.append(
+                float(r._replace(thing_rotation=face[None].astype(float), hand_rotation=hand[None]).jaw_turn[0])
+            )
+        assert turns[1] - turns[0] == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ PAPER = {
 FULL = {
     **PAPER,
     "half_sides": 3,
-    "jaw_in_object": 3,
+    "jaw": 3,
     "fingers": 3,
     "pressing": 2,
 }
@@ -38,7 +38,7 @@ _USUAL: dict[str, tuple[object, object]] = {
     "object_to_goal": (0.0, 0.2),
     "hand_to_goal": (0.0, 0.25),
     "half_sides": (0.075, 0.03),
-    "jaw_in_object": (0.0, 0.7),
+    "jaw": ([0.0, 0.0, 0.03], [0.7, 0.7, 0.05]),
     "fingers": (0.0, 0.7),
     "pressing": (0.5, 0.5),
 }
@@ -66,9 +66,11 @@ def size_of(observation: str) -> int:
 def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
     """Return the observation of each copy, float32, shape ``(n, size)``.
 
-    ``robot`` is the base's position where it stood at first. ``object`` is seen from the base. ``jaw_in_object`` is
-    the way the jaw opens along the box's own axes, ``fingers`` the way they point, ``pressing`` whether each pad
-    presses on the box, which is what the robot's contacts tell.
+    ``robot`` is the base's position where it stood at first. ``object`` is seen from the base. ``half_sides`` are half
+    the box's level sides, the one across the jaw first, and half its height. ``jaw`` is sine and cosine of four times
+    the angle between the way the jaw opens and the box (a box is the same after a quarter turn), and what the jaw is
+    wider than the box on each side. ``fingers`` is the way they point, ``pressing`` whether each pad presses on the box,
+    which is what the robot's contacts tell.
     """
     r = readings
 
@@ -85,5 +87,11 @@ def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
         seen(r.goal - r.hand),
     ]
     if observation == "full":
-        parts += [r.half, r.jaw_in_thing, seen(r.hand_rotation[:, :, 2]), r.pressure > PRESSING]
+        turn = 4.0 * r.jaw_turn
+        parts += [
+            r.level_half,
+            np.column_stack([np.sin(turn), np.cos(turn), r.gap]),
+            seen(r.hand_rotation[:, :, 2]),
+            r.pressure > PRESSING,
+        ]
     return np.clip(np.concatenate(parts, axis=1), -BOUND, BOUND).astype(np.float32)

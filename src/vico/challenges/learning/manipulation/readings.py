@@ -108,6 +108,27 @@ class Readings(NamedTuple):
         return np.asarray(np.abs(self.jaw_in_thing).max(axis=1))
 
     @property
+    def jaw_turn(self) -> Array:
+        """Angle of the way the jaw opens to the box's first level axis, from above to the left, rad, shape ``(n,)``."""
+        k, up, first, second = self._level_axes()
+        jaw = self.jaw_in_thing
+        side = np.where(self.thing_rotation[k, 2, up] < 0.0, -1.0, 1.0)
+        return np.arctan2(side * jaw[k, second], jaw[k, first])
+
+    @property
+    def level_half(self) -> Array:
+        """Half the box's level sides, the one across the jaw first, and half its height, metres, shape ``(n, 3)``."""
+        k, up, first, second = self._level_axes()
+        across = np.abs(np.cos(self.jaw_turn)) >= np.sqrt(0.5)
+        a, b = self.half[k, first], self.half[k, second]
+        return np.column_stack([np.where(across, a, b), np.where(across, b, a), self.half[k, up]])
+
+    def _level_axes(self) -> tuple[NDArray[np.int64], ...]:
+        """Number of each copy, and which axis of its box stands and which two lie."""
+        up = np.abs(self.thing_rotation[:, 2, :]).argmax(axis=1)
+        return np.arange(len(up)), up, (up + 1) % 3, (up + 2) % 3
+
+    @property
     def gripped_half(self) -> Array:
         """Half the side of the box that lies across the jaw, metres, shape ``(n,)``."""
         side = np.abs(self.jaw_in_thing).argmax(axis=1)

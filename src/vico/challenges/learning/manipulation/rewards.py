@@ -14,8 +14,10 @@ NEAR, STAY = 0.1, 100
 #: Metres that a box is lifted.
 LIFTED = 0.1
 _FAR, _PENALTY, _GRASP, _PLACE = 10.0, 0.02, 5.0, 100.0
-# Metres above the grasp point that a hand waits at until it is ready to go down.
+# Metres above the grasp point where a hand is to be until it is ready to go down.
 _HOVER = 0.12
+# From so far off a hand is rewarded for coming nearer, metres.
+_AWAY = 0.9
 
 
 def paper(r: Readings, terms: Collection[str]) -> Array:
@@ -61,16 +63,17 @@ def approach(r: Readings) -> Array:
     away = r.grasp_point - r.hand
     level = np.linalg.norm(away[:, :2], axis=1)
     # Within its sides the hand cannot but be square to a box: alignment counts from an eighth of a turn.
-    turned = share(r.pointing, 0.5, 0.98) * (0.5 + 0.5 * share(r.squareness, 0.72, 0.98))
+    turned = share(r.pointing, 0.5, 0.98) * (0.4 + 0.6 * share(r.squareness, 0.72, 0.98))
     inside = is_inside(r)
     is_open = np.where(inside, 1.0, share(r.gap, -0.04, 0.012))
     ready = share(-level, -0.08, -0.02) * share(r.pointing, 0.85, 0.97) * share(r.squareness, 0.88, 0.98)
     ready = ready * np.where(inside, 1.0, share(r.gap, 0.0, 0.01))
-    want = r.grasp_point
-    want[:, 2] += _HOVER * (1.0 - ready)
-    over = nearness(np.linalg.norm(want - r.hand, axis=1), 0.25)
-    down = ready * nearness(np.linalg.norm(away, axis=1), 0.08)
-    return np.asarray(0.25 * turned + 0.25 * over + 0.15 * is_open + 0.35 * down)
+    above = away + np.array([0.0, 0.0, _HOVER])
+    # Who is ready is not to lose by that: being above counts as done, and going down begins to count.
+    high = np.linalg.norm(above, axis=1)
+    over = ready + (1.0 - ready) * (0.6 * share(-high, -_AWAY, 0.0) + 0.4 * nearness(high, 0.12))
+    down = ready * (0.2 + 0.8 * nearness(np.linalg.norm(away, axis=1), 0.12))
+    return np.asarray(0.2 * turned + 0.35 * over + 0.1 * is_open + 0.35 * down)
 
 
 def closing(r: Readings) -> Array:
@@ -89,8 +92,8 @@ def carrying(r: Readings) -> Array:
     """Return how near a gripped box is to its goal: over it, then down on it; from 0 to 1."""
     level = np.linalg.norm((r.goal - r.thing)[:, :2], axis=1)
     there = share(-level, -0.12, -0.03)
-    height = np.abs(r.goal[:, 2] + 0.1 * (1.0 - there) - r.thing[:, 2])
-    return np.asarray(r.gripped * (0.4 * nearness(level, 0.2) + 0.2 * nearness(height, 0.1) + 0.4 * lowering(r, there)))
+    high = there + (1.0 - there) * nearness(np.abs(r.goal[:, 2] + 0.1 - r.thing[:, 2]), 0.1)
+    return np.asarray(r.gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * lowering(r, there)))
 
 
 def lowering(r: Readings, there: Array) -> Array:
