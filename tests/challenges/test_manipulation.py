@@ -257,6 +257,9 @@ def test_stages_of_the_reward_never_take_back_what_an_earlier_one_gave() -> None
     rewards = [float(staged(one)[0]) for one in path]
     assert all(a < b + 1e-9 for a, b in pairwise(rewards)), rewards
     assert rewards[-1] == pytest.approx(1.0)
+    ready = path[3]
+    heights = [float(staged(ready._replace(hand=over + np.array([0.0, 0.0, z])))[0]) for z in (0.6, 0.3, 0.1, 0.0)]
+    assert all(a < b - 0.01 for a, b in pairwise(heights)), heights
 
 
 def test_pushing_a_box_to_its_goal_is_no_pick_and_place() -> None:

@@ -69,8 +69,8 @@ def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
     ``robot`` is the base's position where it stood at first. ``object`` is seen from the base. ``half_sides`` are half
     the box's level sides, the one across the jaw first, and half its height. ``jaw`` is sine and cosine of four times
     the angle between the way the jaw opens and the box (a box is the same after a quarter turn), and what the jaw is
-    wider than the box on each side. ``fingers`` is the way they point, ``pressing`` whether each pad presses on the box,
-    which is what the robot's contacts tell.
+    wider than the box on each side. ``fingers`` is the way they point, ``pressing`` whether each pad presses on the
+    box, which is what the robot's contacts tell.
     """
     r = readings
 

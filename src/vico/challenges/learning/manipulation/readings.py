@@ -124,7 +124,7 @@ class Readings(NamedTuple):
         return np.column_stack([np.where(across, a, b), np.where(across, b, a), self.half[k, up]])
 
     def _level_axes(self) -> tuple[NDArray[np.int64], ...]:
-        """Number of each copy, and which axis of its box stands and which two lie."""
+        """Return the number of each copy, and which axis of its box stands and which two lie."""
         up = np.abs(self.thing_rotation[:, 2, :]).argmax(axis=1)
         return np.arange(len(up)), up, (up + 1) % 3, (up + 2) % 3
 

@@ -18,6 +18,8 @@ _FAR, _PENALTY, _GRASP, _PLACE = 10.0, 0.02, 5.0, 100.0
 _HOVER = 0.12
 # From so far off a hand is rewarded for coming nearer, metres.
 _AWAY = 0.9
+# A jaw is wider than a box on each side by no more, metres.
+_WIDEST = 0.14
 
 
 def paper(r: Readings, terms: Collection[str]) -> Array:
@@ -69,16 +71,16 @@ def approach(r: Readings) -> Array:
     ready = share(-level, -0.08, -0.02) * share(r.pointing, 0.85, 0.97) * share(r.squareness, 0.88, 0.98)
     ready = ready * np.where(inside, 1.0, share(r.gap, 0.0, 0.01))
     above = away + np.array([0.0, 0.0, _HOVER])
-    # Who is ready is not to lose by that: being above counts as done, and going down begins to count.
-    high = np.linalg.norm(above, axis=1)
-    over = ready + (1.0 - ready) * (0.6 * share(-high, -_AWAY, 0.0) + 0.4 * nearness(high, 0.12))
+    # Who is ready does not lose by going down: it counts how far above that point the hand is, and no longer below.
+    far = ready * np.maximum(-above[:, 2], 0.0) + (1.0 - ready) * np.linalg.norm(above, axis=1)
+    over = 0.6 * share(-far, -_AWAY, 0.0) + 0.4 * nearness(far, 0.12)
     down = ready * (0.2 + 0.8 * nearness(np.linalg.norm(away, axis=1), 0.12))
     return np.asarray(0.2 * turned + 0.35 * over + 0.1 * is_open + 0.35 * down)
 
 
 def closing(r: Readings) -> Array:
     """Return how far a jaw has closed on the box between its pads, from 0 to 1."""
-    return np.asarray(is_inside(r) * (0.5 * share(-r.gap, -0.03, 0.0) + 0.25 * (r.pressure > 0.5).sum(axis=1)))
+    return np.asarray(is_inside(r) * (0.5 * share(-r.gap, -_WIDEST, 0.0) + 0.25 * (r.pressure > 0.5).sum(axis=1)))
 
 
 def lifting(r: Readings) -> Array:
