@@ -127,6 +127,13 @@ def test_people_are_asked_and_answer(helsinki: World, helsinki_path: Path, tmp_p
     assert "   understood: " in printed
 
 
+def test_an_arm_is_scored_on_lifting_a_box() -> None:
+    printed = run("18_manipulation.py", "--task", "lift", "--episodes", "3")
+    assert "vico/Lift-v0: observations (42,), actions (8,)" in printed
+    assert "random: success 0.00 at the end" in printed
+    assert "expert: success 1.00 at the end" in printed
+
+
 def test_work_of_ones_own_is_shared_out(helsinki_path: Path) -> None:
     printed = [run("17_many_machines.py", str(helsinki_path), "nowhere", "--workers", n) for n in ("1", "2")]
     assert sorted(printed[0].splitlines()) == sorted(printed[1].splitlines())

@@ -21,13 +21,21 @@ TASKS = {
     "vico/Influence-v0": "make_influence",
 }
 _LEARNING = "vico.challenges.learning.make"
+#: Tasks of an arm and a box, which need no world, and what makes them.
+ARM_TASKS = {
+    "vico/Reach-v0": "make_reach",
+    "vico/Lift-v0": "make_lift",
+    "vico/Place-v0": "make_place",
+    "vico/PickPlace-v0": "make_pick_place",
+}
+_MANIPULATION = "vico.challenges.learning.manipulation.make"
 
 
 def register_ids() -> None:
     """Register the environments; once is enough, and more does no harm.
 
-    Both take a world's folder as `world` and a community's as `community`, and the options of
-    `vico.envs.spec.EnvSpec`.
+    They take a world's folder as `world`, a community's as `community` where people are needed, and the options of
+    `vico.envs.spec.EnvSpec`; those of `ARM_TASKS` take neither, but `ManipulationOptions`.
     """
     if ID not in gymnasium.registry:
         # The checks of Gymnasium's own wrapper would refuse the short form of actions.
@@ -37,14 +45,15 @@ def register_ids() -> None:
             vector_entry_point="vico.agents.single:make_vec",
             disable_env_checker=True,
         )
-    for name, maker in TASKS.items():
-        if name not in gymnasium.registry:
-            gymnasium.register(
-                name,
-                entry_point=f"{_LEARNING}:{maker}",
-                vector_entry_point=f"{_LEARNING}:{maker}_vec",
-                disable_env_checker=True,
-            )
+    for module, tasks in ((_LEARNING, TASKS), (_MANIPULATION, ARM_TASKS)):
+        for name, maker in tasks.items():
+            if name not in gymnasium.registry:
+                gymnasium.register(
+                    name,
+                    entry_point=f"{module}:{maker}",
+                    vector_entry_point=f"{module}:{maker}_vec",
+                    disable_env_checker=True,
+                )
     registry = getattr(pettingzoo, "parallel_registry", None)
     if registry is not None and ID not in registry:
         pettingzoo.register("parallel", ID, entry_point="vico.envs.parallel:make")
