@@ -202,8 +202,8 @@ def _check_increments(request: BuildRequest) -> None:
     drop, clip = request.contents.drop_below, request.clip
     if not (drop >= 0.0 and 0.0 <= clip < 0.5):
         raise InputError(
-            f"dataset: increments below {drop} dropped, a share of {clip} cut at each end; give 0 or more, and 0 or more "
-            "but less than 0.5"
+            f"dataset: increments below {drop} dropped, a share of {clip} cut at each end; give 0 or more, and 0 up to "
+            "less than 0.5"
         )
     if (drop or clip) and request.category != CHALLENGE:
         raise InputError(f"dataset: only actions of {CHALLENGE} are increments, of which small ones are dropped or cut")

@@ -69,7 +69,7 @@ def demonstrate(
             seen(count, observation)
         count += 1
 
-    played = play(task, world, Demonstrator(period=PERIOD), side=side, seen=told)
+    played = play(task, world, Demonstrator(period=PERIOD), side=side, seen=told, to_the_end=True)
     largest = np.abs(played.actions).max(axis=1, initial=0.0)
     return Demonstrated(task, played, np.flatnonzero(largest >= drop_below))
 

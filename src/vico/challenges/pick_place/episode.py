@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.increments import PERIOD, arm_state, increments_of
+from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE, arm_state, increments_of
 from vico.assets.models.movable import movable_prototype, movable_surfaces
 from vico.challenges.pick_place.field import TABLE
 from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, Thing, world_of_task
@@ -85,6 +85,7 @@ def play(
     side: int = SIDE,
     outputs: tuple[str, ...] = ("rgb", "depth", "segmentation"),
     seen: Seen | None = None,
+    to_the_end: bool = False,
 ) -> Played:
     """Play an episode.
 
@@ -98,6 +99,9 @@ def play(
         That it is given.
     seen
         Told each observation that the robot acted upon, in their order.
+    to_the_end
+        Whether the actor goes on until it says that it is done; else the episode is over once the thing has been where
+        it was to be for a second, in nobody's jaw.
     """
     sim = simulation_of(task, world, side=side, outputs=outputs)
     observation = _step(sim, {"type": "wait"})
@@ -105,7 +109,7 @@ def play(
         actor.begin(task, sim.ground_truth.object_entity("thing"))  # type: ignore[attr-defined]
     states: list[NDArray[np.float32]] = []
     actions: list[NDArray[np.float32]] = []
-    lifted, cause = False, Verdict.TIMEOUT
+    lifted, done, cause = False, 0, Verdict.TIMEOUT
     for _ in range(round(task.seconds / PERIOD)):
         action = actor.act(observation, task.instruction)
         if action is None:
@@ -121,18 +125,27 @@ def play(
         if observation["sensors"]["fallen"][0]:
             cause = Verdict.FALLEN
             break
+        done = done + 1 if lifted and _judged(sim, task, observation, lifted=lifted)[0] == Verdict.DONE else 0
+        if done * PERIOD >= _RESTS and not to_the_end:
+            cause = ""
+            break
+    before = np.zeros(3)
     for _ in range(round(_RESTS / PERIOD)):
+        before = sim.ground_truth.object_position("thing").copy()
         observation = _step(sim, {"type": "stop"})
     found, off = _judged(sim, task, observation, lifted=lifted)
-    success = found == Verdict.DONE and cause != Verdict.FALLEN
+    still = float(np.linalg.norm(sim.ground_truth.object_position("thing") - before)) < _STILL * PERIOD
+    success = found == Verdict.DONE and still and cause != Verdict.FALLEN
+    if not cause and not success and found == Verdict.DONE:
+        found = Verdict.NOT_PLACED  # it rolls, or topples
     return Played(
         success,
         found if success or not cause else cause,
         str(getattr(actor, "why", "")),
         len(states) * PERIOD,
         off,
-        np.array(states, np.float32).reshape(len(states), -1),
-        np.array(actions, np.float32).reshape(len(actions), -1),
+        np.array(states, np.float32).reshape(-1, len(STATE)),
+        np.array(actions, np.float32).reshape(-1, len(INCREMENTS)),
     )
 
 
@@ -193,7 +206,7 @@ def _judged(sim: Simulation, task: PickPlaceTask, observation: Observation, *, l
         off[2] = at[2] - float(sim.world.height(at[:2]))
         there = float(np.hypot(off[0], off[1])) <= NEXT_TO
     distance = float(np.hypot(off[0], off[1]))
-    if float(np.max(observation["sensors"]["contacts"])) > _TOUCHED and float(off[2]) > _HEIGHT:
+    if float(np.min(observation["sensors"]["contacts"])) > _TOUCHED:
         return Verdict.HELD, distance
     if there and abs(float(off[2])) <= _HEIGHT and lifted:
         return Verdict.DONE, distance
