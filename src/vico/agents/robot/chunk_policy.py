@@ -210,11 +210,12 @@ class ChunkActor:
     """
 
     def __init__(self, policy: ChunkPolicy, *, every: int = 10, ensemble: float | None = None) -> None:
+        every = 1 if ensemble is not None else every
         if not 1 <= every <= policy.shape.chunk:
             raise InputError(f"chunk policy: asked every {every} actions; give 1 to {policy.shape.chunk}")
         if ensemble is not None and not ensemble >= 0.0:
             raise InputError(f"chunk policy: ensemble {ensemble}; give 0 or more")
-        self._policy, self._every, self._ensemble = policy, 1 if ensemble is not None else every, ensemble
+        self._policy, self._every, self._ensemble = policy, every, ensemble
         self.reset()
 
     def reset(self) -> None:

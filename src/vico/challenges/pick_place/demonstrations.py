@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE
 from vico.challenges.pick_place.demonstrator import METHOD, Demonstrator
-from vico.challenges.pick_place.episode import Observation, Played, play
+from vico.challenges.pick_place.episode import SIDE, Observation, Played, play
 from vico.challenges.pick_place.task import PickPlaceTask, draw_task
 from vico.world.folder import World
 
@@ -54,7 +54,7 @@ def demonstrate(
     seconds
         That it may last.
     side
-        Of the robot's pictures, pixels.
+        Of the pictures that are wanted, pixels; the robot sees no fewer than 224, for it plans by what it sees.
     drop_below
         Steps whose largest increment is smaller are left out, rad and metres, as in the paper (0.01).
     seen
@@ -69,7 +69,7 @@ def demonstrate(
             seen(count, observation)
         count += 1
 
-    played = play(task, world, Demonstrator(period=PERIOD), side=side, seen=told, to_the_end=True)
+    played = play(task, world, Demonstrator(period=PERIOD), side=max(side, SIDE), seen=told, to_the_end=True)
     largest = np.abs(played.actions).max(axis=1, initial=0.0)
     return Demonstrated(task, played, np.flatnonzero(largest >= drop_below))
 
