@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from vico.challenges.pick_place.demonstrations import FPS, METHOD, STATE, Demonstrated, demonstrate
+from vico.challenges.pick_place.demonstrations import FPS, STATE, Demonstrated, demonstrate
+from vico.challenges.pick_place.demonstrator import METHOD
 from vico.challenges.pick_place.field import ENTITY_TABLE, level_field
 from vico.challenges.pick_place.task import SECONDS
 from vico.datasets.demonstrations import Demonstration

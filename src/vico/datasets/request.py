@@ -8,12 +8,13 @@ from typing import Any
 
 from vico.challenges.assistant.model import CATEGORIES
 from vico.challenges.episodes import code_digest
+from vico.challenges.pick_place.demonstrator import METHOD
 from vico.challenges.pick_place.task import SECONDS
 from vico.challenges.records import Job, Setting
 from vico.challenges.registry import foreign_parts, load_challenge
 from vico.datasets.formats.registry import FORMATS
 from vico.datasets.parts import Contents, key_of
-from vico.datasets.pick_place import CHALLENGE, METHOD, PickPlaceJob
+from vico.datasets.pick_place import CHALLENGE, PickPlaceJob
 from vico.datasets.pictures import PICTURES
 from vico.datasets.splits import SplitRule
 from vico.datasets.worker import chosen_agents, plain_job

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE
-from vico.challenges.pick_place.demonstrator import METHOD, Demonstrator
+from vico.challenges.pick_place.demonstrator import Demonstrator
 from vico.challenges.pick_place.episode import SIDE, Observation, Played, play
 from vico.challenges.pick_place.task import PickPlaceTask, draw_task
 from vico.world.folder import World
@@ -74,4 +74,4 @@ def demonstrate(
     return Demonstrated(task, played, np.flatnonzero(largest >= drop_below))
 
 
-__all__ = ["FPS", "INCREMENTS", "METHOD", "PERIOD", "STATE", "Demonstrated", "demonstrate"]
+__all__ = ["FPS", "INCREMENTS", "PERIOD", "STATE", "Demonstrated", "demonstrate"]
