@@ -27,8 +27,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from vico.agents.robot.chunk_policy import SCALES, ChunkPolicy, ChunkShape, new_network, relative_chunk, shrunk
+from vico.agents.robot.chunk_policy import SCALES, ChunkPolicy, new_network, relative_chunk, shrunk
 from vico.agents.robot.chunk_policy import word_numbers as numbers_of
+from vico.agents.robot.chunk_shape import ChunkShape
 from vico.datasets.folder import Dataset
 from vico.datasets.increments import SPACE
 from vico.errors import InputError, VicoError
@@ -250,11 +251,8 @@ def train(arguments: argparse.Namespace) -> None:
         watch = time.process_time()
         losses.append(trainer.train())
         spent += time.process_time() - watch
-        late = time.monotonic() - began > 60.0 * arguments.minutes
-        if trainer.step % arguments.every and trainer.step < arguments.steps and not late:
+        if trainer.step % arguments.every and trainer.step < arguments.steps:
             continue
-        if late and trainer.step % arguments.every:
-            break  # the next call goes on from the last look, and comes to the same
         loss = trainer.validate()
         row = {"step": trainer.step, "train_loss": round(float(np.mean(losses)), 5), "validation_loss": round(loss, 5)}
         row |= {"rate": round(trainer.rate, 8), "cpu_seconds": round(spent, 1)}
@@ -273,7 +271,7 @@ def train(arguments: argparse.Namespace) -> None:
         for old in out.glob("checkpoint_*.npz"):
             if old.name != checkpoint:
                 old.unlink()
-        if late:
+        if time.monotonic() - began > 60.0 * arguments.minutes:
             break
 
 
@@ -305,7 +303,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--side", type=int, default=96, help="pixels of the pictures it sees")
     parser.add_argument("--steps", type=int, default=50_000)
-    parser.add_argument("--minutes", type=float, default=math.inf)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="after which it stops, at the next look")
     parser.add_argument("--every", type=int, default=500, help="steps between two looks at the validation loss")
     parser.add_argument("--patience", type=int, default=20, help="looks without a better loss after which it stops")
     parser.add_argument("--threads", type=int, default=1)

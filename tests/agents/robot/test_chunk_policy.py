@@ -18,12 +18,12 @@ from felt_arm import sensors
 from vico.agents.robot.chunk_policy import (
     ChunkActor,
     ChunkPolicy,
-    ChunkShape,
     new_network,
     relative_chunk,
     shrunk,
     word_numbers,
 )
+from vico.agents.robot.chunk_shape import ChunkShape
 from vico.agents.robot.increments import arm_state
 from vico.challenges.pick_place.episode import play
 from vico.challenges.pick_place.task import draw_task

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from vico.agents.robot.chunk_policy import ChunkShape
+from vico.agents.robot.chunk_shape import ChunkShape
 
 
 class _Residual(nn.Module):  # type: ignore[misc]

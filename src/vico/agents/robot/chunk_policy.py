@@ -11,7 +11,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from vico.agents.robot.chunk_shape import ChunkShape
 from vico.agents.robot.increments import BASE, INCREMENTS, JOINTS, STATE, arm_state, control_of
 from vico.agents.state import AgentState
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
@@ -31,37 +32,6 @@ _WEIGHT, _SHAPE = "weight/", "shape"
 #: What pictures, states and actions are scaled by, as named in the file.
 SCALES = ("state_mean", "state_std", "action_mean", "action_std")
 _ARM = len(JOINTS)
-
-
-@dataclass(frozen=True)
-class ChunkShape:
-    """Sizes of a policy.
-
-    Attributes
-    ----------
-    side
-        Of the picture, pixels.
-    chunk
-        Actions that it gives at once.
-    state, action
-        Numbers of each.
-    words, vocabulary
-        Words of an instruction that are read, and how many it tells apart.
-    width, heads, encoders, decoders, dropout
-        Of the transformer.
-    """
-
-    side: int = 96
-    chunk: int = 20
-    state: int = len(STATE)
-    action: int = len(INCREMENTS)
-    words: int = 24
-    vocabulary: int = 512
-    width: int = 256
-    heads: int = 8
-    encoders: int = 4
-    decoders: int = 2
-    dropout: float = 0.1
 
 
 def word_numbers(instruction: str, shape: ChunkShape) -> NDArray[np.int64]:

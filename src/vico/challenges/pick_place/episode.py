@@ -13,8 +13,8 @@ from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE, arm_state, i
 from vico.assets.models.movable import movable_prototype, movable_surfaces
 from vico.challenges.pick_place.field import TABLE
 from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, Thing, world_of_task
-from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.clock import clock_of
+from vico.envs import Simulation, make
 from vico.world.folder import World
 
 #: The robot's name.
@@ -151,7 +151,8 @@ def play(
 
 def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, outputs: tuple[str, ...]) -> Simulation:
     """Return the simulation of a task before its first step: the robot, the thing and the one beside it."""
-    config = SimConfig(
+    env = make(
+        world_of_task(task, world),
         seed=task.seed,
         residents=0,
         robots=("manipulator",),
@@ -161,13 +162,16 @@ def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, output
         transit=False,
         outputs=outputs,
         image=side,
-        start=task.start,
+        start=clock_of(task.start),
         weather=task.weather,
+        setup=lambda sim: _set_up(sim, task),
     )
-    sim = Simulation(world_of_task(task, world), None, config)
+    return env.sim
+
+
+def _set_up(sim: Simulation, task: PickPlaceTask) -> None:
     for name, thing in (("thing", task.thing), ("landmark", task.landmark)):
         _add(sim, name, thing)
-    return sim
 
 
 def _add(sim: Simulation, name: str, thing: Thing) -> None:

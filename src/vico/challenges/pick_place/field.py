@@ -11,7 +11,7 @@ from vico.version import __version__
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin, Transit
+from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin, Roads, Transit
 from vico.world.objects import Objects
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
@@ -61,6 +61,7 @@ def level_field(seed: int, *, table: tuple[float, float, float] | None = None) -
         places=[],
         entrances=[],
         rooms=[],
+        roads=Roads(roads=[], junctions=[], crossings=[]),
         transit=Transit(stops=[], lines=[], bike_stations=[], origin={}),
         models={},
         layers={
