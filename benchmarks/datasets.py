@@ -21,6 +21,7 @@ from vico.challenges.assistant.episode import play_task, world_and_people
 from vico.challenges.assistant.generate import generate_task, shortened
 from vico.datasets.build import BuildRequest, layout_of
 from vico.datasets.demonstrations import demonstrations_of
+from vico.datasets.episode_records import origin_of_run
 from vico.datasets.formats.pictures import PictureFiles
 from vico.datasets.formats.registry import FORMATS
 from vico.datasets.parts import Contents, read_part, write_part
@@ -65,7 +66,7 @@ def one_round(world: Path, seed: int, steps: int, size: int) -> dict[str, float]
 
             def write(to: str = to, contents: Contents = contents, staged: Path = staged) -> None:
                 made = demonstrations_of(run, EpisodeFacts(instructions=task.instructions()), ["assistant_0"])[0]
-                about = encoded(made, pictures, PictureFiles(staged, "0"), contents, run, place)
+                about = encoded(made, pictures, PictureFiles(staged, "0"), contents, origin_of_run(made, run, place))
                 write_part(work / f"{to}.part", "key", [(about, made)], staged)
                 part = read_part(work / f"{to}.part", "key")
                 assert part is not None

@@ -151,3 +151,9 @@ def test_a_program_watches_a_run_and_reaches_into_it(
     assert printed.count("step 5: ") == 4
     assert "step 10: 4.0 mm of rain an hour\nwhat if it stayed dry, in live.from-5\nstep 10: 0.0 mm" in printed
     assert {path.name for path in tmp_path.iterdir()} == {"live", "live.from-5"}
+
+
+def test_what_was_shown_is_done_again(tmp_path: Path) -> None:
+    printed = run("19_imitation.py", "--out", str(tmp_path / "demos"), "--episodes", "1")
+    assert "frames: Pick up the blue shopping bag and put it down next to the pink umbrella." in printed
+    assert "seed 7 done again: done" in printed

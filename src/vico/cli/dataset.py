@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.challenges.assistant.thresholds import SUBTASKS
+from vico.challenges.pick_place.task import SECONDS
 from vico.challenges.records import Setting
 from vico.cli.dataset_options import DatasetOptions
 from vico.cli.output import check_output, print_json, print_table, progress_bars
@@ -50,17 +51,19 @@ def request_of(options: DatasetOptions) -> BuildRequest:
         setting = {**setting, "subtasks": options.subtasks}
     foreign = ":" in options.method
     return BuildRequest(
-        contents=Contents(options.to, outputs, options.size, options.agents, options.instruction),
+        contents=Contents(options.to, outputs, options.size, options.agents, options.instruction, options.drop_below),
         runs=options.runs,
         worlds=options.world,
         category=options.challenge,
         method=options.method,
         setting=setting,
+        seconds=min(options.steps, SECONDS),
         episodes=options.episodes,
         first_seed=options.first_seed,
         terms=Terms(deadline=options.deadline or None, isolate=True) if foreign else Terms(),
         rule=SplitRule(options.split_by, options.test, options.validation),
         successes=options.successes,
+        clip=options.clip,
         workers=options.workers or processors(),
         ray=options.ray,
     )

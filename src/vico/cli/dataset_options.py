@@ -20,15 +20,15 @@ class DatasetOptions:
     to
         The format: LeRobot v3.0, WebDataset shards, or plain Parquet.
     world
-        World folders to play in. With --runs: where their world is now.
+        World folders to play in. With --runs: where their world is now. Of pick_place: without any, a level field.
     challenge
-        What is played.
+        What is played; pick_place: a mobile manipulator picks things up and puts them down (docs/imitation.md).
     method
-        By whom: a planner of `vico eval assistant`, or my_module:MyAgent.
+        By whom: a planner of `vico eval assistant`, or my_module:MyAgent. Of pick_place: always the arm's own skills.
     episodes
         How many, over the worlds in turn.
     steps
-        Seconds an episode may last.
+        Seconds an episode may last; of pick_place never more than 120.
     subtasks
         How many of the six subtasks of a task are asked for: the first ones.
     assistants
@@ -48,6 +48,10 @@ class DatasetOptions:
         What to say was asked for, where neither a task nor a schedule says it.
     successes
         Keep only episodes in which all was done.
+    drop_below
+        Of pick_place: leave out steps whose largest increment is smaller, rad and metres; the paper has 0.01.
+    clip
+        Of pick_place: cut this share of the smallest and of the largest increments; the paper has 0.01.
     test
         Share of the episodes that are kept apart for testing.
     validation
@@ -70,7 +74,7 @@ class DatasetOptions:
     out: Path
     to: Literal["lerobot", "webdataset", "parquet"]
     world: tuple[Path, ...] = ()
-    challenge: Literal["carry", "delivery", "search"] = "delivery"
+    challenge: Literal["carry", "delivery", "search", "pick_place"] = "delivery"
     method: str = "heuristic"
     episodes: int = 0
     steps: int = 1500
@@ -83,6 +87,8 @@ class DatasetOptions:
     size: int = 128
     instruction: str = ""
     successes: bool = False
+    drop_below: float = 0.0
+    clip: float = 0.0
     test: float = 0.1
     validation: float = 0.0
     split_by: Literal["world", "person", "episode"] = "episode"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from vico.datasets.increments import SPACE
 from vico.datasets.layout import IMAGES, Layout
 
 _UNITS = {
@@ -91,9 +92,31 @@ def _contents(layout: Layout, record: Mapping[str, Any]) -> str:
         "| `action.status` | " + ", ".join(f"{value} {name}" for value, name in record["statuses"].items()) + " |",
         "| `next.done`, `next.success` | last frame of an episode; and whether all was done |",
         "",
-        "ENU metres, radians, seconds since midnight. `vico.datasets.actions` makes actions of vectors, and back.",
+        _of_actions(record),
     ]
     return "\n".join(lines)
+
+
+def _of_actions(record: Mapping[str, Any]) -> str:
+    """Return how the action vectors are to be read, and which of them were left out or changed."""
+    if record["action"]["space"] != SPACE:
+        return (
+            "ENU metres, radians, seconds since midnight. `vico.datasets.actions` makes actions of vectors, and back."
+        )
+    setting = record["made"]["setting"]
+    lines = [
+        "Radians and metres. An action holds increments of its joints: from where each is, as the state of the same "
+        "frame says, to where its servo is told to be; of the base how far it goes ahead and turns left in the period. "
+        "`vico.agents.robot.increments` makes actions of the simulation of them.",
+    ]
+    if setting["drop_below"]:
+        lines.append(
+            f"Steps whose action is smaller than {setting['drop_below']:g} in all of its numbers are left out."
+        )
+    if setting["clip"]:
+        low, high = setting["clip"], 1.0 - setting["clip"]
+        lines.append(f"Actions are cut to their quantiles {low:g} and {high:g}, each number by itself.")
+    return " ".join(lines)
 
 
 def _origin(record: Mapping[str, Any]) -> str:
@@ -125,9 +148,8 @@ def _limits(layout: Layout, record: Mapping[str, Any]) -> str:
         lines.append("- All demonstrations are by one method: its habits and its mistakes are in them.")
     gaps = sum(int(episode.about["gaps"]) for episode in layout.episodes)
     if gaps:
-        lines.append(
-            f"- {gaps} times more time passed between two frames than timestamps say (`observation.state`, `time`)."
-        )
+        told = " (`observation.state`, `time`)" if "time" in record["features"]["observation.state"] else ""
+        lines.append(f"- {gaps} times more time passed between two frames than timestamps say{told}.")
     if record["judged"] > record["successes"]:
         lines.append("- Failed episodes are in it: select by `success` in `episodes.parquet`.")
     if record["missing"]:

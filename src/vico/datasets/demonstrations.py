@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import robot_model
 from vico.datasets.actions import ActionForm
+from vico.datasets.increments import Form
 from vico.datasets.tasks import EpisodeFacts, current_part
 from vico.datasets.vectors import (
     PERSON_STATE,
@@ -71,7 +72,7 @@ class Demonstration:
     steps: NDArray[np.int64]
     fps: int
     state_names: tuple[str, ...]
-    form: ActionForm
+    form: Form
     state: NDArray[np.float32]
     action: NDArray[np.float32]
     goal: NDArray[np.float32] | None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -56,16 +57,58 @@ def vectors_of(demonstration: Demonstration) -> dict[str, NDArray[Any]]:
     return found
 
 
-def episode_record(demonstration: Demonstration, tally: Tally, run: Run, world: World | None) -> dict[str, Any]:
-    """Return what is said of a demonstration, as JSON.
+@dataclass(frozen=True)
+class Origin:
+    """Where a demonstration comes from.
+
+    Attributes
+    ----------
+    world
+        Its name and digest.
+    sources
+        Of the world's data, as its manifest tells them.
+    run
+        Hash of all that happened.
+    producer
+        What made it.
+    gaps
+        After how many frames more time passed than a frame lasts, such as at appointments.
+    names
+        Kind and name of entities that the pictures may show.
+    """
+
+    world: Mapping[str, str]
+    sources: Sequence[Mapping[str, Any]]
+    run: str
+    producer: str
+    gaps: int
+    names: Mapping[int, Mapping[str, str]]
+
+
+def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -> Origin:
+    """Return where a demonstration of a recorded run comes from.
 
     Parameters
     ----------
     world
         Names what the pictures show that is no body; without it, those have no name.
     """
-    facts = demonstration.facts
     manifest = run.manifest
+    names: dict[int, Mapping[str, str]] = {} if world is None else dict(world.entities)
+    names |= {entity: {"kind": body.kind, "name": body.name} for entity, body in run.cast.items()}
+    return Origin(
+        {"name": _world_name(run, world), "digest": manifest["world"]["digest"]},
+        [] if world is None else [source.model_dump(mode="json") for source in world.manifest.sources],
+        manifest["state_hash"],
+        manifest["producer"],
+        _gaps(demonstration, run),
+        names,
+    )
+
+
+def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -> dict[str, Any]:
+    """Return what is said of a demonstration, as JSON."""
+    facts = demonstration.facts
     return {
         "frames": len(demonstration),
         "fps": demonstration.fps,
@@ -80,18 +123,18 @@ def episode_record(demonstration: Demonstration, tally: Tally, run: Run, world: 
         "success": demonstration.success,
         "persons": [demonstration.person] if demonstration.person else list(facts.persons),
         "instructions": list(dict.fromkeys(demonstration.instructions)),
-        "world": {"name": _world_name(run, world), "digest": manifest["world"]["digest"]},
-        "sources": [] if world is None else [source.model_dump(mode="json") for source in world.manifest.sources],
-        "run": manifest["state_hash"],
-        "producer": manifest["producer"],
+        "world": dict(origin.world),
+        "sources": [dict(source) for source in origin.sources],
+        "run": origin.run,
+        "producer": origin.producer,
         "state_names": list(demonstration.state_names),
         "width": demonstration.form.width,
         "space": demonstration.form.space,
         "goal": demonstration.goal is not None,
-        "gaps": _gaps(demonstration, run),
+        "gaps": origin.gaps,
         "tally": tally.record(),
         "statistics": {name: vector_statistics(values) for name, values in vectors_of(demonstration).items()},
-        "entities": _names(tally.entities, run, world),
+        "entities": _names(tally.entities, origin.names),
     }
 
 
@@ -105,16 +148,11 @@ def _gaps(demonstration: Demonstration, run: Run) -> int:
     return int((np.diff(times) > 1.0 / demonstration.fps + 1e-6).sum())
 
 
-def _names(entities: Sequence[int], run: Run, world: World | None) -> list[dict[str, Any]]:
-    """Return kind and name of entities, as far as the recording and the world tell."""
-    fixed = {} if world is None else world.entities
+def _names(entities: Sequence[int], names: Mapping[int, Mapping[str, str]]) -> list[dict[str, Any]]:
+    """Return kind and name of entities, as far as they are known."""
+    unknown = {"kind": "unknown", "name": ""}
     found: list[dict[str, Any]] = []
     for entity in entities:
-        body, thing = run.cast.get(entity), fixed.get(entity)
-        if body is not None:
-            found.append({"entity": entity, "kind": body.kind, "name": body.name})
-        elif thing is not None:
-            found.append({"entity": entity, "kind": thing["kind"], "name": thing["name"]})
-        else:
-            found.append({"entity": entity, "kind": "unknown", "name": ""})
+        known = names.get(entity, unknown)
+        found.append({"entity": entity, "kind": known["kind"], "name": known["name"]})
     return found

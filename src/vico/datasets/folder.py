@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from vico.datasets.actions import ActionForm
 from vico.datasets.formats.registry import FORMATS
+from vico.datasets.increments import Form, form_of
 from vico.datasets.layout import STATUSES, Layout
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.files import read_json, sha256_of, write_json
@@ -106,9 +106,9 @@ class Dataset:
             )
 
     @property
-    def form(self) -> ActionForm:
+    def form(self) -> Form:
         """How its action vectors are read."""
-        return ActionForm(**self.about.action)
+        return form_of(**self.about.action)
 
     def episodes(self) -> list[dict[str, Any]]:
         """Return a record of each episode, in their order.

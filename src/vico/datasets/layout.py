@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.datasets.actions import ActionForm
+from vico.datasets.increments import Form, form_of
 from vico.datasets.parts import Contents, PartEpisode, array_of
 from vico.datasets.statistics import Statistics, colour_statistics, depth_statistics, vector_statistics
 from vico.datasets.vectors import GOAL
@@ -39,11 +39,14 @@ class Layout:
         In their order: those of a split follow each other.
     splits
         First episode and the one after the last, by name.
+    clip
+        Share of the smallest and of the largest actions that are cut to the next one, each number by itself.
     """
 
     contents: Contents
     episodes: Sequence[PartEpisode]
     splits: Mapping[str, tuple[int, int]]
+    clip: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.episodes:
@@ -78,10 +81,10 @@ class Layout:
         return list(GOAL) if self.episodes[0].about["goal"] else []
 
     @property
-    def form(self) -> ActionForm:
+    def form(self) -> Form:
         """How actions are made of vectors, and vectors of actions."""
         about = self.episodes[0].about
-        return ActionForm(robot=self.body != "person", width=about["width"], space=about["space"])
+        return form_of(robot=self.body != "person", width=about["width"], space=about["space"])
 
     @property
     def frames(self) -> int:
@@ -102,12 +105,22 @@ class Layout:
         """Return the split of an episode."""
         return next(name for name, (first, end) in self.splits.items() if first <= index < end)
 
+    @cached_property
+    def action_bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Smallest and largest that actions are cut to, shape ``(d,)`` each; None where they are not."""
+        if not self.clip:
+            return None
+        actions = np.concatenate([array_of(episode.table(), "action") for episode in self.episodes])
+        low, high = np.quantile(actions, [self.clip, 1.0 - self.clip], axis=0).astype(np.float32)
+        return low, high
+
     def columns(self) -> Iterator[EpisodeColumns]:
         """Yield each episode's numbers."""
         number = {text: k for k, text in enumerate(self.instructions)}
         before = 0
         for index, episode in enumerate(self.episodes):
-            yield EpisodeColumns.of(index, before, episode, number, goal=bool(self.goal_names))
+            columns = EpisodeColumns.of(index, before, episode, number, goal=bool(self.goal_names))
+            yield columns if self.action_bounds is None else columns.clipped(*self.action_bounds)
             before += episode.frames
 
     def statistics(self) -> dict[str, Statistics]:
@@ -203,6 +216,10 @@ class EpisodeColumns:
     def timestamp(self) -> NDArray[np.float32]:
         """Seconds since the episode's first frame, by the frames."""
         return (np.arange(len(self)) / self.fps).astype(np.float32)
+
+    def clipped(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> EpisodeColumns:
+        """Return them with actions held within bounds."""
+        return replace(self, vectors={**self.vectors, "action": np.clip(self.vectors["action"], low, high)})
 
     def numbers(self) -> dict[str, NDArray[Any]]:
         """Return what statistics are told of."""

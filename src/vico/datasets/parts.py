@@ -43,6 +43,8 @@ class Contents:
         any, else all whose pictures were recorded.
     instruction
         What to say where neither task nor schedule says what was asked for.
+    drop_below
+        Of increments: steps whose largest is smaller are left out, rad and metres.
     """
 
     to: str
@@ -50,6 +52,7 @@ class Contents:
     size: int = 128
     agents: tuple[str, ...] = ()
     instruction: str = ""
+    drop_below: float = 0.0
 
     def record(self) -> dict[str, Any]:
         """Return it as JSON; `of` makes the same of it."""

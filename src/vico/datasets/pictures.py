@@ -89,11 +89,11 @@ class PictureKeeper(Hook):
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Keep the pictures before the first step."""
-        self._keep(0, observations)
+        self.keep(0, observations)
 
     def stepped(self, step: Step) -> None:
         """Keep a step's pictures."""
-        self._keep(step.number, step.result.observations)
+        self.keep(step.number, step.result.observations)
 
     def close(self) -> KeptPictures:
         """Finish the files, and return what reads them."""
@@ -102,7 +102,8 @@ class PictureKeeper(Hook):
         write_json(self._folder / _INDEX, record)
         return KeptPictures(self._folder)
 
-    def _keep(self, number: int, observations: Mapping[str, dict[str, Any]]) -> None:
+    def keep(self, number: int, observations: Mapping[str, dict[str, Any]]) -> None:
+        """Keep what is seen at a step, by agent's name."""
         for name in self._agents:
             seen = observations.get(name, {})
             if any(output not in seen for output in self._outputs):

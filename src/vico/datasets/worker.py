@@ -19,10 +19,11 @@ from vico.challenges.assistant.model import Task
 from vico.challenges.episodes import code_digest
 from vico.challenges.records import Job
 from vico.datasets.demonstrations import Demonstration, demonstrations_of
-from vico.datasets.episode_records import Tally, episode_record
+from vico.datasets.episode_records import Origin, Tally, episode_record, origin_of_run
 from vico.datasets.formats.pictures import PictureFiles
 from vico.datasets.formats.registry import FORMATS
 from vico.datasets.parts import Contents, read_part, write_part
+from vico.datasets.pick_place import CHALLENGE, shown
 from vico.datasets.pictures import PictureKeeper, PictureSource, RecordedPictures
 from vico.datasets.tasks import EpisodeFacts, facts_of_episode, facts_of_run
 from vico.errors import InputError
@@ -54,7 +55,8 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
     -------
     callable
         Makes the part of a task: ``key`` and ``folder`` (its name), and either ``run`` (path) and ``world`` (path or
-        null), or ``job`` (`plain_job`). Returns ``frames``; raises where there is no part to be made, and says why.
+        null), or ``job`` (`plain_job`, or `PickPlaceJob.record`). Returns ``frames``; raises where there is no part to
+        be made, and says why.
     """
     parts, contents = Path(options["parts"]), Contents.of(options["contents"])
     check_seen(FolderStore(parts), options["seen"])
@@ -91,6 +93,13 @@ def plain_job(job: Job) -> dict[str, Any]:
 
 
 def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path, tell: Tell) -> None:
+    staged = work / "staged"
+    staged.mkdir()
+    if "job" in task and task["job"].get("challenge") == CHALLENGE:
+        made, kept, origin = shown(task["job"], contents, work)
+        about = encoded(made, kept, PictureFiles(staged, "0"), contents, origin)
+        write_part(folder, task["key"], [(about, made)], staged)
+        return
     if "run" in task:
         run = read_run(Path(task["run"]))
         world = world_of_run(run, task.get("world"))
@@ -100,13 +109,10 @@ def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path,
     else:
         run, facts, pictures, world = _played(task["job"], contents, work, tell)
         agents = chosen_agents(run, contents)
-    staged = work / "staged"
-    staged.mkdir()
-    made = demonstrations_of(run, facts, agents, instruction=contents.instruction)
-    episodes = [
-        (encoded(demonstration, pictures, PictureFiles(staged, str(k)), contents, run, world), demonstration)
-        for k, demonstration in enumerate(made)
-    ]
+    episodes = []
+    for k, one in enumerate(demonstrations_of(run, facts, agents, instruction=contents.instruction)):
+        about = encoded(one, pictures, PictureFiles(staged, str(k)), contents, origin_of_run(one, run, world))
+        episodes.append((about, one))
     write_part(folder, task["key"], episodes, staged)
 
 
@@ -154,8 +160,7 @@ def encoded(
     pictures: PictureSource,
     files: PictureFiles,
     contents: Contents,
-    run: Run,
-    world: World | None,
+    origin: Origin,
 ) -> dict[str, Any]:
     """Encode a demonstration's pictures; return what is said of it."""
     tally = Tally()
@@ -168,7 +173,7 @@ def encoded(
             tally.add(seen)
             writer.add(seen)
         writer.close()
-    return episode_record(demonstration, tally, run, world)
+    return episode_record(demonstration, tally, origin)
 
 
 def chosen_agents(run: Run, contents: Contents) -> list[str]:

@@ -1,0 +1,219 @@
+"""One episode of pick and place in the real simulation: whoever acts, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE, arm_state, increments_of
+from vico.assets.models.movable import movable_prototype, movable_surfaces
+from vico.challenges.pick_place.field import TABLE
+from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, Thing, world_of_task
+from vico.clock import clock_of
+from vico.envs import Simulation, make
+from vico.world.folder import World
+
+#: The robot's name.
+ROBOT = "robot_0"
+#: Side of its pictures unless told, pixels, as in the paper.
+SIDE = 224
+# Metres that a thing may be off the height of what it lies on; m/s of one that lies still; newtons of a finger on it.
+_HEIGHT, _STILL, _TOUCHED = 0.05, 0.02, 0.5
+# Seconds that a thing is given to come to rest once the robot is done.
+_RESTS = 1.0
+
+Observation = dict[str, Any]
+
+
+class Actor(Protocol):
+    """Who controls the robot, twenty times a second."""
+
+    def act(self, observation: Observation, instruction: str) -> dict[str, Any] | None:
+        """Return a ``control`` action; None once all is done, or given up."""
+
+
+class Verdict:
+    """Why an episode ended as it did."""
+
+    DONE, NOT_TAKEN, DROPPED, NOT_PLACED, HELD, TIMEOUT, FALLEN = (
+        "done", "not taken", "dropped on the way", "not where it was to be", "still held", "out of time", "fallen",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Played:
+    """What came of an episode.
+
+    Attributes
+    ----------
+    success
+        Whether the thing lies where it was to be.
+    cause
+        One of `Verdict`.
+    why
+        What the actor says of it; empty where it has nothing to say.
+    seconds
+        It took.
+    off
+        Metres from the thing's middle to that of what it was to be put beside, or onto.
+    states, actions
+        As a policy is taught, before each action: float32, shapes ``(n, 20)`` and ``(n, 11)``.
+    """
+
+    success: bool
+    cause: str
+    why: str
+    seconds: float
+    off: float
+    states: NDArray[np.float32]
+    actions: NDArray[np.float32]
+
+
+#: Told what the robot observed, and what it does next.
+Seen = Callable[[Observation], None]
+
+
+def play(
+    task: PickPlaceTask,
+    world: World | None,
+    actor: Actor,
+    *,
+    side: int = SIDE,
+    outputs: tuple[str, ...] = ("rgb", "depth", "segmentation"),
+    seen: Seen | None = None,
+    to_the_end: bool = False,
+) -> Played:
+    """Play an episode.
+
+    Parameters
+    ----------
+    world
+        That the task was drawn in; None for its field.
+    side
+        Of the robot's pictures, pixels.
+    outputs
+        That it is given.
+    seen
+        Told each observation that the robot acted upon, in their order.
+    to_the_end
+        Whether the actor goes on until it says that it is done; else the episode is over once the thing has been where
+        it was to be for a second, in nobody's jaw.
+    """
+    sim = simulation_of(task, world, side=side, outputs=outputs)
+    observation = _step(sim, {"type": "wait"})
+    if callable(getattr(actor, "begin", None)):
+        actor.begin(task, sim.ground_truth.object_entity("thing"))  # type: ignore[attr-defined]
+    states: list[NDArray[np.float32]] = []
+    actions: list[NDArray[np.float32]] = []
+    lifted, done, cause = False, 0, Verdict.TIMEOUT
+    for _ in range(round(task.seconds / PERIOD)):
+        action = actor.act(observation, task.instruction)
+        if action is None:
+            cause = ""
+            break
+        state = arm_state(observation)
+        states.append(state)
+        actions.append(increments_of(action["vector"], state))
+        if seen is not None:
+            seen(observation)
+        observation = _step(sim, action)
+        lifted = lifted or _rise(sim, task) > 0.05
+        if observation["sensors"]["fallen"][0]:
+            cause = Verdict.FALLEN
+            break
+        done = done + 1 if lifted and _judged(sim, task, observation, lifted=lifted)[0] == Verdict.DONE else 0
+        if done * PERIOD >= _RESTS and not to_the_end:
+            cause = ""
+            break
+    before = np.zeros(3)
+    for _ in range(round(_RESTS / PERIOD)):
+        before = sim.ground_truth.object_position("thing").copy()
+        observation = _step(sim, {"type": "stop"})
+    found, off = _judged(sim, task, observation, lifted=lifted)
+    still = float(np.linalg.norm(sim.ground_truth.object_position("thing") - before)) < _STILL * PERIOD
+    success = found == Verdict.DONE and still and cause != Verdict.FALLEN
+    if not cause and not success and found == Verdict.DONE:
+        found = Verdict.NOT_PLACED  # it rolls, or topples
+    return Played(
+        success,
+        found if success or not cause else cause,
+        str(getattr(actor, "why", "")),
+        len(states) * PERIOD,
+        off,
+        np.array(states, np.float32).reshape(-1, len(STATE)),
+        np.array(actions, np.float32).reshape(-1, len(INCREMENTS)),
+    )
+
+
+def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, outputs: tuple[str, ...]) -> Simulation:
+    """Return the simulation of a task before its first step: the robot, the thing and the one beside it."""
+    env = make(
+        world_of_task(task, world),
+        seed=task.seed,
+        residents=0,
+        robots=("manipulator",),
+        robot_places={ROBOT: task.robot},
+        periods={ROBOT: PERIOD},
+        observe=(ROBOT,),
+        transit=False,
+        outputs=outputs,
+        image=side,
+        start=clock_of(task.start),
+        weather=task.weather,
+        setup=lambda sim: _set_up(sim, task),
+    )
+    return env.sim
+
+
+def _set_up(sim: Simulation, task: PickPlaceTask) -> None:
+    for name, thing in (("thing", task.thing), ("landmark", task.landmark)):
+        _add(sim, name, thing)
+
+
+def _add(sim: Simulation, name: str, thing: Thing) -> None:
+    sim.scenario.add_object(
+        name,
+        movable_prototype(thing.kind, thing.colour),
+        movable_surfaces(thing.kind, thing.colour),
+        thing.position,
+        size=thing.size,
+        yaw=thing.yaw,
+    )
+
+
+def _step(sim: Simulation, action: dict[str, Any]) -> Observation:
+    """Advance by a period; return what the robot observes then."""
+    sim.act({ROBOT: action})
+    sim.advance(PERIOD)
+    observations, _ = sim.observe([ROBOT])
+    return observations[ROBOT]
+
+
+def _rise(sim: Simulation, task: PickPlaceTask) -> float:
+    """Return how much higher the thing is than where it lay, metres."""
+    return float(sim.ground_truth.object_position("thing")[2] - task.thing.position[2])
+
+
+def _judged(sim: Simulation, task: PickPlaceTask, observation: Observation, *, lifted: bool) -> tuple[str, float]:
+    """Return what is to be said of where the thing is, and how far off it is."""
+    at = sim.ground_truth.object_position("thing")
+    if task.destination == "table":
+        assert task.table is not None
+        off = at - np.array(task.table)
+        there = abs(off[0]) <= TABLE[0] / 2 and abs(off[1]) <= TABLE[1] / 2
+    else:
+        off = at - sim.ground_truth.object_position("landmark")
+        off[2] = at[2] - float(sim.world.height(at[:2]))
+        there = float(np.hypot(off[0], off[1])) <= NEXT_TO
+    distance = float(np.hypot(off[0], off[1]))
+    if float(np.min(observation["sensors"]["contacts"])) > _TOUCHED:
+        return Verdict.HELD, distance
+    if there and abs(float(off[2])) <= _HEIGHT and lifted:
+        return Verdict.DONE, distance
+    if not lifted:
+        return Verdict.NOT_TAKEN, distance
+    return Verdict.NOT_PLACED, distance
