@@ -46,7 +46,8 @@ def main() -> int:
     pdoc.render.configure(docformat="numpy", footer_text=f"Virtual Community {vico.__version__}")
     out.mkdir(parents=True, exist_ok=True)
     names = list(modules())
-    pdoc.pdoc(*names, output_directory=out)
+    # What packages bring along beside these is nobody's to import, and may need packages that are not there.
+    pdoc.pdoc(*names, r"!vico\.(.*\.)?_", output_directory=out)
     sys.stdout.write(f"{out / 'index.html'}: {len(names)} modules\n")
     return 0
 

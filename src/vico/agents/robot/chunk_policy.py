@@ -88,7 +88,7 @@ class ChunkPolicy:
     scales
         Mean and spread of states, shape ``(state,)``, and actions, shape ``(chunk, action)``; see `SCALES`.
     network
-        A `vico.agents.robot.chunk_network.ChunkNetwork`.
+        A `vico.agents.robot._chunk_network.ChunkNetwork`.
     """
 
     def __init__(self, shape: ChunkShape, scales: Mapping[str, Array], network: Any) -> None:
@@ -245,7 +245,7 @@ def new_network(shape: ChunkShape) -> tuple[Any, Any]:
         raise MissingExtraError(
             "chunk policy: torch is not installed: pip install 'virtual-community[imitation]'"
         ) from None
-    from vico.agents.robot.chunk_network import ChunkNetwork
+    from vico.agents.robot._chunk_network import ChunkNetwork
 
     return torch, ChunkNetwork(shape)
 
