@@ -32,8 +32,8 @@ _ROOM_AHEAD = 0.06
 _GRIP_TIME, _STALE, _STUCK = 1.6, 20.0, 1.0
 # Newtons on both fingers that are a grip, and metres that fingers stay apart if there is something in between.
 _FELT, _APART = 4.0, 0.004
-# Angles, rad, that count as there.
-_THERE = 0.03
+# Angles, rad, that count as there, and that tell moving from leaning on something, from one look to the next.
+_THERE, _MOVES = 0.03, 0.002
 # Of its speed an arm goes with, and with something in the jaw.
 _SPEED, _LADEN = 0.8, 0.5
 # Metres before a person, and above the ground, that things are held out to them; seconds that they have to take them.
@@ -99,6 +99,7 @@ class ArmWorker:
         self._target = np.zeros(3)
         self._beside: Array | None = None
         self._set = np.concatenate([body.rest, [0.0, 0.0]])  # where servos are told to be
+        self._angles = body.rest.copy()  # as they were felt last
         self._knows = False
         self._timer = self._stuck = 0.0
         self._tries = 0
@@ -265,7 +266,13 @@ class ArmWorker:
         return self._hold()
 
     def _down(self, observation: Mapping[str, Any], angles: Array) -> Action:
-        if self._follow(angles):
+        """Go the last bit, or as far as something solid lets it."""
+        there = self._follow(angles)
+        moves = float(np.abs(angles[:7] - self._angles).max()) > _MOVES
+        self._angles = angles[:7].copy()
+        told = self._way is not None and self._point >= len(self._way)
+        self._stuck = self._stuck + self.period if told and not moves else 0.0
+        if there or self._stuck > _STUCK:
             self._next(Stage.GRIP)
         return self._hold()
 
@@ -368,7 +375,7 @@ class ArmWorker:
         self._way, self._point = way, 0
 
     def _next(self, stage: Stage) -> None:
-        self.stage, self._timer, self._way = stage, 0.0, None
+        self.stage, self._timer, self._way, self._stuck = stage, 0.0, None, 0.0
 
     def _again(self, why: str) -> Action:
         """Try once more from another standoff, or give up."""
@@ -405,6 +412,7 @@ class ArmWorker:
             "target": self._target.copy(),
             "beside": None if self._beside is None else self._beside.copy(),
             "set": self._set.copy(),
+            "angles": self._angles.copy(),
             "knows": self._knows,
             "numbers": [self._timer, self._stuck, self.forces],
             "tries": self._tries,
@@ -424,6 +432,7 @@ class ArmWorker:
         self._entity, self._tries, self._point = int(state["entity"]), int(state["tries"]), int(state["point"])
         self._target, self._set = np.array(state["target"]), np.array(state["set"])
         self._beside = None if state["beside"] is None else np.array(state["beside"])
+        self._angles = np.array(state["angles"])
         self._knows = bool(state["knows"])
         self._timer, self._stuck, self.forces = (float(value) for value in state["numbers"])
         self._skip = set(state["skip"])
