@@ -92,6 +92,6 @@ def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
             r.level_half,
             np.column_stack([np.sin(turn), np.cos(turn), r.gap]),
             seen(r.hand_rotation[:, :, 2]),
-            r.pressure > PRESSING,
+            (r.pressure > PRESSING).astype(np.float64),
         ]
     return np.clip(np.concatenate(parts, axis=1), -BOUND, BOUND).astype(np.float32)
