@@ -86,8 +86,8 @@ def closing(r: Readings) -> Array:
 def lifting(r: Readings) -> Array:
     """Return how far a gripped box has been lifted and is held still, from 0 to 1."""
     up = share(r.clearance, 0.0, 0.15)
-    still = (r.clearance > LIFTED) * nearness(r.thing_speed[:, 0], 0.2)
-    return np.asarray(r.gripped * (0.8 * up + 0.2 * still))
+    still = (r.clearance > LIFTED) * nearness(r.thing_speed[:, 0], 0.25)
+    return np.asarray(r.gripped * (0.6 * up + 0.4 * still))
 
 
 def carrying(r: Readings) -> Array:

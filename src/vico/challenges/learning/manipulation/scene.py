@@ -1,8 +1,8 @@
 """The physics of a manipulation environment: a robot, a box, the ground and a table, as a model of MuJoCo's.
 
 Cities are simulated by `vico.sim`, whose scenes hold streets, people and vehicles. A learner needs nothing of that but
-millions of steps, so this is a model of its own: the same robot from the same MJCF, and the settings of contact that
-hold things in a city (elliptic cones, `impratio` 10).
+millions of steps, so this is a model of its own: the same robot from the same MJCF, and settings of contact that hold
+things (elliptic cones, `impratio` 10).
 """
 
 from __future__ import annotations
