@@ -18,6 +18,7 @@ from vico.challenges.pick_place.episode import play
 from vico.challenges.pick_place.task import draw_task
 from vico.datasets.build import BuildRequest, Contents, build_dataset
 from vico.datasets.folder import Dataset
+from vico.datasets.splits import SplitRule
 
 
 class Again:
@@ -33,7 +34,7 @@ class Again:
 
 def actor_of(options: argparse.Namespace):
     if options.policy:
-        return ChunkActor(ChunkPolicy.read(options.policy), ensemble=0.01)
+        return ChunkActor(ChunkPolicy.read(options.policy), ensemble=options.ensemble)
     return LeRobotActor.read(options.lerobot)
 
 
@@ -44,13 +45,20 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=7)
     parser.add_argument("--policy", type=Path)
     parser.add_argument("--lerobot", type=Path)
+    parser.add_argument("--ensemble", type=float, help="temporal ensembling, such as 0.01; slower")
+    parser.add_argument("--seconds", type=int, default=120, help="that an episode may last")
     parser.add_argument("--seeds", type=int, default=10, help="episodes that a policy is played in")
     options = parser.parse_args()
 
     if not options.out.exists():
         contents = Contents("lerobot", outputs=("rgb",), size=224)
         wanted = BuildRequest(
-            contents, category="pick_place", episodes=options.episodes, first_seed=options.first_seed, successes=True
+            contents,
+            category="pick_place",
+            episodes=options.episodes,
+            first_seed=options.first_seed,
+            rule=SplitRule("episode", 0.0, 0.0),
+            successes=True,
         )
         build_dataset(wanted, options.out)
     dataset = Dataset(options.out)
@@ -65,7 +73,7 @@ def main() -> None:
     causes: Counter[str] = Counter()
     for seed in range(100_000, 100_000 + options.seeds):  # of none of the demonstrations
         actor = actor_of(options)
-        played = play(draw_task(seed), None, actor, outputs=("rgb",))
+        played = play(draw_task(seed, seconds=options.seconds), None, actor, outputs=("rgb",))
         causes[played.cause] += 1
         print(f"seed {seed}: {played.cause} after {played.seconds:.1f} s")
     print(f"{causes['done']} of {options.seeds} done; {dict(causes)}")

@@ -108,10 +108,10 @@ def test_an_episode_is_shown_and_what_was_done_does_it_again() -> None:
 
 
 def test_a_street_will_do(helsinki: World) -> None:
-    task = draw_task(3, helsinki)
+    task = draw_task(4, helsinki)
     assert task.table is None
     assert task.world == helsinki.manifest.name
-    shown = demonstrate(3, helsinki, seconds=60, side=64)
+    shown = demonstrate(4, helsinki, seconds=60, side=64)
     assert shown.played.cause == Verdict.DONE, shown.played.why
     assert shown.played.off <= NEXT_TO
 

@@ -20,6 +20,7 @@ from PIL import Image
 
 from vico.agents.robot.increments import INCREMENTS, STATE, arm_state, control_of
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError, sentence_of
+from vico.seeds import rng
 
 #: What our datasets call the robot's camera, and LeRobot the state and the actions.
 CAMERA, _STATE, _ACTION = "observation.images.ego", "observation.state", "action"
@@ -38,6 +39,8 @@ class LeRobotActor:
         A ``PreTrainedPolicy``.
     preprocess, postprocess
         Its pipelines, as ``make_pre_post_processors`` returns them.
+    seed
+        Decides what a policy leaves to chance, as diffusion does.
 
     Attributes
     ----------
@@ -50,13 +53,13 @@ class LeRobotActor:
         If the policy is for another robot: another state, or other actions.
     """
 
-    def __init__(self, policy: Any, preprocess: Any, postprocess: Any) -> None:
-        self._policy, self._preprocess, self._postprocess = policy, preprocess, postprocess
+    def __init__(self, policy: Any, preprocess: Any, postprocess: Any, *, seed: int = 0) -> None:
+        self._policy, self._preprocess, self._postprocess, self._seed = policy, preprocess, postprocess, seed
         self.cameras = _checked(policy.config, "policy")
         self.reset()
 
     @classmethod
-    def read(cls, folder: Path, *, device: str = "cpu") -> LeRobotActor:
+    def read(cls, folder: Path, *, device: str = "cpu", seed: int = 0) -> LeRobotActor:
         """Read a policy.
 
         Parameters
@@ -65,6 +68,8 @@ class LeRobotActor:
             That LeRobot's training saved it in: ``.../checkpoints/last/pretrained_model``.
         device
             That it runs on, as torch calls it.
+        seed
+            Decides what it leaves to chance.
 
         Raises
         ------
@@ -100,10 +105,11 @@ class LeRobotActor:
             raise SchemaError(
                 f"{folder}: its weights or pipelines do not fit its config ({sentence_of(error)}); save the policy anew"
             ) from None
-        return cls(policy, *processors)
+        return cls(policy, *processors, seed=seed)
 
     def reset(self) -> None:
         """Forget what was to be done: a new episode begins."""
+        self._step = 0
         self._policy.reset()
         for pipeline in (self._preprocess, self._postprocess):
             if callable(getattr(pipeline, "reset", None)):
@@ -135,7 +141,10 @@ class LeRobotActor:
         for name, size in self.cameras.items():
             picture = torch.from_numpy(resized(observation["rgb"], size)).permute(2, 0, 1).contiguous()
             batch[name] = picture[None].float() / 255.0
-        with torch.inference_mode():
+        chance = rng(self._seed, "lerobot policy", self._step)
+        self._step += 1
+        with torch.inference_mode(), torch.random.fork_rng(devices=()):
+            torch.manual_seed(int(chance.integers(2**31)))
             chosen = self._postprocess(self._policy.select_action(self._preprocess(batch)))
         vector = np.asarray(chosen.detach().to("cpu", torch.float32)).reshape(-1)
         try:
