@@ -6,9 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from robot_field import field
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.errors import InputError
+from vico.sim.bodies import Bodies
 from vico.sim.physics import StaticScene, factory, make_engine, make_scene
 from vico.sim.physics.frames import COARSE, FINE, FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.mujoco_engine import MujocoEngine
@@ -16,6 +18,7 @@ from vico.sim.physics.mujoco_physics import MujocoScene
 from vico.sim.physics.records import PhysicsError
 from vico.sim.physics.solids import SolidCells, find_near
 from vico.sim.physics.surroundings import convex_parts
+from vico.sim.robots import RobotPopulation
 from vico.world.heights import HeightField
 from vico.world.mesh import joined
 
@@ -142,3 +145,14 @@ def test_frames_are_counted_by_length() -> None:
     record = count.record()
     assert record["fine"] == {"seconds": 0.01, "frames": 3}
     assert record["coarse"] == {"seconds": 0.02, "frames": 1}
+
+
+def test_what_mujoco_says_of_another_model_is_no_warning_of_this_one() -> None:
+    robots = RobotPopulation(field(), ["husky"], [[0, 0, 0]], packs=False)
+    other = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(other)
+    data.qvel[0] = np.nan
+    mujoco.mj_step(other, data)
+    robots.advance(0.1, Bodies.none())  # warnings are errors here

@@ -15,6 +15,7 @@ from vico.errors import InputError
 from vico.sim.physics.frames import COARSE
 from vico.sim.physics.mujoco_engine import MujocoEngine
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
+from vico.sim.physics.mujoco_warnings import heard
 
 
 class MujocoBatch:
@@ -85,6 +86,7 @@ class MujocoBatch:
 
     def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
         """Move all copies on by some frames."""
+        heard()  # what was said of other models' steps says nothing of these
         parts = [self.engines[k :: len(self._models)] for k in range(len(self._models))]
 
         def run(models: dict[CompiledScene, SharedModel], engines: list[MujocoEngine]) -> None:

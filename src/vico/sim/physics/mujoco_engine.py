@@ -368,6 +368,7 @@ class MujocoEngine:
         actuate: Actuate | None = None,
     ) -> None:
         """Move on by some frames; people and vehicles move first, at every one."""
+        heard()  # what was said of other models' steps says nothing of this one
         self.step_in(self.compiled.shared, frames, frame, holding=holding, actuate=actuate)
         self.judge()
 
