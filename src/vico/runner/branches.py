@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from itertools import chain, count
 from pathlib import Path
 
 from vico.errors import MissingFileError, OutputExistsError
@@ -25,9 +26,6 @@ from vico.sim.recording.schema import (
     VIEWS,
 )
 from vico.sim.recording.segments import segments_of
-
-#: A branch's name is told apart from others by a number where nobody has given one.
-_MOST_ALIKE = 1000
 
 _COPIED = (AGENTS, CAST, SETUP, SETUP_SHAPES, INTERVENTIONS, BOOKMARKS)
 
@@ -95,7 +93,7 @@ def branch_path(run: Path, name: str) -> Path:
 
 def free_name(run: Path, name: str) -> str:
     """Return a name that no branch of a run has yet: the one given, or with a number after it."""
-    names = (name, *(f"{name}-{number}" for number in range(2, _MOST_ALIKE)))
+    names = chain([name], (f"{name}-{number}" for number in count(2)))
     return next(one for one in names if not branch_path(run, one).exists())
 
 
