@@ -12,6 +12,7 @@ from vico.assets.robots import robot_model
 from vico.sim.config import SimConfig
 from vico.sim.moves import place_in_room
 from vico.sim.overlaps import overlaps_of
+from vico.sim.robots import decisions
 from vico.sim.robots.rooms import fits_doors
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
@@ -187,6 +188,17 @@ def test_husky_follows_somebody_indoors_stops_there_and_no_wall_lets_it_through(
     sim.scenario.place_agent("assistant_0", (2.0, 0.0, 0.0))
     assert go(sim, follow, 60, "leaves Corner Café")[-1] == "leaves Corner Café"
     assert room_of(sim, husky) == ""
+
+
+def test_with_something_in_its_hand_a_robot_waits_outside_for_whom_it_follows(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim, husky = simulation("mujoco", ("husky",)), "robot_0"
+    place_in_room(0, sim.state.indoor.index["r_back"], sim.state, near=np.array([-1.0, 9.0]))
+    with monkeypatch.context() as patch:
+        patch.setattr(decisions, "in_hand", lambda run, robot: 7)
+        go(sim, {husky: {"type": "follow", "agent": "assistant_0"}}, 30, "in r_back")
+        assert room_of(sim, husky) == ""
+    go(sim, {}, 60, "in r_back")
+    assert room_of(sim, husky) == "r_back"
 
 
 def test_robots_are_refused_in_words_where_they_do_not_fit() -> None:

@@ -103,7 +103,8 @@ def robot(options: RobotOptions) -> int:
     if options.steps < 1:
         raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
     categories = None if options.category == "all" else (options.category,)
-    setting: Setting = {"steps": options.steps, "period": options.period}
+    by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
+    setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
     return judge("robot", categories, setting, options.common, methods=("heuristic",))
 
 

@@ -182,9 +182,12 @@ class RobotOptions:
         Seconds of an episode at most.
     period
         Seconds between two actions of a robot: 0.05 is 20 Hz.
+    oracle_grasp
+        Hands never lose what they closed on; without it friction alone holds.
     """
 
     common: Common
     category: Literal["carry", "deliver", "all"] = "all"
     steps: int = 1500
     period: float = 0.05
+    oracle_grasp: bool = False

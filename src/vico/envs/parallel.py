@@ -280,9 +280,9 @@ def make(
     setup
         Called with the fresh `Simulation` at each reset.
     options
-        `seed`, `start`, `residents`, `assistants`, `assistant_places`, `robots`, `robot_places`, `errands`, `cars`,
-        `cyclists`, `pedestrians`, `junctions`, `traffic`, `transit`, `observe`, `image`, `periods`, `max_steps` and
-        `form`, as `vico.envs.spec.EnvSpec` has them.
+        `seed`, `start`, `residents`, `assistants`, `assistant_places`, `robots`, `robot_places`, `errands`,
+        `oracle_grasp`, `cars`, `cyclists`, `pedestrians`, `junctions`, `traffic`, `transit`, `observe`,
+        `image`, `periods`, `max_steps` and `form`, as `vico.envs.spec.EnvSpec` has them.
 
     Raises
     ------

@@ -29,6 +29,7 @@ class EnvOptions(TypedDict, total=False):
     robot_places: Mapping[str, Sequence[float]]
     assistant_places: Mapping[str, Sequence[float]]
     errands: bool
+    oracle_grasp: bool
     cars: int
     cyclists: int
     pedestrians: int

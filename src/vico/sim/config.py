@@ -44,6 +44,8 @@ class SimSettings:
         Where robots start, by name: x, y (ENU metres) and yaw (radians); the others start where the seed says.
     errands
         Robots that nobody controls go from place to place.
+    oracle_grasp
+        Whether robots' hands never lose what they closed on; see docs/robot_challenge.md.
     cars, cyclists, pedestrians
         Vehicles and people nobody plays.
     junctions
@@ -92,6 +94,7 @@ class SimSettings:
     physics: str = "mujoco"
     robot_places: Mapping[str, Sequence[float]] = field(default_factory=dict)
     errands: bool = False
+    oracle_grasp: bool = False
     cars: int = 0
     cyclists: int = 0
     pedestrians: int = 0

@@ -154,6 +154,9 @@ class RobotSystem(Subsystem, Protocol):
     def in_hand(self, robot: int) -> int:
         """Return the entity of what the robot's hand holds; 0 for nothing."""
 
+    def held_by_oracle(self, robot: int) -> int:
+        """Return the entity of what the robot's hand holds by oracle grasp; 0 for nothing, and in runs without that."""
+
     def can_grasp(self, robot: int, size: NDArray[np.float64]) -> bool:
         """Return whether the robot's jaw is wide enough for a thing of some extents, metres."""
 

@@ -89,7 +89,7 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
         else:
             raise InputError(f"robots: no free ground for robot {i} ({kind}); take fewer robots")
         places[names[i]] = np.array([*xy, stream.uniform(-np.pi, np.pi)])
-    return RobotPopulation(
+    robots = RobotPopulation(
         world,
         config.robots,
         np.array([places[name] for name in names]),
@@ -98,6 +98,9 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
         errands=errands,
         scene=base.robot_scene(config.robots, config.physics),
     )
+    if config.oracle_grasp:
+        robots.give_oracle_grasp()
+    return robots
 
 
 def _given_places(

@@ -262,7 +262,7 @@ def state_of(i: int, state: SimulationState) -> dict[str, Any]:
         return {
             **common,
             "cash": 0.0,
-            "held": [0, 0],
+            "held": [0, robots.held_by_oracle(k)],
             "vehicle": "",
             **_where_robot_is(k, state),
             "accessible_places": [],

@@ -11,12 +11,14 @@ import pytest
 
 from vico.assets.models.movable import movable_kinds
 from vico.assets.robots import robot_model
+from vico.challenges.assistant.rules import entrance_of
 from vico.challenges.robot.bodies import arm_body
 from vico.challenges.robot.episode import world_and_people
 from vico.challenges.robot.generate import generate_robot_task, portable_kinds
 from vico.challenges.robot.judge import CAUSES, RobotJudge
 from vico.challenges.robot.model import CATEGORIES, RobotTask, read_robot_task, write_robot_task
-from vico.challenges.robot.thresholds import APART, CARRY_REACH, DESTINATION_RADIUS
+from vico.challenges.robot.thresholds import APART, CARRIER_COMES, CARRY_REACH, DESTINATION_RADIUS, GOAL_COMES
+from vico.challenges.robot.ways import Ways
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
 from vico.world.folder import World
@@ -51,6 +53,22 @@ def test_things_fit_the_jaw_and_spots_can_be_reached(
     away = np.hypot(*np.subtract(task.thing.position[:2], task.destination.centre[:2]))
     assert (APART / 2 if category == "deliver" else 0.0) < away < CARRY_REACH + 30.0
     assert max(len(names) for names in task.candidates.values()) <= 9
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_both_robots_have_ways_to_the_thing_and_to_its_destination(
+    category: str, tasks: dict[str, RobotTask], helsinki: World
+) -> None:
+    task, arm, husky = tasks[category], robot_model("manipulator"), robot_model("husky")
+    ways = Ways(helsinki, arm, husky)
+    door = entrance_of(task.destination, helsinki) if category == "carry" else np.array(task.destination.centre)
+    for model, start, near in ((arm, task.manipulator, GOAL_COMES), (husky, task.carrier, CARRIER_COMES)):
+        points = [(np.array(task.thing.position), near), (door, near)]
+        assert ways.stands(model, start.position)
+        assert ways.lead(model, start.position, points, within=2 * CARRY_REACH)
+        assert not ways.lead(model, start.position, points, within=1.0)
+        roof = np.argwhere(~helsinki.walkable.connected & (helsinki.walkable.clearance == 0.0))[0][::-1]
+        assert not ways.stands(model, helsinki.walkable.centre_of(roof))
 
 
 @pytest.mark.parametrize("category", CATEGORIES)

@@ -299,7 +299,8 @@ class ArmWorker:
             return self._hold()
         if self.work is Work.PICK:
             apart, felt = float(angles[7:].min()), float(np.min(observation["sensors"]["contacts"]))
-            if apart < _APART or felt < _FELT:
+            by_oracle = self._entity in observation.get("state", {}).get("held", ())
+            if not by_oracle and (apart < _APART or felt < _FELT):
                 assert self._reach is not None
                 self._skip.add(self._reach.number)
                 return self._again("it slipped" if self.forces > _FELT else "the jaw closed on nothing")

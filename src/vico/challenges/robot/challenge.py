@@ -26,7 +26,8 @@ _PERIODS = (0.01, 0.1)
 class RobotChallenge:
     """Carry and Deliver by a mobile manipulator and a carrier, with real contact; see `vico.challenges.robot.generate`.
 
-    Settings of a job: ``steps``, seconds at most; ``period``, seconds between two actions of a robot.
+    Settings of a job: ``steps``, seconds at most; ``period``, seconds between two actions of a robot;
+    ``oracle_grasp``, whether hands never lose what they closed on.
     """
 
     name = "robot"
@@ -70,9 +71,9 @@ class RobotChallenge:
         category = next((one for one in CATEGORIES if one == job.category), None)
         if category is None:
             raise InputError(f"robot: no category called {job.category!r}; there are {', '.join(CATEGORIES)}")
-        unknown = sorted(set(job.setting) - {"steps", "period"})
+        unknown = sorted(set(job.setting) - {"steps", "period", "oracle_grasp"})
         if unknown:
-            raise InputError(f"robot: there is no setting {unknown[0]!r}; there are steps and period")
+            raise InputError(f"robot: there is no setting {unknown[0]!r}; there are steps, period and oracle_grasp")
         period = float(job.setting.get("period", PERIOD))
         if not _PERIODS[0] <= period <= _PERIODS[1] or abs(period * 100 - round(period * 100)) > 1e-6:
             raise InputError(f"robot: a period of {period:g} s; it has to be 0.01 to 0.1, a multiple of 0.01")

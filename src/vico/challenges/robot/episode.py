@@ -67,7 +67,8 @@ def play_robot_task(
     method
         Name of a pair of robots (see `vico.agents.robot.METHODS`), or ``my_module:MyRobot``, which plays both.
     setting
-        ``period``: seconds between two actions of a robot.
+        ``period``: seconds between two actions of a robot. ``oracle_grasp``: whether hands never lose what they closed
+        on (`vico.sim.robots.oracle`); without it friction alone holds.
     terms
         On which terms robots from elsewhere take part.
     recording
@@ -96,6 +97,7 @@ def play_robot_task(
         pedestrians=for_size(PEDESTRIANS, world),
         observe=(MANIPULATOR, CARRIER),
         periods=dict.fromkeys(starts, period),
+        oracle_grasp=bool(setting.get("oracle_grasp", False)),
         max_steps=round(task.steps / period),
         setup=lambda simulation: set_up(simulation, task),
     )

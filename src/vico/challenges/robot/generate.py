@@ -24,13 +24,17 @@ from vico.assets.robots import robot_model
 from vico.challenges.assistant.choose import Chooser, Question, choose, seeded_chooser
 from vico.challenges.assistant.model import Person, Region, Start, TaskObject
 from vico.challenges.assistant.regions import Neighbourhood, place_region, told
+from vico.challenges.assistant.rules import entrance_of
 from vico.challenges.robot.bodies import arm_body
 from vico.challenges.robot.model import Category, RobotTask
 from vico.challenges.robot.thresholds import (
     APART,
+    ARM_COMES,
     CANDIDATES,
+    CARRIER_COMES,
     CARRY_REACH,
     DESTINATION_RADIUS,
+    GOAL_COMES,
     HIGHEST,
     JAW_ROOM,
     LOWEST,
@@ -38,6 +42,7 @@ from vico.challenges.robot.thresholds import (
     SOURCE_RADIUS,
     STEPS,
 )
+from vico.challenges.robot.ways import Ways
 from vico.community.folder import digest_of
 from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError
@@ -48,6 +53,8 @@ from vico.world.walkable import OPEN, SIDEWALK
 
 # Starts that are tried; hours at which tasks begin; who asks is of this age at least, years.
 _TRIES, _HOURS, _AGE = 40, tuple(range(9, 18)), 10
+# Robots' ways, in metres of pavement, are longer than people's walks by this factor at most.
+_ROUNDABOUT = 2.0
 # Free ground that robots and things need around them, metres; the robots begin, and the person waits, so far apart.
 _ROOM, _BESIDE, _WAITS_WITHIN = 1.0, (2.0, 6.0), (6.0, 14.0)
 
@@ -60,6 +67,7 @@ class _Draw:
     category: Category
     chance: np.random.Generator
     chooser: Chooser
+    ways: Ways
     candidates: dict[str, list[str]] = field(default_factory=dict)
 
     def pick(self, question: str, names: list[str], who: Resident | None) -> int:
@@ -113,7 +121,8 @@ def generate_robot_task(
         If the world and its people have too little around any starting point.
     """
     chance = rng(seed, "robot task", category, world.digest)
-    draw = _Draw(world, category, chance, chooser or seeded_chooser(chance))
+    ways = Ways(world, robot_model("manipulator"), robot_model("husky"))
+    draw = _Draw(world, category, chance, chooser or seeded_chooser(chance), ways)
     frame: dict[str, Any] = {
         "category": category,
         "world": world.manifest.name,
@@ -147,7 +156,7 @@ def _deliver(draw: _Draw, community: Community, frame: dict[str, Any]) -> RobotT
     target = targets[draw.pick("Where is it brought to?", [r.name for r in targets], asker)]
     lies = draw.spot(np.array(source.centre[:2]), 0.5, SOURCE_RADIUS)
     robots = _starts(draw, hood.start)
-    if lies is None or robots is None:
+    if lies is None or robots is None or not _can_go(draw, robots, lies, np.array(target.centre), REACH):
         return None
     thing = _thing(draw, asker, lies, None)
     text = (
@@ -174,13 +183,14 @@ def _carry(draw: _Draw, community: Community, frame: dict[str, Any]) -> RobotTas
     home = hood.places.get(asker.home)
     if home is None or not APART <= hood.distance(home.position) <= CARRY_REACH:
         return None
+    region = place_region(home)
     robots = _starts(draw, hood.start)
     waits = draw.spot(hood.start, *_WAITS_WITHIN)
-    if robots is None or waits is None:
+    door = entrance_of(region, draw.world)
+    if robots is None or waits is None or not _can_go(draw, robots, waits, door, CARRY_REACH):
         return None
     thing = _thing(draw, asker, waits, asker.id)
     looks = looks_in_words(asker.appearance)
-    region = place_region(home)
     text = (
         f"{asker.name}, {looks}, waits near by with {_described(thing)}: go there and call them, take up what they put "
         f"down, go home with them to {told(region)}, and put it down there."
@@ -215,6 +225,19 @@ def _asker(draw: _Draw, community: Community, reach: float) -> tuple[Resident, N
 
 def _known(world: World, who: Resident) -> list[Place]:
     return [world.place_by_id[place] for place in dict.fromkeys((who.home, *who.known_places))]
+
+
+def _can_go(
+    draw: _Draw, robots: tuple[Start, Start], thing: NDArray[np.float64], goal: NDArray[np.float64], reach: float
+) -> bool:
+    """Return whether both robots can begin, and come near enough to the thing and to where it is to be."""
+    ways, within = draw.ways, _ROUNDABOUT * reach
+    near = ((ways.manipulator, ARM_COMES, GOAL_COMES), (ways.carrier, CARRIER_COMES, CARRIER_COMES))
+    for start, (model, at_thing, at_goal) in zip(robots, near, strict=True):
+        points = [(thing, at_thing), (goal, at_goal)]
+        if not ways.stands(model, start.position) or not ways.lead(model, start.position, points, within=within):
+            return False
+    return True
 
 
 def _starts(draw: _Draw, start: NDArray[np.float64]) -> tuple[Start, Start] | None:

@@ -28,6 +28,9 @@ PACE_HOME, WAITS = 0.6, 60.0
 SEEN_PIXELS, SEEN_DISTANCE = 20, 10.0
 #: A robot with an arm came to the thing within this distance, metres.
 REACHED = 1.2
+#: Tasks are drawn where the manipulator can come so near to the thing, and to where it is to be, and the carrier to
+#: both, metres.
+ARM_COMES, GOAL_COMES, CARRIER_COMES = 0.6, 2.0, 4.0
 
 #: People who live in the world.
 RESIDENTS = 15

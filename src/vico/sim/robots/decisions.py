@@ -13,7 +13,7 @@ from vico.sim.robots.navigation import SIGHT, NearbyBodies, braking, speed_to_st
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import OUTDOORS
 from vico.sim.robots.state import RobotMode, RobotRun
-from vico.sim.robots.tasks import decide_task, handled
+from vico.sim.robots.tasks import decide_task, handled, in_hand
 from vico.sim.robots.trip_state import NONE
 from vico.sim.robots.trips import begin_leg, others_in_room, way_on, whereabouts
 from vico.sim.robots.ways import next_errand
@@ -56,12 +56,12 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
                 _rest(run, robot, dt)
             continue
         around = around or NearbyBodies(obstacles, mine)
-        in_hand = handled(run, robot)
+        own = handled(run, robot)
         if run.trips.room[robot] >= 0:
             inside = NearbyBodies(others_in_room(run, robot), mine.where(np.array([robot])))
             others = inside.near(0, SIGHT + 4)
-        elif in_hand:
-            others = NearbyBodies(obstacles.where(obstacles.entity != in_hand), mine).near(robot, SIGHT + 4)
+        elif own:
+            others = NearbyBodies(obstacles.where(obstacles.entity != own), mine).near(robot, SIGHT + 4)
         else:
             others = around.near(robot, SIGHT + 4)
         if mode == _VELOCITY:
@@ -165,7 +165,9 @@ def _keep_near(run: RobotRun, robot: int, others: NDArray[np.void], dt: float, e
     space, at = found
     here = space == trips.room[robot]
     near = run.scene.models[robot].half_length + _FOLLOW_GAP
-    if here and np.hypot(*(at - run.position(robot))[:2]) < near:
+    is_near = here and np.hypot(*(at - run.position(robot))[:2]) < near
+    # What a hand holds stays on its side of a door: so does the robot.
+    if is_near or (not here and in_hand(run, robot)):
         _stay(run, robot)
         return
     if trips.door[robot] != NONE and trips.goal_room[robot] == space:

@@ -126,7 +126,7 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
     """
     arrays, robots = run.arrays, group.robots
     if velocity is not None:
-        targets = group.controller.targets(run.engine.motion(robots), velocity, memory)
+        targets = _as_held(run, robots, group.controller.targets(run.engine.motion(robots), velocity, memory))
         run.engine.command_all(robots, targets, group.controller.gains(memory))
         return
     fallen = arrays.status[robots] == _FALLEN
@@ -147,14 +147,22 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
             run.engine.command(robot, *lying)
         elif arrays.mode[robot] == _MOTORS:
             targets = arrays.command[robot, : len(group.model.motors)]
-            run.engine.command(robot, targets, group.controller.command_gains)
+            held = _as_held(run, robots[row : row + 1], targets[None])[0]
+            run.engine.command(robot, held, group.controller.command_gains)
         else:
             run.engine.command(robot, group.model.stance)
+
+
+def _as_held(run: RobotRun, robots: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return targets with fingers kept where they touch what is held by oracle."""
+    return targets if run.oracle is None else run.oracle.spread(robots, targets)
 
 
 def _follow_velocities(run: RobotRun, group: RobotGroup, memory: np.ndarray, rows: np.ndarray) -> None:
     """Have some of a kind's robots follow their velocities, all in one call."""
     robots, mine = group.robots[rows], memory[rows]
-    targets = group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)
+    targets = _as_held(
+        run, robots, group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)
+    )
     run.engine.command_all(robots, targets, group.controller.gains(mine))
     memory[rows] = mine

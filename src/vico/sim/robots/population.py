@@ -20,6 +20,7 @@ from vico.sim.robots.batteries import charge_of, watch_batteries
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
 from vico.sim.robots.motors import AllRotors, command_motors, velocities
+from vico.sim.robots.oracle import OracleGrasp
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import turning_radius
 from vico.sim.robots.scene import RobotScene
@@ -202,6 +203,18 @@ class RobotPopulation:
         """Return the entity of what a robot's hand holds; 0 for nothing."""
         return tasks.in_hand(self.run, robot)
 
+    def give_oracle_grasp(self) -> None:
+        """Have hands never lose what they closed on, from now on; before the first step."""
+        work = [one for one in self.run.work if one is not None]
+        arms = {int(robot): one for one in work for robot in one.robots.tolist()}
+        chains = {robot: one.chain for robot, one in arms.items()}
+        fingers = {robot: one.model.sensors.contacts for robot, one in arms.items()}
+        self.run.oracle = OracleGrasp(chains, fingers, self.entities)
+
+    def held_by_oracle(self, robot: int) -> int:
+        """Return the entity of what a hand holds by oracle grasp; 0 for nothing, and in runs without that."""
+        return 0 if self.run.oracle is None else int(self.run.oracle.entity[robot])
+
     def can_grasp(self, robot: int, size: NDArray[np.float64]) -> bool:
         """Return whether a robot's jaw is wide enough for a thing of some extents, metres."""
         return tasks.can_grasp(self.run, robot, size)
@@ -262,6 +275,8 @@ class RobotPopulation:
             arrays.left_out[:] = np.maximum(arrays.left_out, (self.engine.left_out, self._loose.left_out))
         self._step(ticks, round((whole - since) / TICK))
         self._loose.write_back()
+        if self.run.oracle is not None:
+            self.run.oracle.hold(self.engine, self.run.objects)
         self.run.known_bodies = None
         if since + dt > whole - 1e-9:
             watch_falls(self.run, whole, obstacles)

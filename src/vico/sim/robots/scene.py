@@ -18,13 +18,12 @@ from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.airspace import Airspace
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
+from vico.sim.robots.narrow import narrow_ground
 from vico.sim.robots.rooms import RobotRooms
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.routing import Router
 
-#: Metres a robot leaves to walls on its way.
-_WALL_GAP = 0.12
 #: Half the side of floors in physics, metres, and who can be near a robot in a room: people, and walls and furniture.
 _FLOOR, _IN_A_ROOM = 50.0, Capacity(people=12, vehicles=48, objects=0)
 
@@ -180,28 +179,12 @@ class RobotScene:
         return np.array([place.position[:2] for place in self.world.places]).reshape(-1, 2)
 
     def narrow(self, robot: int) -> NDArray[np.bool_]:
-        """Return the cells of the walkable map that a robot's ways keep off; not to be written to.
-
-        Those too narrow for it, and those beside kerbs that are too high for it.
-        """
+        """Return the cells of the walkable map that a robot's ways keep off; not to be written to."""
         model = self.models[robot]
-        room = model.half_width + _WALL_GAP
-        if (room, model.kerb) not in self._narrow:
-            narrow = self.world.walkable.clearance < room
-            if model.kerb is not None:
-                narrow |= _at_kerbs(self.world, higher=model.kerb, within=model.half_width)
-            self._narrow[room, model.kerb] = narrow
-        return self._narrow[room, model.kerb]
-
-
-def _at_kerbs(world: World, *, higher: float, within: float) -> NDArray[np.bool_]:
-    """Return the cells of the walkable map that lie so near to kerbs that are higher than that, metres."""
-    walkable, height = world.walkable, world.height
-    row = np.arange(walkable.n)
-    cells = walkable.centre_of(np.stack(np.meshgrid(row, row), axis=-1))
-    is_near = np.abs(height.edge_distance(cells)) < within
-    is_near[is_near] = height.upper(cells[is_near]) - height.lower(cells[is_near]) > higher
-    return is_near
+        key = model.half_width, model.kerb
+        if key not in self._narrow:
+            self._narrow[key] = narrow_ground(self.world, model)
+        return self._narrow[key]
 
 
 def _groups(models: Sequence[RobotModel]) -> tuple[RobotGroup, ...]:

@@ -16,6 +16,7 @@ from vico.seeds import rng
 from vico.sim.bodies import Bodies
 from vico.sim.physics import PhysicsEngine
 from vico.sim.physics.housed import HousedEngine
+from vico.sim.robots.oracle import OracleGrasp
 from vico.sim.robots.outlines import bodies_of
 from vico.sim.robots.path_follower import PathFollower, RobotStatus
 from vico.sim.robots.rotors import Flight
@@ -184,6 +185,8 @@ class RobotRun:
         Avatars, some of whom are indoors.
     trips
         Where robots are indoors, and which doors they go through.
+    oracle
+        What hands hold by oracle; None where friction alone holds.
     closed_ground
         Ground that events close.
     pending
@@ -202,6 +205,7 @@ class RobotRun:
     trips: RobotTrips = field(init=False)
     objects: MovableObjects = field(default_factory=MovableObjects.none)
     people: People | None = None
+    oracle: OracleGrasp | None = None
     closed_ground: Circles = ()
     pending: list[tuple[int, int]] = field(default_factory=list)
     known_bodies: Bodies | None = None
@@ -292,6 +296,7 @@ class RobotRun:
         for k, work in enumerate(self.work):
             if work is not None:
                 found |= {f"work_{k}_{name}": value for name, value in work.saved().items()}
+        found |= {} if self.oracle is None else self.oracle.arrays()
         numbers = [follower.numbers() for follower in self.followers]
         return found | {
             "closed_ground": np.array(self.closed_ground, np.float64).reshape(-1, 3),
@@ -327,6 +332,8 @@ class RobotRun:
             if work is not None:
                 start = f"work_{k}_"
                 work.restore({key[len(start) :]: value for key, value in arrays.items() if key.startswith(start)})
+        if self.oracle is not None:
+            self.oracle.restore(arrays)
         self.closed_ground = tuple((x, y, radius) for x, y, radius in arrays["closed_ground"].tolist())
         self.pending = [(int(a), int(b)) for a, b in arrays["pending"]]
         starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)

@@ -150,6 +150,8 @@ def in_hand(run: RobotRun, robot: int) -> int:
     if found is None:
         return 0
     work, row, _ = found
+    if run.oracle is not None and run.oracle.entity[robot]:
+        return int(run.oracle.entity[robot])
     if run.arrays.mode[robot] == RobotMode.MOTORS:
         return int(_felt(run, robot, work)[0])
     held = work.arrays.held[row]
@@ -405,7 +407,8 @@ def _wait_for_taker(run: RobotRun, work: Work, row: int, memory: Array) -> None:
     """Hold on until somebody else holds the thing; then open."""
     a = work.arrays
     found = _object(run, int(a.held[row, 0]))
-    if found is not None and not found[0].holder[found[1]]:
+    own = run.entities[int(work.robots[row])]
+    if found is not None and found[0].holder[found[1]] in (0, own):
         return
     memory[ARM_GOAL][7:] = work.opening
     a.held[row] = 0.0

@@ -1,0 +1,139 @@
+"""Oracle grasp: a run may have hands that never lose what they closed on.
+
+Given is this, and nothing else: when a closing jaw touches a thing whose box the middle between the pads is inside of,
+or no farther than `MARGIN` from, the thing keeps the place in the hand's frame that it has then, whatever it weighs and
+wherever it is touched, until the jaw opens by `OPENS`. While it is held it weighs nothing and collides with nothing,
+and the fingers stay where they touched it. To come there, to close on it, and to come down again is the robot's own
+affair, and it does not go through doors. One sees it in the observation (``state.held``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import SchemaError
+from vico.exact import apply_matrix
+from vico.kinematics.arm import Chain, hand_pose
+from vico.quaternions import matrix_of, quaternion_of
+from vico.sim.physics.engine import PhysicsEngine
+from vico.sim.state import MovableObjects
+
+Array = NDArray[np.float64]
+
+#: How far from a thing's box the middle of the jaw may be, and how far each finger opens to let go, metres.
+MARGIN, OPENS = 0.02, 0.006
+# A jaw that has closed by less than this since it was looked at stands still, metres.
+_CLOSES = 2e-4
+_FINGERS = slice(7, 9)  # of the targets of an arm's motors
+
+
+class OracleGrasp:
+    """What the hands of a run's robots hold by oracle.
+
+    Parameters
+    ----------
+    chains, fingers
+        The arms, and the names of the links of their fingers, by robot.
+    entities
+        Of all robots, int32, shape ``(n,)``.
+
+    Attributes
+    ----------
+    entity
+        Of the thing in each robot's hand, 0 for none, int32, shape ``(n,)``.
+    """
+
+    def __init__(
+        self, chains: Mapping[int, Chain], fingers: Mapping[int, tuple[str, ...]], entities: NDArray[np.int32]
+    ) -> None:
+        self._chains, self._fingers, self._robots = dict(chains), dict(fingers), entities
+        self.entity = np.zeros(len(entities), np.int32)
+        self._place = np.zeros((len(entities), 7))  # of the thing in the hand's frame: position, quaternion
+        self._apart = np.zeros(len(entities))  # of fingers, when they were looked at last, or touched what they hold
+
+    def hold(self, engine: PhysicsEngine, objects: MovableObjects) -> None:
+        """Take what hands have closed on, keep it in its place, and let go of it."""
+        for robot, chain in self._chains.items():
+            angles = engine.joints(robot)[0]
+            apart = float(angles[_FINGERS].min())
+            if self.entity[robot]:
+                k = objects.index(int(self.entity[robot]))
+                if objects.holder[k] != self._robots[robot]:
+                    self.entity[robot] = 0  # somebody has taken it
+                elif apart > self._apart[robot] + OPENS:
+                    self.entity[robot] = objects.holder[k] = 0
+                else:
+                    self._move(robot, k, _hand(engine, robot, chain, angles[:7]), objects)
+            else:
+                if apart < self._apart[robot] - _CLOSES:
+                    self._close(robot, engine, _hand(engine, robot, chain, angles[:7]), objects)
+                self._apart[robot] = apart
+
+    def spread(self, robots: NDArray[np.int64], targets: Array) -> Array:
+        """Return motor targets of robots, shape ``(k, m)``, with fingers kept where they touch what they hold."""
+        holds = self.entity[robots] != 0
+        if not holds.any():
+            return targets
+        kept = targets.copy()
+        kept[holds, _FINGERS] = np.maximum(kept[holds, _FINGERS], self._apart[robots[holds], None])
+        return kept
+
+    def _close(self, robot: int, engine: PhysicsEngine, hand: Array, objects: MovableObjects) -> None:
+        """Take a thing that a closing jaw touches and is about."""
+        links, contacts = engine.link_names(robot), engine.contacts()
+        touched = set().union(*(contacts.objects_at(robot, links.index(name)) for name in self._fingers[robot]))
+        if not touched:
+            return
+        at, turn = hand[:, 3], hand[:, :3]
+        for k in np.flatnonzero((objects.holder == 0) & (objects.room < 0)).tolist():
+            own, half = objects.rotation(k), objects.size[k] / 2
+            inside = apply_matrix(at - objects.position[k], own.T) - (0.0, 0.0, half[2])
+            if np.all(np.abs(inside) <= half + MARGIN):
+                away = apply_matrix(objects.position[k] - at, turn.T)
+                self._place[robot] = [*away, *quaternion_of(_product(turn.T, own))]
+                self.entity[robot], objects.holder[k], objects.hand[k] = objects.entity[k], self._robots[robot], -1
+                return
+
+    def _move(self, robot: int, k: int, hand: Array, objects: MovableObjects) -> None:
+        place = self._place[robot]
+        objects.position[k] = hand[:, 3] + apply_matrix(place[:3], hand[:, :3])
+        objects.set_rotation(k, _product(hand[:, :3], matrix_of(place[3:])))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future, copied."""
+        return {
+            "oracle_entity": self.entity.copy(),
+            "oracle_place": self._place.copy(),
+            "oracle_apart": self._apart.copy(),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held.
+
+        Raises
+        ------
+        SchemaError
+            If it was saved without oracle grasp, or of other robots.
+        """
+        if "oracle_entity" not in arrays or arrays["oracle_entity"].shape != self.entity.shape:
+            raise SchemaError("robots: the saved state is of a run without oracle grasp, or of other robots")
+        self.entity[:], self._place[:] = arrays["oracle_entity"], arrays["oracle_place"]
+        self._apart[:] = arrays["oracle_apart"]
+
+
+def _hand(engine: PhysicsEngine, robot: int, chain: Chain, angles: Array) -> Array:
+    """Return the pose of the middle between the pads in the world, shape ``(3, 4)``."""
+    count, pose = len(chain.places), np.empty((3, 4))
+    hand_pose(chain, np.ascontiguousarray(angles), np.empty((count, 3)), np.empty((count, 3)), pose)
+    base = engine.base(robot)
+    at = apply_matrix(pose[:, 3], base.rotation) + base.position
+    return np.column_stack([_product(base.rotation, pose[:, :3]), at])
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Return ``a @ b``, the same on every machine."""
+    return apply_matrix(b.T, a).T
