@@ -62,11 +62,13 @@ class Plan:
 class Agent(Protocol):
     """Whoever acts: residents, planners, learners, people at a keyboard, submissions.
 
-    Turns observations into actions, once a step, and sees nothing else of the world but public maps. One that spends
-    on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far; one that goes on where
-    its model gives nothing of use says so in ``model_faults``, pairs of a step and a reason. One that wants to be
-    understood has a method ``plan(second)``, which returns a `Plan`, or None while it has none; it is asked between two
-    steps when somebody looks at the agent, and changes nothing.
+    Turns observations into actions, once a step, and sees nothing else of the world but public maps. One that
+    spends on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far; one that
+    goes on where its model gives nothing of use says so in ``model_faults``, pairs of a step and a reason. One that
+    wants to be understood has a method ``plan(second)``, which returns a `Plan`, or None while it has none; it is
+    asked between two steps when somebody looks at the agent, and changes nothing. One that looks up only now and
+    then says with an attribute ``wants_picture`` whether its next observation is to have pictures; where it comes
+    with vico, none are made for it otherwise.
     """
 
     def act(self, observation: Observation, info: Info) -> Action:

@@ -99,6 +99,10 @@ class Gatherer:
                 gathered.failures[name] = Failure("late", f"no action within {self.deadline:g} s")
         return gathered
 
+    def look_away(self) -> set[str]:
+        """Return the names of the trusted agents that want no picture with their next observation."""
+        return {name for name in self.trusted if not getattr(self.agents[name], "wants_picture", True)}
+
     def is_busy(self, name: str) -> bool:
         """Whether an agent still works on an earlier step."""
         return name in self._busy and not self._busy[name].done()

@@ -114,6 +114,7 @@ class Runner:
         names = set(sim.agents)
         if self.states_every:
             self._check_states()
+        sim.look_away = self.agents.look_away()
         observations, infos = sim.observe(sim.due)
         for hook in self.hooks:
             hook.begin(observations)
@@ -134,6 +135,7 @@ class Runner:
             for name, action in directed.items():
                 actions[name] = short_form(action, places, people)
                 gathered.failures.pop(name, None)
+            sim.look_away = self.agents.look_away()
             result = sim.step(actions, gathered.agent_faults)
             observations, infos = result.observations, result.infos
             self._note(Step(sim.metrics.steps, actions, gathered.failures, result))

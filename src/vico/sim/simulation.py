@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -84,6 +84,8 @@ class Simulation:
     ----------
     state
         Everything that changes.
+    look_away
+        Agents whose observations have no pictures for now, though they see.
     scenario, ground_truth
         For a task's author: to change the state before the first step; for its evaluator: to ask about it.
 
@@ -123,6 +125,7 @@ class Simulation:
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
+        self.look_away: Collection[str] = ()
         self.seeing = _seeing(self.state, self.config.observe)
         self._renderer, self._attached = renderer, False
         #: Counts overlaps since `check_overlaps`; None where they are not looked for.
@@ -234,6 +237,9 @@ class Simulation:
         names = self.agents
         asked = None if who is None or len(who) == len(names) else _indices(tuple(who), names)
         seeing = self.seeing if asked is None else [i for i in self.seeing if i in asked]
+        if self.look_away:
+            names = self.state.names
+            seeing = [i for i in seeing if names[i] not in self.look_away]
         renderer = self.renderer if seeing else None
         result = observe(self.state, seeing, renderer, who=asked, waits=not self.defer_pictures)
         watch.lap("observations")

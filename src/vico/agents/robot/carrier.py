@@ -31,6 +31,11 @@ class Carrier:
         self._called = False
         self._told = 0.0
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks at its pictures: never."""
+        return False
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         self._told += self._period

@@ -86,6 +86,14 @@ class Manipulator:
 
     # What it does.
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks for the thing, or at what its arm is at, the next time."""
+        if self.worker.busy:
+            return self.worker.wants_picture
+        looks = self.stage in (Stage.CALL, Stage.SEARCH) or (self.stage is Stage.GO and self._lies_about)
+        return looks and self._clock + self.period - self._looked >= _LOOKS_EVERY
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         self._clock += self.period
@@ -97,15 +105,15 @@ class Manipulator:
 
     def _go(self, observation: Observation, info: Info) -> Action:
         """Go to where the thing, or the person, is said to be."""
-        carry = self.told["category"] == "carry"
         if not self._began:
             self._began = True
-            self.drive.begin(np.array(self.told["source"]["centre"]), near=_AT_PERSON if carry else _AT_SOURCE)
-        if not carry and self._look(observation, info):
+            near = _AT_SOURCE if self._lies_about else _AT_PERSON
+            self.drive.begin(np.array(self.told["source"]["centre"]), near=near)
+        if self._lies_about and self._look(observation, info):
             return self._pick()
         action = self.drive.act(observation)
         if not self.drive.busy:
-            self._next(Stage.CALL if carry else Stage.SEARCH)
+            self._next(Stage.SEARCH if self._lies_about else Stage.CALL)
         return action
 
     def _call(self, observation: Observation, info: Info) -> Action:
@@ -248,9 +256,14 @@ class Manipulator:
 
     # How it does it.
 
+    @property
+    def _lies_about(self) -> bool:
+        """Whether the thing lies about; else a person has it."""
+        return bool(self.told["category"] == "deliver")
+
     def _look(self, observation: Observation, info: Info, *, near: float = _SURE) -> bool:
         """Look for the thing twice a second; return whether it is in view and near."""
-        if self._clock - self._looked < _LOOKS_EVERY:
+        if self._clock - self._looked < _LOOKS_EVERY or "depth" not in observation:
             return False
         self._looked = self._clock
         named = (int(e) for e, about in info["entities"].items() if about.get("name") == self.told["object"])

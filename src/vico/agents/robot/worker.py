@@ -116,6 +116,13 @@ class ArmWorker:
         """Whether it is at work."""
         return self.work is not Work.NOTHING
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks at what is around it the next time."""
+        return self.busy and (
+            self.stage in (Stage.ALIGN, Stage.LOOK) or (self.stage is Stage.CARRY and self._way is None)
+        )
+
     def pick(self, entity: int, position: Array, *, beside: Array | None = None) -> None:
         """Begin to pick a thing up that is about at a position, ENU metres.
 
@@ -170,6 +177,8 @@ class ArmWorker:
         self.forces = max(self.forces, float(np.min(observation["sensors"]["contacts"])))
         if self._timer > _STALE + _TAKES * (self.work is Work.OFFER) and self.stage is not Stage.COME:
             return self._fail(f"no end of {self.stage}")
+        if self.wants_picture and "depth" not in observation:
+            return self._hold()  # until there is one
         return _STAGES[self.stage](self, observation, angles)
 
     def _come(self, observation: Mapping[str, Any], angles: Array) -> Action:

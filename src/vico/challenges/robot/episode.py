@@ -108,7 +108,8 @@ def play_robot_task(
     truth, system = sim.ground_truth, sim.state.robots
     assert system is not None
     judge = RobotJudge(task, world, truth, system, lambda: sim.state.second)
-    agents = Gatherer(residents | robots, trusted=residents, deadline=terms.deadline, workers=terms.workers)
+    trusted = residents | robots if method in METHODS else residents
+    agents = Gatherer(residents | robots, trusted=trusted, deadline=terms.deadline, workers=terms.workers)
     runner = Runner(sim, agents, hooks=[judge])
     if progress is not None:
         runner.hooks.append(_Reported(progress, task, sim))

@@ -215,10 +215,10 @@ class RobotJudge(Hook):
         name = self.task.thing.name
         entity, position = self.truth.object_entity(name), self.truth.object_position(name)
         for k, robot in enumerate(self.robots.names):
-            seen = step.result.observations.get(robot)
-            if seen is None or _away(self.robots.bodies().position[k], position) > SEEN_DISTANCE:
+            picture = (step.result.observations.get(robot) or {}).get("segmentation")
+            if picture is None or _away(self.robots.bodies().position[k], position) > SEEN_DISTANCE:
                 continue
-            if np.count_nonzero(np.asarray(seen["segmentation"]) == entity) >= SEEN_PIXELS:
+            if np.count_nonzero(np.asarray(picture) == entity) >= SEEN_PIXELS:
                 self.story.seen = second
                 return
 
