@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from robot_field import HALF, field, people
-from vico.sim.bodies import Bodies
+from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
-from vico.sim.robots.navigation import NEIGHBOUR, SIGHT, free_ahead
+from vico.sim.robots.navigation import NEIGHBOUR, SIGHT, NearbyBodies, free_ahead
 from vico.world.heights import HeightField
 
 HALF_LENGTH, HALF_WIDTH = 0.25, 0.3
@@ -96,3 +96,23 @@ def test_who_stands_on_a_slope_stays_there() -> None:
     moved = np.hypot(*(robots.bodies().position[:, :2] - before).T)
     assert moved[KINDS.index("husky")] < 0.06
     assert moved[KINDS.index("manipulator")] < 0.06
+
+
+def test_what_lies_on_a_robot_is_no_obstacle_to_it_and_what_lies_ahead_is() -> None:
+    robots = RobotPopulation(field(), ["husky"], [[0.0, 0.0, 0.4]], packs=False)
+    one = np.ones(2)
+    things = Bodies(
+        np.array([900, 901], np.int32),
+        np.full(2, OBJECT, np.int8),
+        np.array([[0.2, 0.1, 0.4], [2.0, 0.8, 0.0]]),
+        np.zeros(2),
+        0.1 * one,
+        0.1 * one,
+        0.2 * one,
+        np.zeros((2, 2)),
+    )
+    near = NearbyBodies(things, robots.bodies()).near(0, 5.0)
+    assert near["x"].tolist() == [2.0]
+    on_the_ground = things.where(np.array([0]))
+    on_the_ground.position[0, 2] = robots.bodies().position[0, 2]
+    assert len(NearbyBodies(on_the_ground, robots.bodies()).near(0, 5.0)) == 1

@@ -8,12 +8,13 @@ from typing import Any
 from vico.agents.base import Agent
 from vico.agents.robot.carrier import Carrier
 from vico.agents.robot.heuristic import Manipulator
+from vico.agents.robot.scout import Scout
 from vico.agents.robot.team import Team
 from vico.errors import InputError
 from vico.world.public import PublicMap
 
 #: Pairs of robots that come with the community robot challenge.
-METHODS = ("heuristic", "alone")
+METHODS = ("heuristic", "alone", "ours")
 
 
 def make_robots(
@@ -36,4 +37,5 @@ def make_robots(
     if method not in METHODS:
         raise InputError(f"robot: no method called {method!r}; there are {', '.join(METHODS)}")
     arm = Manipulator(told, team, carrier="robot_1", uses_deck=method == "heuristic")
-    return {"robot_0": arm, "robot_1": Carrier("robot_0", period=float(told["period"]))}
+    carrier = Carrier("robot_0", period=float(told["period"])) if method != "ours" else Scout(told, "robot_0")
+    return {"robot_0": arm, "robot_1": carrier}

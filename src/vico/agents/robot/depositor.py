@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.requester import CALL_DISTANCE, Dweller, is_called, way_home
@@ -16,6 +18,8 @@ HELPERS = "robot_"
 TAKEN = "I have it."
 # Nearer than this robots are seen, and what is said is heard, metres.
 _NEAR = CALL_DISTANCE
+# Degrees that one turns who has no room ahead to put something down.
+_ASIDE = 50.0
 _HERE = "Here it is. I wait until you have it, then I walk home; please come along, and put it down there."
 
 
@@ -32,7 +36,7 @@ class Depositor:
 
     def __init__(self, resident: Dweller, public_map: PublicMap, *, pace: float, waits: float, seed: int = 0) -> None:
         self._resident, self._map, self._pace, self._waits, self._seed = resident, public_map, pace, waits, seed
-        self._called = self._said = False
+        self._called = self._said = self._tries = False
         self._put_at = math.inf
         self._home: ScheduleFollower | None = None
         self._home_since = 0.0
@@ -46,7 +50,7 @@ class Depositor:
         heard = self._heard(observation)
         self._called = self._called or any(is_called(self._resident.name, text) for text in heard)
         if any(state["held"]):
-            return {"type": "put", "hand": 0 if state["held"][0] else 1} if self._called else {"type": "wait"}
+            return self._put(state) if self._called else {"type": "wait"}
         if not self._said:
             self._said, self._put_at = True, time
             return {"type": "communicate", "text": _HERE}
@@ -54,6 +58,13 @@ class Depositor:
             self._home_since = time
             self._home = self._homeward(time)
         return {"type": "wait"}
+
+    def _put(self, state: Mapping[str, Any]) -> Action:
+        """Put it down ahead, or turn where there is no room."""
+        self._tries = not (self._tries and state["action_status"] == "refused")
+        if not self._tries:
+            return {"type": "turn_left", "degrees": _ASIDE}
+        return {"type": "put", "hand": 0 if state["held"][0] else 1}
 
     def _heard(self, observation: Observation) -> list[str]:
         """Return what robots near by have said."""
@@ -73,6 +84,7 @@ class Depositor:
         return {
             "called": self._called,
             "said": self._said,
+            "tries": self._tries,
             "put_at": None if math.isinf(self._put_at) else self._put_at,
             "home": None if self._home is None else self._home.state(),
             "home_since": self._home_since,
@@ -80,7 +92,7 @@ class Depositor:
 
     def restore(self, state: AgentState) -> None:
         """Go on where `state` was returned."""
-        self._called, self._said = bool(state["called"]), bool(state["said"])
+        self._called, self._said, self._tries = (bool(state[name]) for name in ("called", "said", "tries"))
         self._put_at = math.inf if state["put_at"] is None else float(state["put_at"])
         self._home_since, self._home = float(state["home_since"]), None
         if state["home"] is not None:

@@ -38,7 +38,7 @@ class Drive:
     def __init__(self, *, period: float) -> None:
         self._period = period
         self._goal: Array | None = None
-        self._near = 0.5
+        self._near, self._stops = 0.5, False
         self._tries = 0
         self._asked = False
         self._stood = 0.0
@@ -49,9 +49,12 @@ class Drive:
         """Whether it is on its way."""
         return self._goal is not None
 
-    def begin(self, goal: Array, *, near: float = 0.5) -> None:
-        """Begin to go to a point, ENU metres, or so near to it."""
-        self._goal, self._near = np.array(goal, np.float64)[:2], near
+    def begin(self, goal: Array, *, near: float = 0.5, stops: bool = False) -> None:
+        """Begin to go to a point, ENU metres, or so near to it; it `stops` there, or goes on as far as it can.
+
+        Who stops keeps off a person, or leaves the point itself to somebody else.
+        """
+        self._goal, self._near, self._stops = np.array(goal, np.float64)[:2], near, stops
         self._tries, self._asked, self._stood = 0, False, 0.0
         self.arrived, self.why = False, ""
 
@@ -65,7 +68,7 @@ class Drive:
         stands = float(np.abs(sensors["base_velocity"][:2]).max()) < _STANDS
         self._stood = self._stood + self._period if stands else 0.0
         refused = self._asked and state["action_status"] == "refused"
-        if away <= self._near and (self._stood >= _ARRIVES or not self._asked):
+        if away <= self._near and (self._stops or self._stood >= _ARRIVES or not self._asked):
             return self._end(arrived=True)
         if not self._asked or self._stood >= _STUCK or refused:
             if self._tries >= TRIES or refused:
@@ -84,6 +87,7 @@ class Drive:
         return {
             "goal": None if self._goal is None else self._goal.copy(),
             "near": self._near,
+            "stops": self._stops,
             "tries": self._tries,
             "asked": self._asked,
             "stood": self._stood,
@@ -94,6 +98,6 @@ class Drive:
     def restore(self, state: AgentState) -> None:
         """Remember what `state` returned."""
         self._goal = None if state["goal"] is None else np.array(state["goal"])
-        self._near, self._stood = float(state["near"]), float(state["stood"])
+        self._near, self._stops, self._stood = float(state["near"]), bool(state["stops"]), float(state["stood"])
         self._tries, self._asked = int(state["tries"]), bool(state["asked"])
         self.arrived, self.why = bool(state["arrived"]), str(state["why"])

@@ -14,8 +14,8 @@ from vico.agents.base import Action, Info, Observation
 from vico.agents.robot.body import Stance
 from vico.agents.robot.depositor import TAKEN
 from vico.agents.robot.driving import Drive
-from vico.agents.robot.sight import look
-from vico.agents.robot.team import Team, deck_spot, heard_from, says_come, told_where
+from vico.agents.robot.sight import seen_at
+from vico.agents.robot.team import Team, deck_spot, heard_from, says_come, told_seen, told_where
 from vico.agents.robot.worker import ArmWorker
 from vico.agents.state import AgentState
 
@@ -23,14 +23,16 @@ Array = NDArray[np.float64]
 
 # Seconds between two looks for the thing, two calls of the person, and until a carrier is waited for no longer.
 _LOOKS_EVERY, _CALLS_EVERY, _WAITS = 0.5, 4.0, 90.0
-# Fewer pixels are no sight of the thing; farther away it is gone nearer to first, metres.
-_PIXELS, _SURE = 6, 8.0
+# Farther away a thing is gone nearer to first, metres.
+_SURE = 8.0
 # A full turn to look about, rad/s and seconds; places to look from lie on a ring about the middle, metres.
 _TURN, _ROUND, _RING, _PLACES = 0.7, 9.5, 4.0, 6
 # How near one comes to regions, to people and to where things are put down, metres; how often something is tried.
-_AT_SOURCE, _AT_PERSON, _AT_GOAL, _TRIES = 2.5, 4.0, 2.0, 5
+_AT_SOURCE, _AT_PERSON, _AT_GOAL, _TRIES = 2.5, 3.0, 2.0, 5
 # Where the carrier is called to, from the robot with the arm, and how far off it may be, metres.
 _ASIDE, _BY = 2.2, 6.0
+# Nearer to the destination than this nothing is put on a deck, metres.
+_FAR = 15.0
 # Things are put down so far ahead, within so much of the middle of the destination, and come to from about it, metres.
 _AHEAD, _WITHIN, _ABOUT = 0.75, 2.2, 1.6
 # Seconds of standing that end going along.
@@ -77,6 +79,7 @@ class Manipulator:
         self.stage = Stage.GO
         self.entity = 0
         self.seen: Array | None = None
+        self._middle = np.array(told["source"]["centre"][:2], np.float64)  # about which the thing is looked for
         self._clock = self._looked = self._said = 0.0
         self._tries = self._place = self._around = 0
         self._turned = self._stood = 0.0
@@ -99,6 +102,9 @@ class Manipulator:
         self._clock += self.period
         for text in heard_from(observation, self.carrier):
             self._carrier_at = told_where(text) or self._carrier_at
+            self._hear_of_it(told_seen(text))
+        if self.worker.lost(observation):
+            self._search_about(Stance.of(observation).position)
         if self._waits_to_say:
             return {"type": "communicate", "text": self._waits_to_say.pop(0)}
         return _STAGES[self.stage](self, observation, info)
@@ -108,7 +114,7 @@ class Manipulator:
         if not self._began:
             self._began = True
             near = _AT_SOURCE if self._lies_about else _AT_PERSON
-            self.drive.begin(np.array(self.told["source"]["centre"]), near=near)
+            self.drive.begin(np.array(self.told["source"]["centre"]), near=near, stops=not self._lies_about)
         if self._lies_about and self._look(observation, info):
             return self._pick()
         action = self.drive.act(observation)
@@ -140,8 +146,7 @@ class Manipulator:
         turn = 2.0 * math.pi * self._place / _PLACES
         self._place += 1
         ring = _RING * (1 + self._place // _PLACES % 2)
-        middle = np.array(self.told["source"]["centre"][:2])
-        self.drive.begin(middle + ring * np.array([math.cos(turn), math.sin(turn)]), near=1.0)
+        self.drive.begin(self._middle + ring * np.array([math.cos(turn), math.sin(turn)]), near=1.0)
         return self.drive.act(observation)
 
     def _picks(self, observation: Observation, info: Info) -> Action:
@@ -149,11 +154,10 @@ class Manipulator:
         if self.worker.busy:
             return action
         if self.worker.outcome == "picked":
-            if self.told["category"] == "carry":
-                self._waits_to_say.append(TAKEN)
-                self._next(Stage.FOLLOW)
-            else:
-                self._next(Stage.LOAD if self.uses_deck else Stage.BRING)
+            self._waits_to_say.append(TAKEN)
+            far = _away(Stance.of(observation).position, self.told["destination"]["centre"]) > _FAR
+            along = Stage.BRING if self._lies_about else Stage.FOLLOW
+            self._next(Stage.LOAD if self.uses_deck and far else along)
             return action
         self._tries += 1
         self.seen = None
@@ -179,7 +183,7 @@ class Manipulator:
             return self.worker.act(observation)
         if self._said > _WAITS:
             self._next(Stage.BRING)
-        return {"type": "wait"}
+        return {"type": "stop"}
 
     def _along(self, observation: Observation, info: Info) -> Action:
         """Send the carrier to the destination, and go there."""
@@ -197,7 +201,7 @@ class Manipulator:
             self._next(Stage.UNLOAD)
         elif self._said > 2.0 * _WAITS:
             self._next(Stage.END)
-        return {"type": "wait"}
+        return {"type": "stop"}
 
     def _unload(self, observation: Observation, info: Info) -> Action:
         action = self.worker.act(observation)
@@ -252,9 +256,22 @@ class Manipulator:
         return action
 
     def _rests(self, observation: Observation, info: Info) -> Action:
-        return {"type": "wait"}
+        return {"type": "stop"}
 
     # How it does it.
+
+    def _hear_of_it(self, seen: Array | None) -> None:
+        """Go where the other robot sees the thing, unless it is in view already."""
+        looks = self.stage is Stage.SEARCH or (self.stage is Stage.GO and self._lies_about)
+        if seen is None or not looks or _away(seen, self._middle) < _AT_SOURCE / 2:
+            return
+        self._search_about(seen)
+        self.drive.begin(self._middle, near=_AT_SOURCE / 2, stops=True)
+
+    def _search_about(self, middle: Array) -> None:
+        """Look for the thing about another point from now on, ENU metres."""
+        self._middle, self._place = middle[:2].copy(), 0
+        self._next(Stage.SEARCH)
 
     @property
     def _lies_about(self) -> bool:
@@ -266,16 +283,11 @@ class Manipulator:
         if self._clock - self._looked < _LOOKS_EVERY or "depth" not in observation:
             return False
         self._looked = self._clock
-        named = (int(e) for e, about in info["entities"].items() if about.get("name") == self.told["object"])
-        entity = next(named, 0)
-        if not entity:
+        found, here = seen_at(observation, info, str(self.told["object"])), Stance.of(observation)
+        if found is None:
             return False
-        points = look(observation).of(entity)
-        if len(points) < _PIXELS:
-            return False
-        self.entity = entity
-        self.seen = Stance.of(observation).outside(np.array([*np.median(points[:, :2], axis=0), points[:, 2].min()]))
-        return _away(self.seen, Stance.of(observation).position) <= near
+        self.entity, self.seen = found.entity, here.outside(found.low)
+        return _away(self.seen, here.position) <= near
 
     def _on_the_ground(self, observation: Observation) -> bool:
         """Return whether the thing lies low: nobody has it in hand."""
@@ -323,6 +335,7 @@ class Manipulator:
             "stage": str(self.stage),
             "entity": self.entity,
             "seen": None if self.seen is None else self.seen.copy(),
+            "middle": self._middle.copy(),
             "seconds": [self._clock, self._looked, self._said, self._turned, self._stood],
             "counts": [self._tries, self._place, self._around],
             "began": self._began,
@@ -336,6 +349,7 @@ class Manipulator:
         self.drive.restore(state["drive"])
         self.stage, self.entity, self._began = Stage(state["stage"]), int(state["entity"]), bool(state["began"])
         self.seen = None if state["seen"] is None else np.array(state["seen"])
+        self._middle = np.array(state["middle"])
         self._clock, self._looked, self._said, self._turned, self._stood = (float(v) for v in state["seconds"])
         self._tries, self._place, self._around = (int(value) for value in state["counts"])
         at = state["carrier"]

@@ -13,6 +13,8 @@ from vico.agents.robot.body import Stance
 
 Array = NDArray[np.float64]
 
+# Fewer pixels are no sight of a thing.
+_PIXELS = 6
 # Points farther away say nothing about what an arm can do, metres.
 _FARTHEST = 6.0
 
@@ -52,3 +54,30 @@ def look(observation: Mapping[str, Any], *, step: int = 1) -> Look:
     points, pixels = points_from_depth(depth, observation["intrinsics"], observation["extrinsics"], step=step)
     entity = np.asarray(observation["segmentation"], np.int64).reshape(-1)[pixels]
     return Look(Stance.of(observation).inside(points), entity)
+
+
+class Seen(NamedTuple):
+    """A thing in a picture.
+
+    Attributes
+    ----------
+    entity
+        Its number in segmentation.
+    low
+        Where it stands: the middle of its points, as low as they are, in the base's frame, metres, shape ``(3,)``.
+    """
+
+    entity: int
+    low: Array
+
+
+def seen_at(observation: Mapping[str, Any], info: Mapping[str, Any], name: str) -> Seen | None:
+    """Return where a thing of a name is in a picture; None where it is not in view."""
+    named = (int(e) for e, about in info["entities"].items() if about.get("name") == name)
+    entity = next(named, 0)
+    if not entity:
+        return None
+    points = look(observation).of(entity)
+    if len(points) < _PIXELS:
+        return None
+    return Seen(entity, np.array([*np.median(points[:, :2], axis=0), points[:, 2].min()]))

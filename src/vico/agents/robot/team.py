@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 _NUMBER = r"(-?\d+(?:\.\d+)?)"
 _HERE = re.compile(rf"^I stand at {_NUMBER} {_NUMBER} {_NUMBER}, heading {_NUMBER}\.$")
+_SEEN = re.compile(rf"^I see it at {_NUMBER} {_NUMBER} {_NUMBER}\.$")
 _COME = re.compile(rf"^Come to {_NUMBER} {_NUMBER}\.$")
 # Things lie so far from the edge of a deck that the arm reaches over, metres.
 _FROM_EDGE = 0.17
@@ -62,6 +63,18 @@ def says_where(stance: Stance) -> str:
 def says_come(x: float, y: float) -> str:
     """Return the sentence that calls a carrier to a point, ENU metres."""
     return f"Come to {x:.2f} {y:.2f}."
+
+
+def says_seen(position: Array) -> str:
+    """Return the sentence that tells where a thing was seen, ENU metres, shape ``(3,)``."""
+    x, y, z = position.tolist()
+    return f"I see it at {x:.2f} {y:.2f} {z:.2f}."
+
+
+def told_seen(text: str) -> Array | None:
+    """Return where a thing was seen; None of any other sentence."""
+    found = _SEEN.match(text)
+    return None if found is None else np.array([float(value) for value in found.groups()])
 
 
 def told_where(text: str) -> Stance | None:

@@ -34,6 +34,8 @@ _GRIP_TIME, _STALE, _STUCK = 1.6, 20.0, 1.0
 _FELT, _APART = 4.0, 0.004
 # Angles, rad, that count as there, and that tell moving from leaning on something, from one look to the next.
 _THERE, _MOVES = 0.03, 0.002
+# Seconds without a grip after which what was held is lost.
+_LOST = 0.6
 # Of its speed an arm goes with, and with something in the jaw.
 _SPEED, _LADEN = 0.8, 0.5
 # Metres before a person, and above the ground, that things are held out to them; seconds that they have to take them.
@@ -153,6 +155,22 @@ class ArmWorker:
         """Bring the arm to where things are carried, or to its rest with nothing in it."""
         self._begin(Work.FOLD, self._target, self._entity)
         self._next(Stage.CARRY)
+
+    def lost(self, observation: Mapping[str, Any]) -> bool:
+        """Return whether a jaw that held something feels it no more; then nothing is held.
+
+        Asked once a period while there is no work for it.
+        """
+        feels = self._by_oracle(observation) or float(np.min(observation["sensors"]["contacts"])) >= _FELT / 2
+        self._stuck = 0.0 if feels or self.busy or self.held is None else self._stuck + self.period
+        if self._stuck < _LOST:
+            return False
+        self.held, self._stuck = None, 0.0
+        return True
+
+    def _by_oracle(self, observation: Mapping[str, Any]) -> bool:
+        """Return whether it is told that it holds the thing, as it is with oracle grasp."""
+        return self._entity != 0 and self._entity in observation.get("state", {}).get("held", ())
 
     def _begin(self, work: Work, target: Array, entity: int) -> None:
         self.work, self._entity, self._target = work, entity, np.array(target, np.float64)
@@ -308,8 +326,7 @@ class ArmWorker:
             return self._hold()
         if self.work is Work.PICK:
             apart, felt = float(angles[7:].min()), float(np.min(observation["sensors"]["contacts"]))
-            by_oracle = self._entity in observation.get("state", {}).get("held", ())
-            if not by_oracle and (apart < _APART or felt < _FELT):
+            if not self._by_oracle(observation) and (apart < _APART or felt < _FELT):
                 assert self._reach is not None
                 self._skip.add(self._reach.number)
                 return self._again("it slipped" if self.forces > _FELT else "the jaw closed on nothing")

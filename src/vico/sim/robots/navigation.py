@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
-from vico.sim.bodies import IS_ROUND, Bodies
+from vico.sim.bodies import IS_ROUND, OBJECT, Bodies
 from vico.sim.footprints import Rectangle, point_gap
 
 Array = NDArray[Any]
@@ -57,7 +57,8 @@ def _neighbours(found, count, parts, own, reach):  # type: ignore[no-untyped-def
     parts
         Entity, kind, position, yaw, half length, half width, height and velocity of bodies.
     own
-        Of the body itself: entity, x, y, bottom and top.
+        Of the body itself: entity, x, y, bottom, top, cosine and sine of its heading, half its length and width. What
+        lies on it, with its middle within its outline, is not near but part of it.
     """
     entity, kind, position, yaw, half_length, half_width, height, velocity = parts
     for k in range(len(entity)):
@@ -66,6 +67,10 @@ def _neighbours(found, count, parts, own, reach):  # type: ignore[no-untyped-def
             continue
         if z >= own[4] + _HEIGHT_GAP or z + height[k] <= own[3] - _HEIGHT_GAP:
             continue
+        if kind[k] == OBJECT and z > own[3]:
+            ahead, aside = own[5] * (x - own[1]) + own[6] * (y - own[2]), own[5] * (y - own[2]) - own[6] * (x - own[1])
+            if abs(ahead) < own[7] and abs(aside) < own[8]:
+                continue
         one = found[count]
         one.x, one.y, one.yaw, one.vx, one.vy = x, y, yaw[k], velocity[k, 0], velocity[k, 1]
         one.rounding = half_width[k] if IS_ROUND[kind[k]] else 0.0
@@ -95,7 +100,9 @@ class NearbyBodies:
         """Return who is within `reach` metres of a robot, and as high or low, dtype `NEIGHBOUR`."""
         mine = self._robots
         x, y, bottom = mine.position[robot].tolist()
-        own = (int(mine.entity[robot]), x, y, bottom, bottom + float(mine.height[robot]))
+        yaw, top = float(mine.yaw[robot]), bottom + float(mine.height[robot])
+        outline = float(mine.half_length[robot]), float(mine.half_width[robot])
+        own = (int(mine.entity[robot]), x, y, bottom, top, math.cos(yaw), math.sin(yaw), *outline)
         found = np.empty(len(self._others) + len(mine), NEIGHBOUR)
         count = 0
         for b in (self._others, mine):
