@@ -4,11 +4,11 @@
     python benchmarks/tables.py --table assistant --worlds WORLDS --out OUT [--workers 2]
     python benchmarks/tables.py --table assistant --reduced --out OUT        # builds four windows of the packaged map
 
-Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), influence (five), commute (ten). A table
-that was cut short goes on with the same command. With `--reduced` there are four worlds, one seed and shorter episodes
-of the first part, so that all is over in ten minutes on two cores; these worlds are built into OUT/worlds if `--worlds`
-is not given. Methods that need a language model are played where `--method` names them, with the model of the
-environment; without, the page says that they were not run.
+Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), influence (five), commute (ten), robot
+(21). A table that was cut short goes on with the same command. With `--reduced` there are four worlds, one seed and
+shorter episodes of the first part, so that all is over in ten minutes on two cores; these worlds are built into
+OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method` names them, with
+the model of the environment; without, the page says that they were not run.
 
 Reported seeds are drawn from the commit at which a method was frozen, so nobody can have tuned on them:
 `--first-seed N` with N the first six hexadecimal digits of that commit's hash, as an integer (`echo $((16#e6541f))`).
@@ -93,6 +93,13 @@ TABLES = {
     ),
     "commute": Table(
         (Block("a day of commutes", "commute"),), "commute", 10, "rule", {"a day of commutes": {}}
+    ),
+    "robot": Table(
+        (
+            Block("held by friction", "robot", {"steps": 1500, "oracle_grasp": False}),
+            Block("oracle grasp", "robot", {"steps": 1500, "oracle_grasp": True}),
+        ),
+        "robot", 1, "heuristic", {"held by friction": {"steps": 400}},
     ),
 }  # fmt: skip
 

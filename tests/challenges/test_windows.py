@@ -27,7 +27,12 @@ def test_the_standard_list_is_24_windows_of_ten_cities() -> None:
 
 def test_the_other_lists_are_what_the_tables_need() -> None:
     counts = {name: len(found.windows) for name, found in window_lists().items()}
-    assert counts == {"standard": 24, "advanced": 3, "influence": 5, "commute": 10, "reduced": 4, "tuning": 6}
+    robots = {"robot": 21, "robot_tuning": 9}
+    assert counts == robots | {
+        "standard": 24, "advanced": 3, "influence": 5, "commute": 10, "reduced": 4, "tuning": 6
+    }  # fmt: skip
+    reported, tuned_on = ({window.name for window in window_list(name).windows} for name in robots)
+    assert not reported & tuned_on
     assert all(window.radius == 400 for window in window_list("commute").windows)
 
 
@@ -66,7 +71,9 @@ def test_a_list_of_ones_own_is_read_strictly(tmp_path: Path, monkeypatch: pytest
         with pytest.raises(SchemaError, match=says):
             window_list("mine")
     monkeypatch.delenv("VICO_DATA")
-    with pytest.raises(InputError, match="there are advanced, commute, influence, reduced, standard, tuning"):
+    with pytest.raises(
+        InputError, match="there are advanced, commute, influence, reduced, robot, robot_tuning, standard, tuning"
+    ):
         window_list("mine")
 
 
