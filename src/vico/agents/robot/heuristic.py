@@ -35,6 +35,8 @@ _ASIDE, _BY = 2.2, 6.0
 _FAR = 15.0
 # Things are put down so far ahead, within so much of the middle of the destination, and come to from about it, metres.
 _AHEAD, _WITHIN, _ABOUT = 0.75, 2.2, 1.6
+# Sides that are tried one after the other are turned by so much, rad: none comes twice.
+_GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 # Seconds of standing that end going along.
 _STANDS, _SPEED = 4.0, 0.03
 
@@ -135,6 +137,8 @@ class Manipulator:
 
     def _search(self, observation: Observation, info: Info) -> Action:
         """Look all about, from one place after the other round the middle."""
+        if self.worker.busy:
+            return self.worker.act(observation)
         if self._look(observation, info):
             return self._pick()
         if self.drive.busy:
@@ -154,6 +158,7 @@ class Manipulator:
         if self.worker.busy:
             return action
         if self.worker.outcome == "picked":
+            self._tries = 0
             self._waits_to_say.append(TAKEN)
             far = _away(Stance.of(observation).position, self.told["destination"]["centre"]) > _FAR
             along = Stage.BRING if self._lies_about else Stage.FOLLOW
@@ -161,7 +166,8 @@ class Manipulator:
             return action
         self._tries += 1
         self.seen = None
-        self._next(Stage.SEARCH if self._tries < _TRIES else Stage.END)
+        self.worker.fold()  # a hand left where it failed is in the way of the next try
+        self._next(Stage.SEARCH)
         return action
 
     def _load(self, observation: Observation, info: Info) -> Action:
@@ -208,6 +214,7 @@ class Manipulator:
         if self.worker.busy:
             return action
         if self.worker.outcome == "picked":
+            self._tries = 0
             self._next(Stage.BRING)
             return action
         self._tries += 1
@@ -295,8 +302,11 @@ class Manipulator:
         return self.seen is not None and float(self.seen[2]) - ground < 0.2
 
     def _pick(self) -> Action:
+        """Pick the thing; where that has failed twice, from one side after the other, until time is out."""
         assert self.seen is not None
-        self.worker.pick(self.entity, self.seen)
+        turn = _GOLDEN * (self._tries // 2)
+        beside = np.array([math.cos(turn), math.sin(turn)]) if self._tries >= 2 else None
+        self.worker.pick(self.entity, self.seen, beside=beside)
         self._next(Stage.PICK)
         return {"type": "stop"}
 

@@ -34,6 +34,8 @@ _GRIP_TIME, _STALE, _STUCK = 1.6, 20.0, 1.0
 _FELT, _APART = 4.0, 0.004
 # Angles, rad, that count as there, and that tell moving from leaning on something, from one look to the next.
 _THERE, _MOVES = 0.03, 0.002
+# Seconds after which a hand that still trembles where it leans on something is as far as it goes.
+_LEANS = 8.0
 # Seconds without a grip after which what was held is lost.
 _LOST = 0.6
 # Of its speed an arm goes with, and with something in the jaw.
@@ -299,7 +301,7 @@ class ArmWorker:
         self._angles = angles[:7].copy()
         told = self._way is not None and self._point >= len(self._way)
         self._stuck = self._stuck + self.period if told and not moves else 0.0
-        if there or self._stuck > _STUCK:
+        if there or self._stuck > _STUCK or self._timer > _LEANS:
             self._next(Stage.GRIP)
         return self._hold()
 
