@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from robot_field import field
+from robot_field import HALF, field
 from vico.sim.bodies import CAR, Bodies
 from vico.sim.config import SimConfig
 from vico.sim.environment.agenda import EventEffects
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
+from vico.sim.robots.ways import way_to
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
+from vico.world.heights import HeightField
 from vico.world.walkable import ROADWAY
 
 CLOSED = ((8.0, 0.0, 4.0),)
@@ -38,6 +40,20 @@ def test_a_way_leads_round_closed_ground_and_none_into_it(husky: RobotPopulation
     events, places = run(husky, 30.0)
     assert events == ["arrived"]
     assert np.hypot(*(places - [8.0, 0.0]).T).min() > 3.5
+
+
+def test_ways_lead_round_ground_that_is_too_steep() -> None:
+    n, cell = 81, 2 * HALF / 80
+    x, y = np.meshgrid(np.arange(n) * cell - HALF, np.arange(n) * cell - HALF)
+    # A bank 1 m high that rises by a quarter of its length, but for a ramp in the north.
+    slope = np.where(y > 12.0, 0.1, 0.25)
+    hill = HeightField(np.clip((x - 5.0) * slope, 0.0, 1.0).astype(np.float32), HALF)
+    robots = RobotPopulation(field(height=hill), ["manipulator", "husky"], [[0, 0, 0], [0, -6, 0]], packs=False)
+    straight, round_it = (way_to(robots.run, robot, np.array([19.0, -3.0])) for robot in (1, 0))
+    assert straight is not None
+    assert round_it is not None
+    assert straight[:, 1].max() < 0.0
+    assert round_it[:, 1].max() > 12.0
 
 
 def test_ground_that_is_closed_on_the_way_changes_the_way_and_is_kept_in_a_snapshot(husky: RobotPopulation) -> None:

@@ -207,5 +207,6 @@ def go2(packs: bool = True) -> RobotModel:
         half_length=HALF_LENGTH,
         half_width=HALF_WIDTH,
         height=HEIGHT,
+        grade=0.18,
         shapes=pack.shapes if pack else _own_shapes(),
     )

@@ -175,6 +175,7 @@ def h1(packs: bool = True) -> RobotModel:
         half_length=HALF_LENGTH,
         half_width=HALF_WIDTH,
         height=HEIGHT,
+        grade=0.12,
         lookahead=0.9,
         arrival=0.35,
         shapes=meshes or own_shapes(arm_places()),

@@ -169,6 +169,7 @@ def husky(packs: bool = True) -> RobotModel:
         half_length=0.495,
         half_width=0.3425,
         height=0.39,
+        grade=0.5,
         lookahead=0.9,
         arrival=0.4,
         shapes=meshes or _own_shapes(),

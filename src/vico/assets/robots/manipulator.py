@@ -212,6 +212,7 @@ def manipulator(packs: bool = True) -> RobotModel:
         half_length=RADIUS,
         half_width=RADIUS,
         height=HEIGHT,
+        grade=0.17,
         kerb=KERB,
         shapes={"base": _body(), "left_wheel": _wheel(), "right_wheel": _wheel()}
         | {name: _link(k) for k, name in enumerate(ARM)}

@@ -391,6 +391,8 @@ class RobotModel:
         Upright box around the robot, metres, centred on the base.
     kerb
         Highest kerb that it drives or steps up, metres; its ways lead round higher ones. None: any.
+    grade
+        Steepest ground that it drives or walks up, metres up a metre; its ways lead round steeper ground. None: any.
     lookahead, arrival
         How far ahead on its way it steers for, and how near the end it has arrived, metres.
     fallen_below
@@ -427,6 +429,7 @@ class RobotModel:
     sensors: Sensors = Sensors()
     deck: DeckModel | None = None
     kerb: float | None = None
+    grade: float | None = None
     lookahead: float = 0.7
     arrival: float = 0.3
     fallen_below: float | None = 0.7
