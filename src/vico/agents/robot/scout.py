@@ -17,6 +17,8 @@ from vico.agents.state import AgentState
 
 # How near to the source it comes, metres: the other robot needs room there; a turn to look about, rad/s.
 _AT_SOURCE, _TURN = 4.5, 0.7
+# Seconds that one turn takes; who went on turning would wander off on a slope.
+_ROUND = 9.5
 # Seconds between two looks, and two sentences; until it goes after a person who may have gone.
 _LOOKS_EVERY, _SAYS_EVERY, _GONE = 0.5, 6.0, 80.0
 
@@ -37,7 +39,7 @@ class Scout:
         self._period = float(told["period"])
         self._drive = Drive(period=self._period)
         self._began = self._taken = self._follows = False
-        self._clock = self._looked = self._said = 0.0
+        self._clock = self._looked = self._said = self._turned = 0.0
 
     @property
     def wants_picture(self) -> bool:
@@ -65,6 +67,9 @@ class Scout:
             self._drive.begin(np.array(self._told["source"]["centre"]), near=_AT_SOURCE, stops=True)
         if self._drive.busy:
             return self._drive.act(observation)
+        self._turned += self._period
+        if self._turned > _ROUND:
+            return {"type": "stop"}
         return {"type": "control", "space": "velocity", "vector": [0.0, 0.0, _TURN]}
 
     def _go_along(self) -> Action:
@@ -92,11 +97,11 @@ class Scout:
         return {
             "drive": self._drive.state(),
             "flags": [self._began, self._taken, self._follows],
-            "seconds": [self._clock, self._looked, self._said],
+            "seconds": [self._clock, self._looked, self._said, self._turned],
         }
 
     def restore(self, state: AgentState) -> None:
         """Remember what `state` returned."""
         self._drive.restore(state["drive"])
         self._began, self._taken, self._follows = (bool(flag) for flag in state["flags"])
-        self._clock, self._looked, self._said = (float(value) for value in state["seconds"])
+        self._clock, self._looked, self._said, self._turned = (float(value) for value in state["seconds"])

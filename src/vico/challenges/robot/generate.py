@@ -51,8 +51,8 @@ from vico.world.folder import World
 from vico.world.model import Place
 from vico.world.walkable import OPEN, SIDEWALK
 
-# Starts that are tried; hours at which tasks begin; who asks is of this age at least, years.
-_TRIES, _HOURS, _AGE = 40, tuple(range(9, 18)), 10
+# Points, and tasks, that are tried; hours at which tasks begin; who asks is of this age at least, years.
+_TRIES, _DRAWS, _HOURS, _AGE = 40, 200, tuple(range(9, 18)), 10
 # Robots' ways, in metres of pavement, are longer than people's walks by this factor at most.
 _ROUNDABOUT = 2.0
 # Free ground that robots and things need around them, metres; the robots begin, and the person waits, so far apart.
@@ -77,12 +77,12 @@ class _Draw:
         return choice.chosen
 
     def spot(self, near: NDArray[np.float64], low: float, high: float) -> NDArray[np.float64] | None:
-        """Return free ground so far from a point; None if there is none."""
+        """Return free level ground so far from a point; None if there is none."""
         for _ in range(_TRIES):
             found = self.world.walkable.random_point(
                 self.chance, classes=(OPEN, SIDEWALK), near=near, radius=high, clearance=_ROOM
             )
-            if low <= float(np.hypot(*(found - near))):
+            if low <= float(np.hypot(*(found - near))) and self.ways.is_level(found):
                 return found
         return None
 
@@ -131,14 +131,14 @@ def generate_robot_task(
         "seed": seed,
         "steps": steps,
     }
-    for _ in range(_TRIES):
+    for _ in range(_DRAWS):
         task = (_carry if category == "carry" else _deliver)(draw, community, frame)
         if task is not None:
             return task
         draw.candidates = {}
     raise EmptyInputError(
-        f"robot: nobody knows two spots with free ground, {APART:.0f} m apart and within a walk of {REACH:.0f} m; use "
-        "a larger world or more residents"
+        f"robot: nobody knows two spots on level ground that both robots have ways to, {APART:.0f} m apart and within "
+        f"a walk of {REACH:.0f} m; use a larger world or more residents"
     )
 
 
@@ -232,6 +232,8 @@ def _can_go(
 ) -> bool:
     """Return whether both robots can begin, and come near enough to the thing and to where it is to be."""
     ways, within = draw.ways, _ROUNDABOUT * reach
+    if not ways.is_level(goal):
+        return False
     near = ((ways.manipulator, ARM_COMES, GOAL_COMES), (ways.carrier, CARRIER_COMES, CARRIER_COMES))
     for start, (model, at_thing, at_goal) in zip(robots, near, strict=True):
         points = [(thing, at_thing), (goal, at_goal)]

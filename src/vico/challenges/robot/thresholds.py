@@ -32,6 +32,9 @@ REACHED = 1.2
 #: both, metres.
 ARM_COMES, GOAL_COMES, CARRIER_COMES = 0.6, 2.0, 4.0
 
+#: Things lie, and are put down, on ground that rises by so much a metre at most.
+LEVEL = 0.1
+
 #: People who live in the world.
 RESIDENTS = 15
 #: Candidates that each thing and place is chosen from.

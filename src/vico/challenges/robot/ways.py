@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -9,8 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.challenges.robot.thresholds import LEVEL
 from vico.sim.robots.narrow import narrow_ground
 from vico.world.folder import World
+
+# The ground is looked at so far to either side of a point, metres.
+_ASIDE = 0.5
 
 Array = NDArray[np.float64]
 Grid = NDArray[np.bool_]
@@ -36,6 +41,14 @@ class Ways:
         walkable = self.world.walkable
         ix, iy = walkable.cell_of(np.asarray(at, np.float64)[:2])
         return bool(walkable.connected[iy, ix] and not self._kept_off(model)[iy, ix])
+
+    def is_level(self, at: Sequence[float] | Array) -> bool:
+        """Return whether things lie still, and are put down upright, at a point, ENU metres."""
+        x, y = float(at[0]), float(at[1])
+        east, west, north, south = self.world.height.smooth(
+            [[x + _ASIDE, y], [x - _ASIDE, y], [x, y + _ASIDE], [x, y - _ASIDE]]
+        ).tolist()
+        return math.hypot(east - west, north - south) <= LEVEL * 2.0 * _ASIDE
 
     def lead(
         self, model: RobotModel, start: Sequence[float] | Array, points: Sequence[tuple[Array, float]], *, within: float

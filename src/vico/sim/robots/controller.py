@@ -53,6 +53,11 @@ class MotorController:
         """
         return np.tile(self.model.stance, (len(motion), 1))
 
+    def commanded(self, motion: Motion, command: Array, memory: Array) -> Array:
+        """Return what servos follow that are commanded one by one, shape ``(k, motors)``; arguments as above."""
+        memory[:] = 0.0
+        return command
+
     def rotor_speeds(self, motion: Motion, setpoints: Array, memory: Array, seconds: float) -> Array:
         """Return what the rotors of robots that fly follow for some seconds, rad/s, shape ``(k, rotors)``.
 

@@ -134,8 +134,9 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
     if led.any():
         _follow_velocities(run, group, memory, led.nonzero()[0])
     for row in (~led).nonzero()[0].tolist():
-        memory[row] = 0.0
         robot = int(robots[row])
+        if arrays.mode[robot] != _MOTORS or fallen[row]:
+            memory[row] = 0.0
         lying = None
         if fallen[row]:
             lying = group.controller.lying_targets(float(arrays.lying[robot]), run.engine.base(robot))
@@ -146,9 +147,9 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
         if lying is not None:
             run.engine.command(robot, *lying)
         elif arrays.mode[robot] == _MOTORS:
-            targets = arrays.command[robot, : len(group.model.motors)]
-            held = _as_held(run, robots[row : row + 1], targets[None])[0]
-            run.engine.command(robot, held, group.controller.command_gains)
+            who, told = robots[row : row + 1], arrays.command[robot : robot + 1, : len(group.model.motors)]
+            targets = group.controller.commanded(run.engine.motion(who), told, memory[row : row + 1])
+            run.engine.command(robot, _as_held(run, who, targets)[0], group.controller.command_gains)
         else:
             run.engine.command(robot, group.model.stance)
 
