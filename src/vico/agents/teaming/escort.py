@@ -65,6 +65,11 @@ class Escort:
         self.stage = Stage.MEET
         self._began, self._said, self._spot = False, 0.0, 0
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks at its pictures: never; whom it follows its controller finds."""
+        return False
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         heard = heard_from(observation, str(self.told["person"]["agent"]))

@@ -63,6 +63,11 @@ class Finder:
         self._view = self._side = 0
         self._turned = 0.0
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks for the thing the next time."""
+        return self.stage not in (Stage.WAIT, Stage.STAND)
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         for text, _ in heard_from(observation, self.spotter):

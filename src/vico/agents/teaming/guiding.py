@@ -67,6 +67,11 @@ class Leader:
         self._said = self._looked = 0.0
         self._blocked = 0
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks for the person the next time."""
+        return self.stage in (Stage.LOOK, Stage.FETCH)
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         for text, at in heard_from(observation, str(self.told["person"]["agent"])):

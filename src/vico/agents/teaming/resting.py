@@ -9,6 +9,11 @@ from vico.agents.state import AgentState
 class Resting:
     """Stays where it is."""
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks at its pictures: never."""
+        return False
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         return {"type": "wait"}

@@ -68,6 +68,11 @@ class Spotter:
         self._clock = self._said = 0.0
         self._aim = np.zeros(3)
 
+    @property
+    def wants_picture(self) -> bool:
+        """Whether it looks for the thing the next time."""
+        return self.stage is not Stage.END
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         self._clock += self.period

@@ -37,6 +37,8 @@ from vico.challenges.teaming.thresholds import (
 )
 from vico.world.folder import World
 
+#: Who accompanies.
+ROBOT = "h1"
 #: Why it fails, in the order in which a table lists them.
 CAUSES = (
     "not met",  # the person was never called
@@ -58,6 +60,9 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     if not targets or waits is None:
         return None
     target = targets[draw.pick("Where to?", [place.name for place in targets], who)]
+    door = np.array(target.position[:2])
+    if not draw.has_ways(ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (door, DOOR_DISTANCE / 2)):
+        return None
     comes_out = bool(draw.chance.integers(2))
     stay = round(float(draw.chance.uniform(*STAYS)), 1) if comes_out else None
     person, region = person_of(who), place_region(target)
@@ -69,7 +74,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     return TeamingTask(
         **frame,
         start=draw.hour(),
-        team=[Member(model="h1", start=draw.stands(hood.start))],
+        team=[Member(model=ROBOT, start=draw.stands(hood.start))],
         text=text,
         person=person,
         walk=Walk(waits_at=draw.stands(waits, towards=np.asarray(hood.start)), pace=draw.pace(), stay=stay),

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from vico.assets.models.movable import MovableKind, movable_colours, movable_kinds
 from vico.assets.people.words import looks_in_words
+from vico.assets.robots import robot_model
 from vico.challenges.assistant.choose import Chooser, Question, choose
 from vico.challenges.assistant.model import Person, Start, TaskObject
 from vico.challenges.assistant.regions import Neighbourhood
+from vico.challenges.robot.ways import Ways
 from vico.challenges.teaming.model import Category
 from vico.challenges.teaming.thresholds import LEAST_AREA, MOST_WALK, PACES
 from vico.community.model import Community, Resident
@@ -25,6 +27,8 @@ ROOM = 1.0
 _TRIES, _AGE, _ABOUT = 40, 14, 40.0
 # Share of the world in which tasks begin: nothing is known of what lies beyond it.
 _INNER = 0.8
+# Ways of robots may be so much longer than people's walks.
+_DETOUR = 1.5
 _HOURS = tuple(range(9, 18))
 
 
@@ -38,6 +42,7 @@ class Draw:
     chance: np.random.Generator
     chooser: Chooser
     candidates: dict[str, list[str]] = field(default_factory=dict)
+    _ways: dict[str, Ways] = field(default_factory=dict)
 
     def pick(self, question: str, names: list[str], who: Resident | None) -> int:
         """Have one of nine chosen, and note what it was chosen from."""
@@ -70,6 +75,14 @@ class Draw:
             if low <= float(np.hypot(*(found - near))):
                 return found
         return None
+
+    def has_ways(self, model: str, start: NDArray[np.float64], *points: tuple[NDArray[np.float64], float]) -> bool:
+        """Return whether a robot can stand somewhere, and go near points from there: each with how near, metres."""
+        if model not in self._ways:
+            robot = robot_model(model)
+            self._ways[model] = Ways(self.world, robot, robot)
+        ways, robot = self._ways[model], self._ways[model].carrier
+        return ways.stands(robot, start) and ways.lead(robot, start, points, within=_DETOUR * MOST_WALK)
 
     def stands(self, at: NDArray[np.float64], *, towards: NDArray[np.float64] | None = None) -> Start:
         """Return a start at a point that looks somewhere, or towards another point."""

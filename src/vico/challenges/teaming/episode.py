@@ -37,10 +37,6 @@ from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
 from vico.world.public import PublicMap
 
-# What robots see.
-_SHAPES: tuple[str, ...] = ("depth", "segmentation")
-_ALL = ("rgb", *_SHAPES)
-
 
 @lru_cache(maxsize=2)
 def world_and_people(folder: Path) -> tuple[World, Community]:
@@ -93,8 +89,6 @@ def play_teaming_task(
         cars=for_size(CARS, world),
         pedestrians=for_size(PEDESTRIANS, world),
         observe=tuple(starts),
-        # The teams that come with it look at no colours, and these take longest; a recording shows them.
-        outputs=_SHAPES if method in METHODS and recording is None else _ALL,
         periods=dict.fromkeys(starts, period),
         max_steps=round(task.steps / min(period, 1.0)),
         setup=lambda simulation: set_up(simulation, task),
@@ -106,7 +100,8 @@ def play_teaming_task(
     system = sim.state.robots
     assert system is not None
     judge = TeamingJudge(task, world, sim.ground_truth, system, lambda: sim.state.second)
-    agents = Gatherer(residents | robots, trusted=residents, deadline=terms.deadline, workers=terms.workers)
+    trusted = residents | robots if method in METHODS else residents
+    agents = Gatherer(residents | robots, trusted=trusted, deadline=terms.deadline, workers=terms.workers)
     runner = Runner(sim, agents, hooks=[judge])
     if progress is not None:
         label = f"{task.world}, {task.category}, seed {task.seed}"

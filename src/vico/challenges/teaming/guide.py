@@ -33,6 +33,8 @@ from vico.challenges.teaming.thresholds import (
 )
 from vico.world.folder import World
 
+#: Who guides.
+ROBOT = "go2"
 #: Why it fails, in the order in which a table lists them.
 CAUSES = (
     "not met",  # the person was never called
@@ -54,6 +56,9 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
         return None
     order = [targets[int(k)] for k in draw.chance.permutation(len(targets))]
     target = order[draw.pick("Where to?", [region.name for region in order], who)]
+    goal = np.array(target.centre[:2])
+    if not draw.has_ways(ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (goal, ARRIVED / 3)):
+        return None
     person = person_of(who)
     text = (
         f"{who.name}, {person.looks}, waits near by and does not know the way: go there and call them, lead them "
@@ -62,7 +67,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     return TeamingTask(
         **frame,
         start=draw.hour(),
-        team=[Member(model="go2", start=draw.stands(hood.start))],
+        team=[Member(model=ROBOT, start=draw.stands(hood.start))],
         text=text,
         person=person,
         walk=Walk(

@@ -126,7 +126,7 @@ class TeamingJudge(Hook):
         entity, at = self.truth.object_entity(name), self.truth.object_position(name)
         found = []
         for robot, position in zip(self.robots.names, self.robots.bodies().position, strict=True):
-            seen = step.result.observations.get(robot)
-            near = seen is not None and away(position, at) <= SEEN_DISTANCE
-            found.append(int(np.count_nonzero(np.asarray(seen["segmentation"]) == entity)) if seen and near else 0)
+            picture = (step.result.observations.get(robot) or {}).get("segmentation")
+            near = picture is not None and away(position, at) <= SEEN_DISTANCE
+            found.append(int(np.count_nonzero(np.asarray(picture) == entity)) if near else 0)
         return tuple(found)

@@ -39,8 +39,6 @@ CAUSES = (
 )
 #: In the order of the team.
 DRONE, GROUND = 0, 1
-# Walks to the thing may be so much longer than straight lines are.
-_DETOUR = 1.5
 
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
@@ -51,11 +49,13 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     if middle is None or beside is None or hood.distance(middle) > MOST_WALK:
         return None
     lies = draw.spot(middle, 0.0, AREA)
-    if lies is None or hood.distance(lies) > _DETOUR * MOST_WALK:
+    if lies is None:
+        return None
+    ground = GROUND_ROBOTS[int(draw.chance.integers(len(GROUND_ROBOTS)))]
+    if not draw.has_ways(ground, np.asarray(hood.start), (lies, BESIDE_THING * 0.8)):
         return None
     region = hood.spot(middle, radius=AREA)
     thing = draw.thing(who, lies)
-    ground = GROUND_ROBOTS[int(draw.chance.integers(len(GROUND_ROBOTS)))]
     text = (
         f"{who.name} has lost {described(thing)} {told(region)}: find it, one from above and one on the ground, which "
         "is to stand beside it."
