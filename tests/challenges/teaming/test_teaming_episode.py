@@ -12,6 +12,7 @@ import pytest
 from vico.challenges.records import Job
 from vico.challenges.registry import load_challenge
 from vico.challenges.teaming.judge import CAUSES
+from vico.challenges.teaming.model import CATEGORIES
 from vico.errors import InputError
 from vico.sim.recording import read_run
 
@@ -36,26 +37,26 @@ import sys
 from pathlib import Path
 from vico.challenges.records import Job
 from vico.challenges.registry import load_challenge
-job = Job("teaming", sys.argv[2], "heuristic", {"steps": 6, "period": 0.5}, Path(sys.argv[1]), 3)
-record = load_challenge("teaming").play(job)
-print(record.state_hash)
+for category in sys.argv[2:]:
+    job = Job("teaming", category, "heuristic", {"steps": 6, "period": 0.5}, Path(sys.argv[1]), 3)
+    print(load_challenge("teaming").play(job).state_hash)
 """
 
 
-@pytest.mark.parametrize("category", ["accompany", "guide", "spot"])
-def test_an_episode_is_the_same_in_a_fresh_process_and_can_be_looked_at(
-    category: str, helsinki_path: Path, tmp_path: Path
-) -> None:
-    record = load_challenge("teaming").play(job(helsinki_path, category), recording=tmp_path / "run")
+def test_episodes_are_the_same_in_a_fresh_process_and_can_be_looked_at(helsinki_path: Path, tmp_path: Path) -> None:
+    challenge = load_challenge("teaming")
+    hashes = []
+    for category in CATEGORIES:
+        record = challenge.play(job(helsinki_path, category), recording=tmp_path / category)
+        hashes.append(record.state_hash)
+        assert (record.metrics["SR"], record.metrics["Ts"], record.steps) == (0.0, 6.0, 6)
+        assert record.parts[0].cause in CAUSES[category]
+        assert record.fault_counts == {}
+        assert "robot_0" in {agent["name"] for agent in read_run(tmp_path / category).agents}
     again = subprocess.run(
-        [sys.executable, "-c", PLAY, str(helsinki_path), category], capture_output=True, text=True, check=True
+        [sys.executable, "-c", PLAY, str(helsinki_path), *CATEGORIES], capture_output=True, text=True, check=True
     )
-    assert again.stdout.strip() == record.state_hash
-    assert (record.metrics["SR"], record.metrics["Ts"], record.steps) == (0.0, 6.0, 6)
-    assert record.parts[0].cause in CAUSES[category]  # type: ignore[index]
-    assert record.fault_counts == {}
-    run = read_run(tmp_path / "run")
-    assert "robot_0" in {agent["name"] for agent in run.agents}
+    assert again.stdout.split() == hashes
 
 
 def test_settings_and_categories_that_make_no_sense_are_refused(helsinki_path: Path) -> None:
