@@ -32,7 +32,7 @@ _HERE = "Here I am. Please come nearer, then I can hand it over."
 
 @dataclass(frozen=True)
 class _Item:
-    """A stretch of the way home, as schedules have them."""
+    """A stretch of the way there, as schedules have them."""
 
     type: str
     start: str
@@ -45,7 +45,7 @@ class _Item:
 
 @dataclass(frozen=True)
 class _WayHome:
-    """Somebody whose only plan is to go home and stay there."""
+    """Somebody whose only plan is to go somewhere, as home, and stay there."""
 
     resident: Scheduled
     schedule: Sequence[_Item]
@@ -172,13 +172,25 @@ def way_home(resident: Dweller, public_map: PublicMap, *, time: float, pace: flo
     pace
         Of a grown-up, metres a second; the old are as much slower as they are else.
     """
+    # Who comes home sits down, and leaves the hall to others.
+    rest = _Item("meal", _BY, "23:59:59", "have a rest at home", resident.home, tag="meal_home")
+    return _way_to(rest, "walk home", resident, public_map, time=time, pace=pace, seed=seed)
+
+
+def way_to(
+    place: str, resident: Scheduled, public_map: PublicMap, *, time: float, pace: float, seed: int
+) -> ScheduleFollower:
+    """Return who goes to a place, by its id, from wherever they are, and waits in there; else as `way_home`."""
+    visit = _Item("main", _BY, "23:59:59", "see to something", place)
+    return _way_to(visit, "walk there", resident, public_map, time=time, pace=pace, seed=seed)
+
+
+def _way_to(
+    stay: _Item, walk: str, resident: Scheduled, public_map: PublicMap, *, time: float, pace: float, seed: int
+) -> ScheduleFollower:
     now = clock_of(int(time % DAY))
-    plan = (
-        _Item("commute", now, _BY, "walk home", None),
-        # Who comes home sits down, and leaves the hall to others.
-        _Item("meal", _BY, "23:59:59", "have a rest at home", resident.home, tag="meal_home"),
-    )
     own = pace * walk_speed(resident.age) / WALK_SPEED
+    plan = (_Item("commute", now, _BY, walk, None), stay)
     return ScheduleFollower(_WayHome(resident, plan), public_map, seed=seed, paces=(own, own))
 
 
@@ -208,4 +220,5 @@ __all__ = [
     "first_name",
     "is_called",
     "way_home",
+    "way_to",
 ]

@@ -15,6 +15,7 @@ CHALLENGES = {
     "commute": "vico.challenges.commute.challenge:COMMUTE",
     "influence": "vico.challenges.influence:INFLUENCE",
     "robot": "vico.challenges.robot.challenge:ROBOT",
+    "teaming": "vico.challenges.teaming.challenge:TEAMING",
 }
 #: The method, of any challenge, that asks a language model.
 ASKS_A_MODEL = "llm"

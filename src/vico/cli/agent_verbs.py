@@ -9,7 +9,13 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, InfluenceOptions, RobotOptions
+from vico.cli.evaluation_options import (
+    AssistantOptions,
+    CommuteOptions,
+    InfluenceOptions,
+    RobotOptions,
+    TeamingOptions,
+)
 
 # The fields of a record are options of the verb itself, not of a part of it.
 _FLAT = tyro.conf.arg(name="")
@@ -100,6 +106,17 @@ def evaluate_robot(options: Annotated[RobotOptions, _FLAT]) -> int:
     from vico.cli import evaluate as verb
 
     return verb.robot(options)
+
+
+@evaluation.command(name="teaming")
+def evaluate_teaming(options: Annotated[TeamingOptions, _FLAT]) -> int:
+    """Judge a humanoid, a quadruped and a drone at work with a person or another robot.
+
+    Example: vico eval teaming --category guide --method heuristic --method alone --worlds helsinki --out results
+    """
+    from vico.cli import evaluate as verb
+
+    return verb.teaming(options)
 
 
 @leaderboard.command(name="add")

@@ -31,6 +31,7 @@ from vico.cli.evaluation_options import (
     EvaluationOptions,
     InfluenceOptions,
     RobotOptions,
+    TeamingOptions,
 )
 from vico.cli.live import city_of, told
 from vico.cli.output import check_output, print_json
@@ -96,6 +97,15 @@ def commute(options: CommuteOptions) -> int:
     if not options.hours >= 0:
         raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
     return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
+
+
+def teaming(options: TeamingOptions) -> int:
+    """Judge robots at work with a person or with each other."""
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    setting: Setting = {"steps": options.steps, "period": options.period}
+    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
 
 
 def robot(options: RobotOptions) -> int:

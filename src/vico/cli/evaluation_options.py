@@ -169,6 +169,28 @@ class CommuteOptions:
 
 
 @dataclass(frozen=True)
+class TeamingOptions:
+    """What `vico eval teaming` is asked for.
+
+    Attributes
+    ----------
+    common
+        What every evaluation is asked for.
+    category
+        Of the tasks.
+    steps
+        Seconds of an episode at most.
+    period
+        Seconds between two actions of a robot: 0.5 is 2 Hz.
+    """
+
+    common: Common
+    category: Literal["accompany", "guide", "spot", "all"] = "all"
+    steps: int = 600
+    period: float = 0.5
+
+
+@dataclass(frozen=True)
 class RobotOptions:
     """What `vico eval robot` is asked for.
 

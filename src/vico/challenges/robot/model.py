@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.challenges.assistant.model import Person, Region, Start, TaskObject
-from vico.errors import SchemaError
-from vico.io.files import read_json, write_json
+from vico.challenges.task_files import check_thing, check_world, read_task_file
+from vico.io.files import write_json
 from vico.world.folder import World
 from vico.world.model import Record
 
@@ -103,29 +102,8 @@ def read_robot_task(path: Path, *, world: World | None = None) -> RobotTask:
     SchemaError
         If the file is damaged, of another version, made for another world, or names what the world does not have.
     """
-    content = read_json(path)
-    found = (content.get("schema_name"), content.get("version")) if isinstance(content, dict) else None
-    if found != (SCHEMA, VERSION):
-        raise SchemaError(f"{path}: not a robot task file of version {VERSION}; generate the task anew")
-    try:
-        task = RobotTask.model_validate(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "task"
-        raise SchemaError(f"{path}: {where}: {first['msg']}; generate the task anew") from None
-    if task.thing.kind not in movable_kinds() or task.thing.colour not in movable_colours():
-        raise SchemaError(
-            f"{path}: thing: there is no {task.thing.colour} {task.thing.kind}; add it to the movable things, or "
-            "generate the task anew"
-        )
+    task = read_task_file(path, RobotTask, schema=SCHEMA, version=VERSION, what="robot task")
+    check_thing(path, task.thing)
     if world is not None:
-        _check_against(task, world, path)
+        check_world(path, task, world, (task.source, task.destination))
     return task
-
-
-def _check_against(task: RobotTask, world: World, path: Path) -> None:
-    if task.world_digest != world.digest:
-        raise SchemaError(f"{path}: made for another world ({task.world}); generate the task for this one")
-    for region in (task.source, task.destination):
-        if region.place is not None and region.place not in world.place_by_id:
-            raise SchemaError(f"{path}: the world has no place {region.place!r}; generate the task anew")

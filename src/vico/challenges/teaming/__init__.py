@@ -1,0 +1,1 @@
+"""Human-robot teaming: a humanoid, a quadruped and a drone at small tasks with a person or another robot."""

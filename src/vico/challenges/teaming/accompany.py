@@ -1,0 +1,158 @@
+"""Accompany: a humanoid walks with a person to a door, and waits there.
+
+Task
+    Go to where somebody waits, call them, walk with them to the door of a place, stand there; they go in, and with some
+    of the tasks come out again.
+Randomizations
+    Person, pace, where they wait, place, whether and after how long they come out, time of day, the robot's place.
+Success
+    The robot was within 4 m of them for 80 % of the way. 20 s after they went in at the latest it stands upright and
+    still within 4 m of the door; if they come out again, it did so for 90 % of the time from then until they came out,
+    and does when they do. It never fell.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vico.agents.teaming.visitor import LETS_GO
+from vico.challenges.assistant.regions import place_region
+from vico.challenges.assistant.rules import entrance_of
+from vico.challenges.teaming.drawing import Draw, person_of
+from vico.challenges.teaming.looking import Look, away
+from vico.challenges.teaming.model import Member, TeamingTask, Walk
+from vico.challenges.teaming.thresholds import (
+    DOOR_DISTANCE,
+    DOOR_GRACE,
+    DOOR_SHARE,
+    LEAST_WALK,
+    MOST_WALK,
+    STANDS_FOR,
+    STAYS,
+    WAITS_WITHIN,
+    WITH_DISTANCE,
+    WITH_SHARE,
+)
+from vico.world.folder import World
+
+#: Who accompanies.
+ROBOT = "h1"
+#: Why it fails, in the order in which a table lists them.
+CAUSES = (
+    "not met",  # the person was never called
+    "fallen",  # the robot fell
+    "person lost",  # they went in, and it was not with them on the way
+    "not at the door",  # it did not stand at the door when it should have
+    "person never came",  # they were on the way, or inside, to the end
+)
+
+
+def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
+    """Draw a task; None where this start has no place to go to."""
+    who, hood = draw.asker()
+    world = draw.world
+    at_home = world.place_by_id[who.home].building
+    near = [p for p in hood.places_of(who) if p.entrance and LEAST_WALK <= hood.distance(p.position) <= MOST_WALK]
+    targets = [place for place in near if place.building != at_home]
+    waits = draw.spot(hood.start, *WAITS_WITHIN)
+    if not targets or waits is None:
+        return None
+    target = targets[draw.pick("Where to?", [place.name for place in targets], who)]
+    door = np.array(target.position[:2])
+    if not draw.has_ways(ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (door, DOOR_DISTANCE / 2)):
+        return None
+    comes_out = bool(draw.chance.integers(2))
+    stay = round(float(draw.chance.uniform(*STAYS)), 1) if comes_out else None
+    person, region = person_of(who), place_region(target)
+    end = "until they come out again" if comes_out else "until they have gone in"
+    text = (
+        f"{who.name}, {person.looks}, waits near by: go there and call them, walk with them to the door of "
+        f"{region.name}, and stand there {end}."
+    )
+    return TeamingTask(
+        **frame,
+        start=draw.hour(),
+        team=[Member(model=ROBOT, start=draw.stands(hood.start))],
+        text=text,
+        person=person,
+        walk=Walk(waits_at=draw.stands(waits, towards=np.asarray(hood.start)), pace=draw.pace(), stay=stay),
+        thing=None,
+        destination=region,
+        candidates=dict(draw.candidates),
+    )
+
+
+class Accompany:
+    """Follows one episode, a look a second.
+
+    Attributes
+    ----------
+    done_at
+        Second at which it was done; None before.
+    walked, beside
+        Looks at the person on the way, and those at which the robot was with them.
+    """
+
+    causes = CAUSES
+
+    def __init__(self, task: TeamingTask, world: World) -> None:
+        assert task.walk is not None
+        self._place, self._comes_out = task.destination.place, task.walk.stay is not None
+        self._door = entrance_of(task.destination, world)
+        self.done_at: float | None = None
+        self.over = False
+        self.walked = self.beside = 0
+        self._called = self._failed = False
+        self._inside_since: float | None = None
+        self._stood = 0.0
+        self._waited = self._at_door = 0
+
+    def look(self, look: Look) -> None:
+        """Take in how things stand."""
+        at_door = look.stands[0] and away(look.robots[0], self._door) <= DOOR_DISTANCE
+        self._stood = self._stood + 1.0 if at_door else 0.0
+        self._called = self._called or LETS_GO in look.said
+        if not self._called or self.over:
+            return
+        if self._inside_since is None:
+            self._walk(look)
+            return
+        inside = look.second - self._inside_since
+        if not self._comes_out:
+            self._end(look, good=self._stood >= STANDS_FOR, last=inside >= DOOR_GRACE)
+        elif look.outdoors:
+            enough = self._at_door >= DOOR_SHARE * self._waited
+            self._end(look, good=at_door and enough, last=True)
+        elif inside >= DOOR_GRACE:
+            self._waited += 1
+            self._at_door += at_door
+
+    def _walk(self, look: Look) -> None:
+        if look.place == self._place:
+            self._inside_since = look.second
+            self._failed = self.share() < 100.0 * WITH_SHARE
+            self.over = self._failed
+            return
+        self.walked += 1
+        self.beside += away(look.robots[0], look.person) <= WITH_DISTANCE
+
+    def _end(self, look: Look, *, good: bool, last: bool) -> None:
+        if good:
+            self.done_at = look.second
+        self.over = good or last
+
+    def share(self) -> float:
+        """Return on which share of the way the robot was with the person, percent."""
+        return 100.0 * self.beside / self.walked if self.walked else 0.0
+
+    def cause(self) -> str:
+        """Return why it failed; "" if it did not."""
+        if self.done_at is not None:
+            return ""
+        if not self._called:
+            return "not met"
+        if self._failed:
+            return "person lost"
+        return "not at the door" if self.over else "person never came"

@@ -1,0 +1,154 @@
+"""Task files of the teaming challenge: everything one episode needs, in JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from vico.assets.robots import robot_names
+from vico.challenges.assistant.model import Person, Region, Start, TaskObject
+from vico.challenges.task_files import check_thing, check_world, read_task_file
+from vico.errors import SchemaError
+from vico.io.files import write_json
+from vico.world.folder import World
+from vico.world.model import Record
+
+SCHEMA, VERSION = "vico.teaming_task", 1
+
+Category = Literal["accompany", "guide", "spot"]
+CATEGORIES: tuple[Category, ...] = ("accompany", "guide", "spot")
+
+
+class Member(Record):
+    """A robot of the team: its model, and where it begins. Robot ``i`` is the agent ``robot_i``."""
+
+    model: str
+    start: Start
+
+
+class Pause(Record):
+    """A stop on the way: after so many metres of walking, for so many seconds."""
+
+    after: Annotated[float, Field(ge=0.0)]
+    seconds: Annotated[float, Field(gt=0.0)]
+
+
+class Walk(Record):
+    """What the person does who is walked with; robots are told none of it but where they wait.
+
+    Attributes
+    ----------
+    waits_at
+        Where they wait to be called.
+    pace
+        Metres a second.
+    stay
+        With accompany: seconds until they come out again; None: they stay inside.
+    pauses
+        With guide: stops on the way.
+    """
+
+    waits_at: Start
+    pace: Annotated[float, Field(gt=0.0)]
+    stay: Annotated[float, Field(gt=0.0)] | None = None
+    pauses: tuple[Pause, ...] = ()
+
+
+class TeamingTask(Record):
+    """One episode.
+
+    Attributes
+    ----------
+    world_digest, community_digest
+        Identity of the world and of the community the task belongs to.
+    start
+        Time of day at which it begins, ``HH:MM``.
+    steps
+        Seconds at most.
+    team
+        The robots.
+    text
+        What they are told.
+    person
+        Who asks; with accompany and guide who is walked with.
+    walk
+        What that person does; None with spot.
+    thing
+        With spot what is looked for; robots are told its name, never where it lies. Else None.
+    destination
+        With accompany the place at whose door it ends; with guide where to; with spot the area to look in.
+    candidates
+        What was chosen from, by question, as the chooser saw it.
+    """
+
+    schema_name: str = SCHEMA
+    version: int = VERSION
+    category: Category
+    world: str
+    world_digest: str
+    community_digest: str
+    seed: int
+    start: Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")]
+    steps: Annotated[int, Field(ge=1)]
+    team: Annotated[list[Member], Field(min_length=1, max_length=2)]
+    text: str
+    person: Person
+    walk: Walk | None
+    thing: TaskObject | None
+    destination: Region
+    candidates: dict[str, list[str]]
+
+    @model_validator(mode="after")
+    def _parts_fit_the_category(self) -> Self:
+        spots = self.category == "spot"
+        if len(self.team) != (2 if spots else 1):
+            raise ValueError(f"{self.category}: a team of {len(self.team)}; it takes {2 if spots else 1}")
+        if (self.walk is None) != spots:
+            raise ValueError(f"{self.category}: {'somebody' if self.walk else 'nobody'} walks along")
+        if (self.thing is not None) != spots:
+            raise ValueError(f"{self.category}: {'a' if self.thing else 'no'} thing to look for")
+        if self.category == "accompany" and self.destination.place is None:
+            raise ValueError("accompany: the destination has no door; it has to be a place")
+        return self
+
+    def instruction(self) -> dict[str, Any]:
+        """Return what the robots are told: no position of the thing, nothing of the person's pace and stops."""
+        walk = self.walk
+        return {
+            "category": self.category,
+            "text": self.text,
+            "team": [member.model for member in self.team],
+            "person": None if walk is None else self.person.model_dump(),
+            "waits_at": None if walk is None else list(walk.waits_at.position),
+            "comes_out": walk is not None and walk.stay is not None,
+            "object": None if self.thing is None else self.thing.name,
+            "destination": self.destination.model_dump(),
+            "seconds": self.steps,
+        }
+
+
+def write_teaming_task(path: Path, task: TeamingTask) -> None:
+    """Write a task file."""
+    write_json(path, task.model_dump(mode="json"))
+
+
+def read_teaming_task(path: Path, *, world: World | None = None) -> TeamingTask:
+    """Read a task file.
+
+    Raises
+    ------
+    SchemaError
+        If the file is damaged, of another version, made for another world, or names what there is not.
+    """
+    task = read_task_file(path, TeamingTask, schema=SCHEMA, version=VERSION, what="teaming task")
+    if task.thing is not None:
+        check_thing(path, task.thing)
+    for member in task.team:
+        if member.model not in robot_names():
+            known = ", ".join(robot_names())
+            raise SchemaError(f"{path}: team: there is no robot {member.model!r}; there are {known}")
+    if world is not None:
+        check_world(path, task, world, [task.destination])
+    return task
