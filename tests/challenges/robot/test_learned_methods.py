@@ -5,15 +5,21 @@ from __future__ import annotations
 import importlib.util
 import pickle
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from command_line import vico
+from robot_field import drawn_field
+from vico.agents.robot.chunk_policy import ChunkPolicy, new_network
+from vico.agents.robot.chunk_shape import ChunkShape
+from vico.agents.robot.learned import LearnedArm, Stage
 from vico.agents.robot.skill import Errand
 from vico.agents.robot.thing_watch import ThingPose
 from vico.assets.robots import robot_model
+from vico.assets.shapes import box
 from vico.challenges.episodes import Outcome
 from vico.challenges.learning.manipulation import ArrayPolicy, make_manipulation
 from vico.challenges.learning.manipulation.policy import write_policy
@@ -22,12 +28,14 @@ from vico.challenges.registry import load_challenge
 from vico.challenges.robot import episode
 from vico.challenges.robot.arm_policies import ImitatingArm, ReinforcedArm
 from vico.challenges.robot.bodies import arm_body
-from vico.challenges.robot.policy_files import _controller, policy_setting, policy_settings
+from vico.challenges.robot.policy_files import _controller, policy_setting, policy_settings, read_arm_policy
 from vico.challenges.tables.summary import summarise
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
 from vico.io.files import sha256_of, write_json
 from vico.io.plain_data import decode, encode
 from vico.seeds import rng
+from vico.sim.config import SimConfig
+from vico.sim.simulation import Simulation
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
 BODY = arm_body(robot_model("manipulator"))
@@ -220,6 +228,44 @@ def test_vla_takes_a_file_or_a_folder_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "policy" / "pytorch_model.bin").write_bytes(b"pickle")
     with pytest.raises(SchemaError, match="never read"):
         policy_setting("vla", str(tmp_path / "policy"))
+
+
+@pytest.mark.skipif(not HAS_TORCH, reason="needs pip install 'virtual-community[imitation]'")
+@pytest.mark.filterwarnings("ignore")  # of torch, which the project's own warnings-are-errors is not about
+def test_a_policy_of_pictures_drives_and_moves_the_arm(tmp_path: Path) -> None:
+    shape = ChunkShape(side=32, chunk=4, words=8, vocabulary=16, width=32, heads=2, encoders=1, decoders=1)
+    torch, _ = new_network(shape)
+    torch.manual_seed(0)
+    sizes = {"state_mean": (20,), "state_std": (20,), "action_mean": (4, 11), "action_std": (4, 11)}
+    scales = {name: np.full(size, 0.01 * ("std" in name), np.float32) for name, size in sizes.items()}
+    scales["state_std"][:] = 1.0
+    np.savez(tmp_path / "policy.npz", **ChunkPolicy(shape, scales, new_network(shape)[1]).arrays())
+    setting = policy_setting("vla", str(tmp_path / "policy.npz"))
+    names = {"thing": SimpleNamespace(name="red toolbox"), "destination": SimpleNamespace(name="Cafe")}
+    task: Any = SimpleNamespace(category="deliver", seed=0, **names)
+    places = {"robot_0": (0.0, 0.0, 0.0)}
+    config = SimConfig(
+        robots=("manipulator",), robot_places=places, periods={"robot_0": 0.1}, observe=("robot_0",), image=64
+    )
+    sim = Simulation(drawn_field(), None, config)
+    size = (0.12, 0.2, 0.2)
+    thing = sim.scenario.add_object("p", "parcel", [box(size, (0, 0, 0.1))], (1.1, 0.3, 0.0), size=size, yaw=0.3)
+    arm = LearnedArm(BODY, read_arm_policy("vla", setting, task, BODY, period=0.1), period=0.1)
+    arm.pick(int(thing), np.array([1.1, 0.3, 0.0]))
+    observation = sim.step({"robot_0": {"type": "wait"}}).observations["robot_0"]
+    vectors: list[list[float]] = []
+    while len(vectors) < 8:
+        action = arm.act(observation)
+        if arm.stage is Stage.POLICY:
+            vectors.append(action["vector"])
+        observation = sim.step({"robot_0": action}).observations["robot_0"]
+        assert observation["state"]["action_status"] in ("ok", "ongoing")
+    assert np.isfinite(vectors).all()
+    assert np.ptp(vectors, axis=0)[:9].min() > 0.0
+    assert np.abs(np.array(vectors)[:, 9:]).max() > 0.0
+    again = LearnedArm(BODY, read_arm_policy("vla", setting, task, BODY, period=0.1), period=0.1)
+    again.restore(decode(encode(arm.state())))
+    assert again.act(observation) == arm.act(observation)
 
 
 def test_each_method_is_given_its_own_policy(tmp_path: Path) -> None:

@@ -34,6 +34,8 @@ _FACES = 0.4
 # A thing was picked once it has been lifted so far, metres, and pressed on so long; it was put down once no finger has
 # pressed on it for so long, seconds.
 _LIFTED, _HOLDS, _LETS_GO = 0.08, 0.25, 0.5
+# Fingers that did not pick a thing open by so much, metres.
+_LETS_GO_BY = 0.02
 # Before it is put down a thing is held so far beside its goal, metres, on either side of it.
 _BESIDE = 0.22
 # Gaps that are tried on the way to where a policy begins, metres; of their speed arms go with there; angles that count
@@ -224,7 +226,11 @@ class LearnedArm:
         """Bring the arm to where things are carried, or fold it; then the work is over."""
         self.outcome, self.why = outcome, why
         angles = np.asarray(observation["sensors"]["joint_position"], np.float64)
-        if thing is not None and presses(observation, self._entity).all():
+        if outcome == "failed" and not self._places:
+            # What was not picked is let go of where it is, rather than dropped later.
+            self._servos[7:] = np.minimum(angles[7:] + _LETS_GO_BY, self.body.opening)
+            self._worker.held = None
+        elif thing is not None and presses(observation, self._entity).all():
             self._worker.held = held_thing(self.body, angles[:7].copy(), thing.as_box(), float(angles[7:].min()))
         elif thing is not None:
             self._worker.held = None
