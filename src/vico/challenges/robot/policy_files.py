@@ -205,7 +205,7 @@ def _imitator(path: Path, *, seed: int) -> ChunkActor | LeRobotActor:
         raise SchemaError(
             f"policy: {path} looks at pictures of {policy.shape.side} pixels; robots of the challenge see {PICTURE}"
         )
-    return ChunkActor(policy)
+    return ChunkActor(policy, every=max(1, policy.shape.chunk // 2))
 
 
 def _files_of(path: Path) -> list[Path]:
