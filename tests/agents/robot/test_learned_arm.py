@@ -183,6 +183,11 @@ def test_a_policy_that_does_nothing_fails_in_time_and_one_that_gives_no_numbers_
     trial.policy.ways = []
     trial.until_done()
     assert (trial.arm.outcome, trial.arm.why) == ("failed", "the jaw closed on nothing")
+    trial.arm.fold()
+    trial.until_done()
+    assert (trial.arm.outcome, trial.arm.why) == ("folded", "")
+    felt = np.asarray(trial.observation["sensors"]["joint_position"])
+    np.testing.assert_allclose(felt[:7], BODY.rest, atol=0.06)
     trial.policy.gives = float("nan")
     trial.arm.pick(trial.thing, trial.position)
     with pytest.raises(InputError, match="holds nan"):

@@ -123,6 +123,12 @@ class LearnedArm:
         self._worker.place(spot, beside=beside)
         self._next(Stage.COME)
 
+    def fold(self) -> None:
+        """Begin to bring the arm to where things are carried, or to its rest; no policy is asked."""
+        self.outcome, self.why = "folded", ""
+        self._worker.fold()
+        self._next(Stage.FOLD)
+
     def lost(self, observation: Mapping[str, Any]) -> bool:
         """Return whether a jaw that held something feels it no more; see `ArmWorker.lost`."""
         return not self.busy and self._worker.lost(observation)

@@ -49,6 +49,9 @@ class ArmSkill(Protocol):
     def place(self, spot: Array, *, beside: Array | None = None) -> None:
         """Begin to put down what is held, with its underside at a spot, ENU metres."""
 
+    def fold(self) -> None:
+        """Begin to bring the arm to where things are carried, or to its rest with nothing in it."""
+
     def act(self, observation: Mapping[str, Any]) -> Action:
         """Return the action for the coming period."""
 
