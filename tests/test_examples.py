@@ -134,6 +134,13 @@ def test_an_arm_is_scored_on_lifting_a_box() -> None:
     assert "expert: success 1.00 at the end" in printed
 
 
+def test_a_learned_arm_is_a_method_of_the_challenge(helsinki_path: Path) -> None:
+    printed = run("20_learned_arm.py", "--world", str(helsinki_path), "--seconds", "3")
+    assert "actions (11,)" in printed
+    assert "random actions: reward -" in printed
+    assert "rl: SR 0, not found, 3 s" in printed
+
+
 def test_work_of_ones_own_is_shared_out(helsinki_path: Path) -> None:
     printed = [run("17_many_machines.py", str(helsinki_path), "nowhere", "--workers", n) for n in ("1", "2")]
     assert sorted(printed[0].splitlines()) == sorted(printed[1].splitlines())

@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from vico.challenges.records import Challenge, EpisodeRecord, Job, Progress
+from vico.challenges.records import Challenge, EpisodeRecord, Job, Progress, setting_of_task
 from vico.challenges.registry import foreign_parts
 from vico.errors import OutputError, SchemaError, VicoError, line_of, sentence_of
 from vico.io.data_files import own_folder
@@ -144,7 +144,7 @@ class Player:
 
     def _task(self, job: Job, world: str) -> Mapping[str, object]:
         """Return a job's task; methods that follow each other in it share it."""
-        which = (job.category, json.dumps(dict(job.setting), sort_keys=True), world, job.seed)
+        which = (job.category, json.dumps(dict(setting_of_task(job.setting)), sort_keys=True), world, job.seed)
         if self._last_task is None or self._last_task[0] != which:
             self._last_task = (which, self.challenge.task(job))
         return self._last_task[1]
@@ -201,7 +201,8 @@ def _key(challenge: Challenge, job: Job, world: str, task: Mapping[str, object],
         "code": code,
         "challenge": job.challenge,
         "category": job.category,
-        "setting": dict(job.setting),
+        # A policy is told by its hash, wherever it lies.
+        "setting": {name: value for name, value in job.setting.items() if name != "policy"},
         "seed": job.seed,
         "world": world,
         "task": task,

@@ -13,8 +13,16 @@ from vico.runner.foreign import Terms
 #: What decides an episode besides method, world and seed: ``assistants``, ``advanced``, ``steps``, ...
 Setting = Mapping[str, bool | int | float | str]
 
+#: Entries of a setting that say whose weights a method has: they tell methods apart, and no tasks.
+OF_POLICIES = ("policy", "policy_sha256")
+
 #: Called with a label, how far an episode is, and its limit.
 Progress = Callable[[str, int, int], None]
+
+
+def setting_of_task(setting: Setting) -> Setting:
+    """Return what of a setting decides the task, and so which episodes can be compared."""
+    return {name: value for name, value in setting.items() if name not in OF_POLICIES}
 
 
 @dataclass(frozen=True)

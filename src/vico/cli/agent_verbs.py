@@ -102,6 +102,7 @@ def evaluate_robot(options: Annotated[RobotOptions, _FLAT]) -> int:
     """Judge robots with an arm and a deck that bring things, and go along with people, by real contact.
 
     Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
+    Example: vico eval robot --method rl --policy runs/whole/policy.npz --worlds helsinki --out results
     """
     from vico.cli import evaluate as verb
 

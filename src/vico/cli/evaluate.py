@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import partial
@@ -113,9 +113,12 @@ def robot(options: RobotOptions) -> int:
     if options.steps < 1:
         raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
     categories = None if options.category == "all" else (options.category,)
+    from vico.challenges.robot.policy_files import policy_settings  # physics is slow to import
+
     by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
     setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
-    return judge("robot", categories, setting, options.common, methods=("heuristic",))
+    policies = policy_settings(options.common.method, options.policy)
+    return judge("robot", categories, setting, options.common, methods=("heuristic",), of_method=policies)
 
 
 def judge(
@@ -125,6 +128,7 @@ def judge(
     options: EvaluationOptions,
     *,
     methods: Sequence[str] = (),
+    of_method: Mapping[str, Setting] | None = None,
 ) -> int:
     """Play the episodes; leave tasks, episodes, ``results.json`` and ``results.md`` in ``options.out``.
 
@@ -137,6 +141,8 @@ def judge(
         All of the challenge's if None.
     methods
         If none are asked for.
+    of_method
+        What the setting says of single methods beside.
 
     Returns
     -------
@@ -162,6 +168,7 @@ def judge(
         first_seed=options.first_seed,
         terms=_terms(challenge, methods, options),
     )
+    jobs = [replace(job, setting={**job.setting, **(of_method or {}).get(job.method, {})}) for job in jobs]
     if not 0 <= options.workers <= 256:
         raise InputError(f"--workers {options.workers}; give a number of processes in 1..256, or 0 for one a processor")
     for path in worlds:

@@ -206,6 +206,9 @@ class RobotOptions:
         Seconds between two actions of a robot: 0.05 is 20 Hz.
     oracle_grasp
         Hands never lose what they closed on; without it friction alone holds.
+    policy
+        What training has written: for rl a file, for rl-decomposed the folder with both or LIFT.npz,PLACE.npz, for vla
+        a file or a LeRobot policy's folder. With several such methods METHOD=FILE, once for each.
     """
 
     common: Common
@@ -213,3 +216,4 @@ class RobotOptions:
     steps: int = 1500
     period: float = 0.05
     oracle_grasp: bool = False
+    policy: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()

@@ -18,6 +18,8 @@ TASKS = {
     "vico/Carry-v0": "make_carry",
     "vico/Delivery-v0": "make_delivery",
     "vico/Search-v0": "make_search",
+    "vico/RobotCarry-v0": "make_robot_carry",
+    "vico/RobotDeliver-v0": "make_robot_deliver",
     "vico/Influence-v0": "make_influence",
 }
 _LEARNING = "vico.challenges.learning.make"

@@ -15,6 +15,7 @@ from vico.agents.robot.body import Stance
 from vico.agents.robot.depositor import TAKEN
 from vico.agents.robot.driving import Drive
 from vico.agents.robot.sight import seen_at
+from vico.agents.robot.skill import ArmSkill
 from vico.agents.robot.team import Team, deck_spot, heard_from, says_come, told_seen, told_where
 from vico.agents.robot.worker import ArmWorker
 from vico.agents.state import AgentState
@@ -70,13 +71,23 @@ class Manipulator:
         Name of the carrier.
     uses_deck
         Whether things travel on the carrier's deck; else in the jaw.
+    worker
+        Picks and places; the arm's own skills if None.
     """
 
-    def __init__(self, told: Mapping[str, Any], team: Team, *, carrier: str, uses_deck: bool = True) -> None:
+    def __init__(
+        self,
+        told: Mapping[str, Any],
+        team: Team,
+        *,
+        carrier: str,
+        uses_deck: bool = True,
+        worker: ArmSkill | None = None,
+    ) -> None:
         self.told, self.team, self.carrier = dict(told), team, carrier
         self.uses_deck = uses_deck and told["category"] == "deliver"
         self.period = float(told["period"])
-        self.worker = ArmWorker(team.arm, period=self.period)
+        self.worker: ArmSkill = ArmWorker(team.arm, period=self.period) if worker is None else worker
         self.drive = Drive(period=self.period)
         self.stage = Stage.GO
         self.entity = 0

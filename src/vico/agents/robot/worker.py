@@ -158,6 +158,10 @@ class ArmWorker:
         self._begin(Work.FOLD, self._target, self._entity)
         self._next(Stage.CARRY)
 
+    def moved(self, servos: Array) -> None:
+        """Take in where somebody else has told the servos to be meanwhile, rad and metres, shape ``(9,)``."""
+        self._set, self._knows = np.array(servos, np.float64), True
+
     def lost(self, observation: Mapping[str, Any]) -> bool:
         """Return whether a jaw that held something feels it no more; then nothing is held.
 

@@ -15,6 +15,7 @@ from vico.challenges.commute.rules import LEGAL
 from vico.challenges.learning.env import TaskEnv
 from vico.challenges.learning.influence import InfluenceEnv
 from vico.challenges.learning.point_goal import KINDS, PointGoal, PointGoalOptions
+from vico.challenges.robot.model import Category as RobotCategory
 from vico.community import build_community
 from vico.community.model import Community
 from vico.envs.vector import VectorAgentEnv, makers
@@ -94,6 +95,38 @@ def make_assistant(world: World | Path | str, category: Category, **options: Any
     return TaskEnv(AssistantTask(found, people, category, AssistantOptions(**of_task), **settings), **of_env)
 
 
+def make_robot_carry(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/RobotCarry-v0``; see `make_robot_work`."""
+    return make_robot_work(world, "carry", **options)
+
+
+def make_robot_deliver(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/RobotDeliver-v0``; see `make_robot_work`."""
+    return make_robot_work(world, "deliver", **options)
+
+
+def make_robot_work(world: World | Path | str, category: RobotCategory, **options: Any) -> TaskEnv:
+    """Make an environment of the community robot challenge for its mobile manipulator.
+
+    Parameters
+    ----------
+    options
+        Those of `vico.challenges.learning.robot.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
+    """
+    from vico.challenges.learning.robot import RobotOptions, RobotWork  # physics, slow to import
+    from vico.challenges.robot.episode import world_and_people as world_and_residents
+    from vico.challenges.robot.thresholds import RESIDENTS as ROBOT_RESIDENTS
+
+    of_env, rest = _split(options, _OF_ENV)
+    of_task, settings = _split(rest, [field.name for field in fields(RobotOptions)])
+    settings.setdefault("form", "arrays")
+    if isinstance(world, World):
+        found, people = world, build_community(world, residents=ROBOT_RESIDENTS, seed=0)
+    else:
+        found, people = world_and_residents(Path(world))
+    return TaskEnv(RobotWork(found, people, category, RobotOptions(**of_task), **settings), **of_env)
+
+
 def make_influence(world: World | Path | str, **options: Any) -> InfluenceEnv:
     """Make ``vico/Influence-v0``; see `InfluenceEnv` for its options."""
     return InfluenceEnv(world_of(world), **options)
@@ -131,6 +164,8 @@ make_commute_vec = partial(make_task_vec, "make_commute")
 make_carry_vec = partial(make_task_vec, "make_carry")
 make_delivery_vec = partial(make_task_vec, "make_delivery")
 make_search_vec = partial(make_task_vec, "make_search")
+make_robot_carry_vec = partial(make_task_vec, "make_robot_carry")
+make_robot_deliver_vec = partial(make_task_vec, "make_robot_deliver")
 make_influence_vec = partial(make_task_vec, "make_influence")
 
 

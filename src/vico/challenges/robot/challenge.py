@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vico.agents.robot import METHODS
-from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
+from vico.challenges.records import OF_POLICIES, EpisodeRecord, Job, Metric, Progress
 from vico.challenges.robot.episode import play_robot_task, world_and_people
 from vico.challenges.robot.generate import generate_robot_task
 from vico.challenges.robot.judge import CAUSES
 from vico.challenges.robot.model import CATEGORIES, RobotTask
+from vico.challenges.robot.policy_files import LEARNED
 from vico.challenges.robot.thresholds import PERIOD, STEPS
 from vico.errors import InputError
 
@@ -27,12 +28,13 @@ class RobotChallenge:
     """Carry and Deliver by a mobile manipulator and a carrier, with real contact; see `vico.challenges.robot.generate`.
 
     Settings of a job: ``steps``, seconds at most; ``period``, seconds between two actions of a robot;
-    ``oracle_grasp``, whether hands never lose what they closed on.
+    ``oracle_grasp``, whether hands never lose what they closed on; of methods that were learned ``policy``, where
+    theirs lies, and its hash ``policy_sha256``.
     """
 
     name = "robot"
     categories: Sequence[str] = CATEGORIES
-    methods: Sequence[str] = METHODS
+    methods: Sequence[str] = (*METHODS, *LEARNED)
 
     def metrics(self, category: str) -> Sequence[Metric]:
         """Columns of a category's table; Ts counts failures as the limit."""
@@ -71,7 +73,7 @@ class RobotChallenge:
         category = next((one for one in CATEGORIES if one == job.category), None)
         if category is None:
             raise InputError(f"robot: no category called {job.category!r}; there are {', '.join(CATEGORIES)}")
-        unknown = sorted(set(job.setting) - {"steps", "period", "oracle_grasp"})
+        unknown = sorted(set(job.setting) - {"steps", "period", "oracle_grasp", *OF_POLICIES})
         if unknown:
             raise InputError(f"robot: there is no setting {unknown[0]!r}; there are steps, period and oracle_grasp")
         period = float(job.setting.get("period", PERIOD))

@@ -9,9 +9,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vico.agents.base import Agent
 from vico.agents.robot import METHODS, make_robots
+from vico.agents.robot.carrier import Carrier
 from vico.agents.robot.depositor import Depositor
+from vico.agents.robot.heuristic import Manipulator
+from vico.agents.robot.learned import LearnedArm
+from vico.agents.robot.thing_watch import ThingPose, Truth
 from vico.agents.schedule import followers_of
 from vico.agents.wrappers import usage_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
@@ -21,6 +27,7 @@ from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
 from vico.challenges.robot.bodies import team_of
 from vico.challenges.robot.judge import RobotJudge
 from vico.challenges.robot.model import RobotTask
+from vico.challenges.robot.policy_files import LEARNED, read_arm_policy
 from vico.challenges.robot.thresholds import PACE_HOME, PERIOD, RESIDENTS, WAITS
 from vico.clock import seconds_of_day
 from vico.community import build_community
@@ -28,6 +35,7 @@ from vico.community.folder import digest_of
 from vico.community.model import Community
 from vico.envs import Simulation, make
 from vico.errors import InputError, SchemaError
+from vico.quaternions import matrix_of
 from vico.runner.faults import FaultLog
 from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
 from vico.runner.gather import Gatherer
@@ -37,6 +45,8 @@ from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
 from vico.world.public import PublicMap
 
+#: The cause of an episode that ended as a learned policy gave numbers that are none.
+UNUSABLE = "unusable action"
 #: The robots, in the order of their names.
 TEAM = ("manipulator", "husky")
 MANIPULATOR, CARRIER = "robot_0", "robot_1"
@@ -65,10 +75,12 @@ def play_robot_task(
     Parameters
     ----------
     method
-        Name of a pair of robots (see `vico.agents.robot.METHODS`), or ``my_module:MyRobot``, which plays both.
+        Name of a pair of robots (see `vico.agents.robot.METHODS` and `vico.challenges.robot.policy_files.LEARNED`), or
+        ``my_module:MyRobot``, which plays both.
     setting
         ``period``: seconds between two actions of a robot. ``oracle_grasp``: whether hands never lose what they closed
-        on (`vico.sim.robots.oracle`); without it friction alone holds.
+        on (`vico.sim.robots.oracle`); without it friction alone holds. ``policy``, ``policy_sha256``: of a method that
+        was learned.
     terms
         On which terms robots from elsewhere take part.
     recording
@@ -80,6 +92,8 @@ def play_robot_task(
         If the task was made for another world, or for other people.
     InputError
         If there is no such method.
+    VicoError
+        If the method's policy cannot be used; see `vico.challenges.robot.policy_files.policy_setting`.
     """
     began = time.perf_counter()
     _check_made_for(task, world, community)
@@ -103,12 +117,13 @@ def play_robot_task(
     )
     sim = env.sim
     terms = terms or Terms()
-    robots = _robots(method, task, world, terms, period)
-    residents = _residents(task, community, env.public_map)
+    learned = _learned_arm(method, setting, task, sim, period) if method in LEARNED else None
+    robots = _robots(method, task, world, terms, period) if learned is None else _learned_robots(task, learned, period)
+    residents = residents_of_robot_task(task, community, env.public_map)
     truth, system = sim.ground_truth, sim.state.robots
     assert system is not None
     judge = RobotJudge(task, world, truth, system, lambda: sim.state.second)
-    trusted = residents | robots if method in METHODS else residents
+    trusted = residents | robots if method in (*METHODS, *LEARNED) else residents
     agents = Gatherer(residents | robots, trusted=trusted, deadline=terms.deadline, workers=terms.workers)
     runner = Runner(sim, agents, hooks=[judge])
     if progress is not None:
@@ -121,7 +136,12 @@ def play_robot_task(
             )
             runner.hooks.append(recorded)
         end = sim.state.second + task.steps
-        runner.run(100 * task.steps, until=lambda: judge.over or sim.state.second >= end)
+        runner.run(
+            100 * task.steps,
+            until=lambda: judge.over or sim.state.second >= end or (learned is not None and bool(learned.broken)),
+        )
+    if learned is not None and learned.broken:
+        judge.ended_by = UNUSABLE
     return _record(task, method, setting, judge, sim, runner.faults, robots, time.perf_counter() - began)
 
 
@@ -163,7 +183,8 @@ def _check_made_for(task: RobotTask, world: World, community: Community) -> None
         )
 
 
-def _residents(task: RobotTask, community: Community, public_map: PublicMap) -> dict[str, Agent]:
+def residents_of_robot_task(task: RobotTask, community: Community, public_map: PublicMap) -> dict[str, Agent]:
+    """Return who lives there, each on their day; with Carry one waits for the robots with a thing."""
     residents: dict[str, Agent] = dict(followers_of(community, public_map, seed=task.seed))
     if task.category == "carry":
         name = task.person.agent
@@ -185,6 +206,41 @@ def _robots(method: str, task: RobotTask, world: World, terms: Terms, period: fl
         except InputError as error:
             made[name] = AbsentAgent(str(error))
     return made
+
+
+def _learned_arm(method: str, setting: Setting, task: RobotTask, sim: Simulation, period: float) -> LearnedArm:
+    """Return the arm of a method that was learned; with an oracle's grasp it is told where the thing really is."""
+    team = team_of(robot_model(TEAM[0]), robot_model(TEAM[1]))
+    policy = read_arm_policy(method, setting, task, team.arm, period=period)
+    truth = truth_of(sim, task) if setting.get("oracle_grasp") else None
+    return LearnedArm(team.arm, policy, period=period, truth=truth)
+
+
+def _learned_robots(task: RobotTask, arm: LearnedArm, period: float) -> dict[str, Agent]:
+    """Return robots that drive, search and talk as the heuristic does; one has a learned arm."""
+    told = task.instruction() | {"period": period}
+    team = team_of(robot_model(TEAM[0]), robot_model(TEAM[1]))
+    return {
+        MANIPULATOR: Manipulator(told, team, carrier=CARRIER, worker=arm),
+        CARRIER: Carrier(MANIPULATOR, period=period),
+    }
+
+
+def truth_of(sim: Simulation, task: RobotTask) -> Truth:
+    """Return what tells where the thing of a task really is, as a box in the world."""
+    half = np.array(movable_kinds()[task.thing.kind].size) / 2.0
+    entity = sim.ground_truth.object_entity(task.thing.name)
+
+    def pose(asked: int) -> ThingPose | None:
+        if asked != entity:
+            return None
+        objects = sim.state.objects
+        k = objects.names.index(task.thing.name)
+        rotation = matrix_of(objects.orientation[k])
+        # Things are placed by the middle of their underside.
+        return ThingPose(objects.position[k] + rotation[:, 2] * half[2], rotation, half)
+
+    return pose
 
 
 def _record(

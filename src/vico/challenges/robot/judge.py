@@ -34,6 +34,7 @@ CAUSES = (
     "fallen",  # a robot fell, and was not on its way again
     "person lost",  # the person went home, and no robot was near for half of the way
     "out of time",  # the episode ended while it was on the way
+    "unusable action",  # a learned policy gave numbers that are none, which ended the episode
 )
 # A thing on a deck lies no lower than this above the ground, metres, and no farther than the second from its robot.
 _ON_DECK, _OF_DECK = 0.15, 0.9
@@ -125,6 +126,8 @@ class RobotJudge(Hook):
         self.story = Story()
         #: Second of the episode since which all is as it should be; None while it is not.
         self.done_at: float | None = None
+        #: Cause of an end that came from outside, as by a policy that gave no usable action; "" for none.
+        self.ended_by = ""
         self._start = seconds()
         self._looked = -1
         self._rests_since: float | None = None
@@ -176,6 +179,8 @@ class RobotJudge(Hook):
         story, position = self.story, self.truth.object_position(self.task.thing.name)
         if self.done_at is not None:
             return ""
+        if self.ended_by:
+            return self.ended_by
         if self.task.category == "carry" and story.put_down is None:
             return "not found"
         if story.held is None and story.seen is None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from vico.challenges.episodes import Outcome
-from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting
+from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting, setting_of_task
 from vico.challenges.tables.means import Estimate, estimate, estimate_of_means
 from vico.runner.faults import FAULT_KINDS
 
@@ -126,7 +126,8 @@ def summarise(challenge: Challenge, outcomes: Sequence[Outcome], *, reference: s
         if method != reference and group and groups.get((category, reference))
     ]
     averages = _averages(challenge, categories, methods, groups, reference)
-    return Summary(challenge.name, outcomes[0].job.setting, reference, rows, differences, averages)
+    setting = setting_of_task(outcomes[0].job.setting)
+    return Summary(challenge.name, setting, reference, rows, differences, averages)
 
 
 def _row(challenge: Challenge, category: str, method: str, outcomes: Sequence[Outcome]) -> Row:
