@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.assets.robots.ground import narrow_ground
 from vico.challenges.robot.thresholds import LEVEL
-from vico.sim.robots.narrow import narrow_ground
 from vico.world.folder import World
 
 # The ground is looked at so far to either side of a point, metres.

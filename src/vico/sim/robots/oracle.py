@@ -10,7 +10,7 @@ affair, and it does not go through doors. One sees it in the observation (``stat
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,21 @@ _CLOSES = 2e-4
 _FINGERS = slice(7, 9)  # of the targets of an arm's motors
 
 
+class Hand(NamedTuple):
+    """A hand: its arm, the names of the links of its fingers, and how far each of them opens at most, metres."""
+
+    chain: Chain
+    fingers: tuple[str, ...]
+    opening: float
+
+
 class OracleGrasp:
     """What the hands of a run's robots hold by oracle.
 
     Parameters
     ----------
-    chains, fingers
-        The arms, and the names of the links of their fingers, by robot.
+    hands
+        By robot.
     entities
         Of all robots, int32, shape ``(n,)``.
 
@@ -47,31 +55,29 @@ class OracleGrasp:
         Of the thing in each robot's hand, 0 for none, int32, shape ``(n,)``.
     """
 
-    def __init__(
-        self, chains: Mapping[int, Chain], fingers: Mapping[int, tuple[str, ...]], entities: NDArray[np.int32]
-    ) -> None:
-        self._chains, self._fingers, self._robots = dict(chains), dict(fingers), entities
+    def __init__(self, hands: Mapping[int, Hand], entities: NDArray[np.int32]) -> None:
+        self._hands, self._robots = dict(hands), entities
         self.entity = np.zeros(len(entities), np.int32)
         self._place = np.zeros((len(entities), 7))  # of the thing in the hand's frame: position, quaternion
-        self._apart = np.zeros(len(entities))  # of fingers, when they were looked at last, or touched what they hold
+        self._apart = np.zeros(len(entities))  # of fingers, when they were looked at last
+        self._touched = np.zeros(len(entities))  # and when they touched what they hold
 
     def hold(self, engine: PhysicsEngine, objects: MovableObjects) -> None:
         """Take what hands have closed on, keep it in its place, and let go of it."""
-        for robot, chain in self._chains.items():
+        for robot, own in self._hands.items():
             angles = engine.joints(robot)[0]
-            apart = float(angles[_FINGERS].min())
+            apart, before = float(angles[_FINGERS].min()), float(self._apart[robot])
+            self._apart[robot] = apart
             if self.entity[robot]:
                 k = objects.index(int(self.entity[robot]))
                 if objects.holder[k] != self._robots[robot]:
                     self.entity[robot] = 0  # somebody has taken it
-                elif apart > self._apart[robot] + OPENS:
+                elif apart > self._touched[robot] + OPENS and apart >= before:
                     self.entity[robot] = objects.holder[k] = 0
                 else:
-                    self._move(robot, k, _hand(engine, robot, chain, angles[:7]), objects)
-            else:
-                if apart < self._apart[robot] - _CLOSES:
-                    self._close(robot, engine, _hand(engine, robot, chain, angles[:7]), objects)
-                self._apart[robot] = apart
+                    self._move(robot, k, _hand(engine, robot, own.chain, angles[:7]), objects)
+            elif apart < before - _CLOSES:
+                self._close(robot, engine, _hand(engine, robot, own.chain, angles[:7]), objects)
 
     def spread(self, robots: NDArray[np.int64], targets: Array) -> Array:
         """Return motor targets of robots, shape ``(k, m)``, with fingers kept where they touch what they hold."""
@@ -79,22 +85,25 @@ class OracleGrasp:
         if not holds.any():
             return targets
         kept = targets.copy()
-        kept[holds, _FINGERS] = np.maximum(kept[holds, _FINGERS], self._apart[robots[holds], None])
+        kept[holds, _FINGERS] = np.maximum(kept[holds, _FINGERS], self._touched[robots[holds], None])
         return kept
 
     def _close(self, robot: int, engine: PhysicsEngine, hand: Array, objects: MovableObjects) -> None:
         """Take a thing that a closing jaw touches and is about."""
         links, contacts = engine.link_names(robot), engine.contacts()
-        touched = set().union(*(contacts.objects_at(robot, links.index(name)) for name in self._fingers[robot]))
+        own = self._hands[robot]
+        touched = set().union(*(contacts.objects_at(robot, links.index(name)) for name in own.fingers))
         if not touched:
             return
         at, turn = hand[:, 3], hand[:, :3]
         for k in np.flatnonzero((objects.holder == 0) & (objects.room < 0)).tolist():
-            own, half = objects.rotation(k), objects.size[k] / 2
-            inside = apply_matrix(at - objects.position[k], own.T) - (0.0, 0.0, half[2])
+            lies, half = objects.rotation(k), objects.size[k] / 2
+            inside = apply_matrix(at - objects.position[k], lies.T) - (0.0, 0.0, half[2])
             if np.all(np.abs(inside) <= half + MARGIN):
                 away = apply_matrix(objects.position[k] - at, turn.T)
-                self._place[robot] = [*away, *quaternion_of(_product(turn.T, own))]
+                self._place[robot] = [*away, *quaternion_of(_product(turn.T, lies))]
+                # Who holds what is as wide as the jaw can still open it.
+                self._touched[robot] = min(float(self._apart[robot]), own.opening - OPENS - _CLOSES)
                 self.entity[robot], objects.holder[k], objects.hand[k] = objects.entity[k], self._robots[robot], -1
                 return
 
@@ -108,7 +117,7 @@ class OracleGrasp:
         return {
             "oracle_entity": self.entity.copy(),
             "oracle_place": self._place.copy(),
-            "oracle_apart": self._apart.copy(),
+            "oracle_fingers": np.column_stack([self._apart, self._touched]),
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -122,7 +131,7 @@ class OracleGrasp:
         if "oracle_entity" not in arrays or arrays["oracle_entity"].shape != self.entity.shape:
             raise SchemaError("robots: the saved state is of a run without oracle grasp, or of other robots")
         self.entity[:], self._place[:] = arrays["oracle_entity"], arrays["oracle_place"]
-        self._apart[:] = arrays["oracle_apart"]
+        self._apart[:], self._touched[:] = arrays["oracle_fingers"].T
 
 
 def _hand(engine: PhysicsEngine, robot: int, chain: Chain, angles: Array) -> Array:

@@ -20,7 +20,7 @@ from vico.sim.robots.batteries import charge_of, watch_batteries
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
 from vico.sim.robots.motors import AllRotors, command_motors, velocities
-from vico.sim.robots.oracle import OracleGrasp
+from vico.sim.robots.oracle import Hand, OracleGrasp
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import turning_radius
 from vico.sim.robots.scene import RobotScene
@@ -206,10 +206,12 @@ class RobotPopulation:
     def give_oracle_grasp(self) -> None:
         """Have hands never lose what they closed on, from now on; before the first step."""
         work = [one for one in self.run.work if one is not None]
-        arms = {int(robot): one for one in work for robot in one.robots.tolist()}
-        chains = {robot: one.chain for robot, one in arms.items()}
-        fingers = {robot: one.model.sensors.contacts for robot, one in arms.items()}
-        self.run.oracle = OracleGrasp(chains, fingers, self.entities)
+        hands = {
+            int(robot): Hand(one.chain, one.model.sensors.contacts, one.opening)
+            for one in work
+            for robot in one.robots.tolist()
+        }
+        self.run.oracle = OracleGrasp(hands, self.entities)
 
     def held_by_oracle(self, robot: int) -> int:
         """Return the entity of what a hand holds by oracle grasp; 0 for nothing, and in runs without that."""

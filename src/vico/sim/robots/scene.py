@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import TICK, RobotModel, robot_model
+from vico.assets.robots.ground import narrow_ground
 from vico.sim.bodies import ROBOT
 from vico.sim.indoor import Indoor
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
@@ -18,7 +19,6 @@ from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.airspace import Airspace
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
-from vico.sim.robots.narrow import narrow_ground
 from vico.sim.robots.rooms import RobotRooms
 from vico.world.folder import World
 from vico.world.heights import HeightField

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
+from vico.assets.robots.model import RobotModel
 from vico.world.folder import World
 
 #: Metres a robot leaves to walls on its way.
