@@ -28,6 +28,7 @@ from vico.challenges.episodes import Outcome, label_of
 from vico.challenges.evaluation import evaluate, jobs_for
 from vico.challenges.records import Challenge, Setting
 from vico.challenges.registry import load_challenge
+from vico.challenges.robot.policy_files import LEARNED
 from vico.challenges.tables.files import write_results
 from vico.challenges.tables.published import published_rows
 from vico.challenges.windows import window_list
@@ -105,8 +106,8 @@ TABLES = {
 
 
 def offline_methods(challenge: Challenge) -> list[str]:
-    """Return the methods that need no language model; where methods compete, every pair of two of them."""
-    methods = [method for method in challenge.methods if "llm" not in method]
+    """Return the methods that need no language model, and no policy of one's own; where methods compete, every pair of two of them."""
+    methods = [method for method in challenge.methods if "llm" not in method and method not in LEARNED]
     if challenge.name == "influence":  # ours, which comes last, is the first of its pairs
         return [f"{other}+{one}" for i, one in enumerate(methods) for other in methods[i + 1 :]]
     return methods
