@@ -106,7 +106,7 @@ TABLES = {
 
 
 def offline_methods(challenge: Challenge) -> list[str]:
-    """Return the methods that need no language model, and no policy of one's own; where methods compete, every pair of two of them."""
+    """Return the methods that need neither a language model nor a policy; where they compete, all pairs of two."""
     methods = [method for method in challenge.methods if "llm" not in method and method not in LEARNED]
     if challenge.name == "influence":  # ours, which comes last, is the first of its pairs
         return [f"{other}+{one}" for i, one in enumerate(methods) for other in methods[i + 1 :]]

@@ -2,6 +2,7 @@
 
 python scripts/model_sheet.py docs/images/things.png
 python scripts/model_sheet.py --room indoor out/furniture.png
+python scripts/model_sheet.py --room carried docs/images/carried.png
 
 Models of the folder that VICO_DATA names are among them, so it shows what one has added.
 """
@@ -15,6 +16,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from vico.assets.models.furniture import furniture_models
 from vico.assets.models.model import Model
+from vico.assets.models.model import model as model_of
+from vico.assets.models.movable import movable_colours, movable_kinds, movable_surfaces
 from vico.assets.models.street import street_models
 from vico.assets.shapes import box
 from vico.render import Cameras, Scene, render
@@ -25,13 +28,23 @@ FIELD_OF_VIEW = np.radians(24.0)
 TOWARDS = np.array([0.78, -0.5, 0.38])  # where the camera is, seen from the model: people use things from +x
 
 
+def carried_models() -> dict[str, Model]:
+    """Return the things that people carry, each in a colour of its own."""
+    colours = list(movable_colours())
+    painted = {kind: colours[k % len(colours)] for k, kind in enumerate(movable_kinds())}
+    return {kind: model_of(kind, movable_surfaces(kind, colour)) for kind, colour in painted.items()}
+
+
+ROOMS = {"outdoor": street_models, "indoor": furniture_models, "carried": carried_models}
+
+
 def main() -> None:
     """Draw the models of a room."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, help="picture to write")
-    parser.add_argument("--room", choices=("outdoor", "indoor"), default="outdoor")
+    parser.add_argument("--room", choices=tuple(ROOMS), default="outdoor")
     arguments = parser.parse_args()
-    models = street_models() if arguments.room == "outdoor" else furniture_models()
+    models = ROOMS[arguments.room]()
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     sheet(models).save(arguments.out, optimize=True)
 

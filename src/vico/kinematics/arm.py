@@ -27,29 +27,68 @@ class Chain(NamedTuple):
 
 
 @compiled
+def joint_origin(chain, k, r, p):  # type: ignore[no-untyped-def]
+    """Move on from joint `k` - 1 to where joint `k` is; `r` and `p` are what has been reached of the chain."""
+    for i in range(3):
+        step = 0.0
+        for j in range(3):
+            step += r[i, j] * chain.places[k, j]
+        p[i] += step
+
+
+@compiled
+def joint_turn(chain, k, angle, r):  # type: ignore[no-untyped-def]
+    """Turn what has been reached of the chain about joint `k`."""
+    c, s = math.cos(angle), math.sin(angle)
+    for i in range(3):
+        a, b, d = r[i, 0], r[i, 1], r[i, 2]
+        if chain.axes[k, 2] > 0.5:  # about z
+            r[i, 0], r[i, 1] = c * a + s * b, c * b - s * a
+        else:  # about y
+            r[i, 0], r[i, 2] = c * a - s * d, s * a + c * d
+
+
+@compiled
 def hand_pose(chain, angles, origins, directions, out):  # type: ignore[no-untyped-def]
     """Write the hand's rotation (columns 0-2) and position (column 3) in the base's frame, and each joint's place."""
     r = np.eye(3)
     p = np.zeros(3)
     for k in range(len(angles)):
-        for i in range(3):
-            step = 0.0
-            for j in range(3):
-                step += r[i, j] * chain.places[k, j]
-            p[i] += step
+        joint_origin(chain, k, r, p)
         for i in range(3):
             origins[k, i] = p[i]
             directions[k, i] = r[i, 0] * chain.axes[k, 0] + r[i, 1] * chain.axes[k, 1] + r[i, 2] * chain.axes[k, 2]
-        c, s = math.cos(angles[k]), math.sin(angles[k])
-        for i in range(3):
-            a, b, d = r[i, 0], r[i, 1], r[i, 2]
-            if chain.axes[k, 2] > 0.5:  # about z
-                r[i, 0], r[i, 1] = c * a + s * b, c * b - s * a
-            else:  # about y
-                r[i, 0], r[i, 2] = c * a - s * d, s * a + c * d
+        joint_turn(chain, k, angles[k], r)
     for i in range(3):
         out[i, :3] = r[i]
         out[i, 3] = p[i] + r[i, 2] * chain.grip
+
+
+@compiled
+def hand_error(pose, goal, error):  # type: ignore[no-untyped-def]
+    """Write what is left to a pose, metres and radians; return both summed."""
+    for i in range(3):
+        error[i] = goal[i, 3] - pose[i, 3]
+        error[3 + i] = 0.0
+    for axis in range(3):
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            error[3 + i] += 0.5 * (pose[j, axis] * goal[k, axis] - pose[k, axis] * goal[j, axis])
+    left = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+    left += math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+    return left
+
+
+@compiled
+def hand_jacobian(pose, origins, directions, out):  # type: ignore[no-untyped-def]
+    """Write how the hand moves and turns with each joint, shape ``(6, n)``."""
+    for k in range(len(origins)):
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            out[i, k] = directions[k, a] * (pose[b, 3] - origins[k, b]) - directions[k, b] * (
+                pose[a, 3] - origins[k, a]
+            )
+            out[3 + i, k] = directions[k, i]
 
 
 @compiled
@@ -91,24 +130,10 @@ def solve(chain, angles, goal, steps):  # type: ignore[no-untyped-def]
     left = 1e9
     for _ in range(steps):
         hand_pose(chain, angles, origins, directions, pose)
-        for i in range(3):
-            error[i] = goal[i, 3] - pose[i, 3]
-            error[3 + i] = 0.0
-        for axis in range(3):
-            for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
-                error[3 + i] += 0.5 * (pose[j, axis] * goal[k, axis] - pose[k, axis] * goal[j, axis])
-        left = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
-        left += math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+        left = hand_error(pose, goal, error)
         if left < 1e-4:
             break
-        for k in range(n):
-            for i in range(3):
-                a, b = (i + 1) % 3, (i + 2) % 3
-                jacobian[i, k] = directions[k, a] * (pose[b, 3] - origins[k, b]) - directions[k, b] * (
-                    pose[a, 3] - origins[k, a]
-                )
-                jacobian[3 + i, k] = directions[k, i]
+        hand_jacobian(pose, origins, directions, jacobian)
         damped_step(jacobian, error, change)
         most = np.abs(change).max()
         share = min(1.0, _LONGEST / most) if most > 0.0 else 0.0

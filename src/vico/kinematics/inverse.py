@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.kinematics.arm import damped_step, hand_pose
+from vico.kinematics.arm import damped_step, hand_error, hand_jacobian, hand_pose
 from vico.kinematics.planning import Arm, is_free
 from vico.seeds import rng
 
@@ -73,27 +72,13 @@ def solve_near(chain, angles, goal, posture, steps):  # type: ignore[no-untyped-
     left = 1e9
     for step in range(steps):
         hand_pose(chain, angles, origins, directions, pose)
-        for i in range(3):
-            error[i] = goal[i, 3] - pose[i, 3]
-            error[3 + i] = 0.0
-        for axis in range(3):
-            for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
-                error[3 + i] += 0.5 * (pose[j, axis] * goal[k, axis] - pose[k, axis] * goal[j, axis])
-        left = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
-        left += math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+        left = hand_error(pose, goal, error)
         # Half a turn off there is no error that leads back.
         if left < 1e-4 and pose[0, 0] * goal[0, 0] + pose[1, 0] * goal[1, 0] + pose[2, 0] * goal[2, 0] < 0.0:
             return 1e9
         if left < 1e-4 and step > steps // 2:
             break
-        for k in range(n):
-            for i in range(3):
-                a, b = (i + 1) % 3, (i + 2) % 3
-                jacobian[i, k] = directions[k, a] * (pose[b, 3] - origins[k, b]) - directions[k, b] * (
-                    pose[a, 3] - origins[k, a]
-                )
-                jacobian[3 + i, k] = directions[k, i]
+        hand_jacobian(pose, origins, directions, jacobian)
         damped_step(jacobian, error, change)
         # In the last steps the hand alone counts.
         share = _DRAWN if step < steps // 2 else 0.0

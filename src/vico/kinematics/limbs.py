@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.kinematics.arm import Chain
+from vico.kinematics.arm import Chain, joint_origin, joint_turn
 
 Array = NDArray[np.float64]
 
@@ -125,18 +125,8 @@ def ball_places(chain, limbs, angles, out):  # type: ignore[no-untyped-def]
     p = np.zeros(3)
     ball = 0
     for k in range(len(angles)):
-        for i in range(3):
-            step = 0.0
-            for j in range(3):
-                step += r[i, j] * chain.places[k, j]
-            p[i] += step
-        c, s = math.cos(angles[k]), math.sin(angles[k])
-        for i in range(3):
-            a, b, d = r[i, 0], r[i, 1], r[i, 2]
-            if chain.axes[k, 2] > 0.5:  # about z
-                r[i, 0], r[i, 1] = c * a + s * b, c * b - s * a
-            else:  # about y
-                r[i, 0], r[i, 2] = c * a - s * d, s * a + c * d
+        joint_origin(chain, k, r, p)
+        joint_turn(chain, k, angles[k], r)
         while ball < len(limbs.link) and limbs.link[ball] == k:
             for i in range(3):
                 out[ball, i] = (

@@ -9,7 +9,8 @@ import pytest
 
 from robot_field import drawn_field
 from vico.agents.robot.body import Stance
-from vico.agents.robot.worker import ArmWorker, Stage
+from vico.agents.robot.stages import Stage
+from vico.agents.robot.worker import ArmWorker
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.challenges.robot.bodies import arm_body
@@ -36,12 +37,14 @@ class Trial:
         *,
         table: float = 0.0,
         carrier: bool = False,
+        assistants: int = 0,
     ) -> None:
         robots = ("manipulator", "husky") if carrier else ("manipulator",)
         places = {"robot_0": (0.0, 0.0, 0.0)} | ({"robot_1": (2.5, -3.0, 0.6)} if carrier else {})
         config = SimConfig(
             robots=robots,
             robot_places=places,
+            assistants=assistants,
             periods=dict.fromkeys(places, PERIOD),
             observe=("robot_0",),
             outputs=("depth", "segmentation"),
@@ -153,3 +156,37 @@ def test_what_is_taken_away_is_no_grip() -> None:
 def test_a_robot_without_an_arm_has_no_body_of_one() -> None:
     with pytest.raises(InputError, match="has no arm on a base that drives"):
         arm_body(robot_model("husky"))
+
+
+def test_what_is_held_out_is_let_go_of_once_a_person_takes_it() -> None:
+    trial = Trial((0.12, 0.2, 0.1), (1.4, 0.2, 0.0), assistants=1)
+    trial.sim.scenario.place_agent("assistant_0", (0.6, 2.6, 0.0))
+    trial.worker.pick(trial.thing, np.array([1.4, 0.2, 0.0]))
+    trial.until_done()
+    assert trial.worker.outcome == "picked"
+    person = np.array([0.6, 2.6, 0.0])
+    trial.worker.offer(person)
+    trial.until_done(stage=Stage.GRIP)
+    for _ in range(60):
+        action = trial.worker.act(trial.observations["robot_0"])
+        trial.observations = dict(trial.sim.step({"robot_0": action}).observations)
+    assert trial.worker.busy  # it waits, and holds on
+    assert np.hypot(*(trial.position - person)[:2]) < 0.8
+    assert 0.6 < trial.position[2] < 1.2
+    takes = {"type": "pick", "hand": 0, "object": trial.thing}  # once the person is due: every second
+    for _ in range(300):
+        action = trial.worker.act(trial.observations["robot_0"])
+        if not trial.worker.busy:
+            break
+        trial.observations = dict(trial.sim.step({"robot_0": action, "assistant_0": takes}).observations)
+    assert (trial.worker.outcome, trial.worker.held) == ("handed_over", None)
+    assert trial.sim.state.objects.holder[0] == trial.sim.state.people.entity[0]
+
+
+def test_what_has_rolled_under_a_car_is_out_of_reach() -> None:
+    trial = Trial((0.12, 0.14, 0.1), (3.0, 0.0, 0.0), table=0.22)
+    trial.sim.state.objects.position[0] = (3.0, 0.0, 0.0)
+    trial.worker.pick(trial.thing, np.array([3.0, 0.0, 0.0]))
+    trial.until_done(seconds=90.0)
+    assert trial.worker.outcome == "failed"
+    assert trial.worker.why in ("not seen", "out of reach", "no way there")

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vico.agents.robot.grasps import ROOM, Grasp, grasps_of, thing_box
+from vico.assets.models.movable import movable_surfaces
 from vico.assets.robots import robot_model
 from vico.challenges.robot.bodies import arm_body
 
@@ -67,3 +68,29 @@ def test_what_is_high_up_is_taken_from_the_side_and_what_is_too_wide_not_at_all(
     wide = thing_box(seen((0.5, 0.4, 0.3), (0.7, 0.0, -0.1), 0.0))
     assert wide is not None
     assert grasps_of(wide, BODY) == []
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.9, 2.0, 4.0])
+def test_a_can_is_held_by_its_body_and_not_by_spout_or_handle(yaw: float) -> None:
+    stream = np.random.default_rng(6)
+    c, s = np.cos(yaw), np.sin(yaw)
+    turn, at = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), np.array([0.65, 0.05, -0.25])
+    found = []
+    for surface in movable_surfaces("watering can", "red"):
+        corners = surface.positions[surface.triangles].astype(np.float64) @ turn.T + at
+        faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        seen_from = np.array([0.0, 0.0, 0.9]) - corners.mean(axis=1)
+        shown = (faces * seen_from).sum(axis=1) > 0.0
+        counts = np.ceil(np.linalg.norm(faces, axis=1) / 2 * 40_000 * shown).astype(int)
+        share = stream.dirichlet(np.ones(3), int(counts.sum()))
+        found.append(np.einsum("sk,skc->sc", share, np.repeat(corners, counts, axis=0)))
+    points = np.concatenate(found)
+    box = thing_box(points)
+    assert box is not None
+    grasps = grasps_of(box, BODY, points)
+    assert np.hypot(*(box.centre - at[:2])) > 0.03  # the box's middle is off the body
+    first = grasps[0]
+    assert first.pose[2, 2] == pytest.approx(-1.0)
+    assert first.opening > 0.125
+    off = first.pose[:2, 3] - at[:2]
+    assert np.hypot(*off) < 0.035

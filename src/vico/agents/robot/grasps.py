@@ -26,6 +26,10 @@ _TOO_HIGH = 0.75
 _FEWEST, _STRAYS = 12, 0.01
 # Fingers keep off what a thing stands on, metres.
 _OFF = 0.012
+# The jaw is so much wider, metres, where it closes towards whoever looks: the far side of a thing is hidden.
+_HIDDEN = 0.015
+# Half the width of a pad; widths are compared so close to each other, metres; share of the largest that is as wide.
+_PAD_WIDE, _BIN, _WIDE = 0.05, 0.015, 0.85
 
 
 class ThingBox(NamedTuple):
@@ -102,28 +106,39 @@ def thing_box(points: Array) -> ThingBox | None:
     return ThingBox(centre, axes[order], half[order], float(low), float(high))
 
 
-def grasps_of(box: ThingBox, body: ArmBody) -> list[Grasp]:
-    """Return ways to take hold of a thing, those that hold best first; none if it is too wide for the jaw."""
-    above, side = _from_above(box, body), _from_the_side(box, body)
+def grasps_of(box: ThingBox, body: ArmBody, points: Array | None = None) -> list[Grasp]:
+    """Return ways to take hold of a thing, those that hold best first; none if it is too wide for the jaw.
+
+    Parameters
+    ----------
+    points
+        Of the thing, that the box is round: where it is wide, the pads hold it; None for anywhere in the box.
+    """
+    seen = np.zeros((0, 3)) if points is None else points
+    above, side = _from_above(box, body, seen), _from_the_side(box, body, seen)
     return side + above if box.high > _TOO_HIGH else above + side
 
 
-def _from_above(box: ThingBox, body: ArmBody) -> list[Grasp]:
+def _from_above(box: ThingBox, body: ArmBody, seen: Array) -> list[Grasp]:
     # The pads hold the upper part of what is high, and do not touch the ground beside what is low.
     grip = max(box.high - 0.06, box.low + PADS + _OFF)
     found: list[Grasp] = []
-    for axis in (0, 1):
-        opening = float(box.half[axis]) + ROOM
-        if opening > body.opening:
-            break
-        at, along = np.array([*box.centre, grip]), box.axes[axis]
+    for axis in sorted((0, 1), key=lambda axis: _opening(box, axis)):
+        opening = _opening(box, axis)
+        if float(box.half[axis]) + ROOM > body.opening:
+            continue
+        across, along = box.axes[axis], box.axes[1 - axis]
+        first, last = _wide_part(box, seen, axis, low=grip - PADS)
+        room = min(_PAD_WIDE, (last - first) / 2)
+        level = box.centre + along * min(max(0.0, first + room), last - room)
         for tilt in _TILTS:
             for sign in (1.0, -1.0):
-                found.append(Grasp(downward(at, along * sign, tilt), opening, np.array([0.0, 0.0, BACK])))
+                pose = downward(np.array([*level, grip]), across * sign, tilt)
+                found.append(Grasp(pose, min(opening, body.opening), np.array([0.0, 0.0, BACK])))
     return found
 
 
-def _from_the_side(box: ThingBox, body: ArmBody) -> list[Grasp]:
+def _from_the_side(box: ThingBox, body: ArmBody, seen: Array) -> list[Grasp]:
     if box.high - box.low < _TALL:
         return []
     away = box.centre / max(float(np.hypot(*box.centre)), 1e-6)
@@ -132,13 +147,14 @@ def _from_the_side(box: ThingBox, body: ArmBody) -> list[Grasp]:
     for axis in (0, 1):
         # Pads lie flat on two faces: what is held by its edges turns, and slips.
         across, opening = box.axes[axis], float(box.half[axis]) + ROOM
-        ahead = np.array([across[1], -across[0]])
+        ahead = box.axes[1 - axis]
         ahead = ahead if ahead @ away > 0.0 else -ahead
         if opening > body.opening or float(ahead @ away) < _ASIDE:
             continue
         # The pads reach into what is deep, not through it.
-        deep = float(np.abs(box.axes @ ahead) @ box.half)
-        at = np.array([*(box.centre - ahead * max(deep - 0.05, 0.0)), grip])
+        first, last = _wide_part(box, seen, axis, low=grip - PADS, high=grip + PADS)
+        near = first if ahead @ box.axes[1 - axis] > 0.0 else -last
+        at = np.array([*(box.centre + ahead * min(near + 0.05, 0.5 * (last - first) + near)), grip])
         for slant in _SLANTS:
             z = np.array([*(ahead * math.cos(slant)), -math.sin(slant)])
             for sign in (1.0, -1.0):
@@ -146,3 +162,35 @@ def _from_the_side(box: ThingBox, body: ArmBody) -> list[Grasp]:
                 pose = np.column_stack([np.cross(y, z), y, z, at])
                 found.append(Grasp(pose, opening, -z * BACK))
     return found
+
+
+def _opening(box: ThingBox, axis: int) -> float:
+    """Return how far each finger is off the middle before it closes: more where the thing's far side is hidden."""
+    away = box.centre / max(float(np.hypot(*box.centre)), 1e-6)
+    return float(box.half[axis]) + ROOM + _HIDDEN * abs(float(box.axes[axis] @ away))
+
+
+def _wide_part(box: ThingBox, seen: Array, axis: int, *, low: float, high: float = math.inf) -> tuple[float, float]:
+    """Return from where to where a thing is about as wide across an axis as anywhere, along the other one.
+
+    A can has a spout, and a handle: its pads belong on neither.
+
+    Parameters
+    ----------
+    low, high
+        Heights between which its points count, metres.
+    """
+    whole = -float(box.half[1 - axis]), float(box.half[1 - axis])
+    points = seen[(seen[:, 2] >= low) & (seen[:, 2] <= high)]
+    # Where no top is seen, two sides say nothing of what is between them.
+    if len(points) < _FEWEST or box.high > _TOO_HIGH:
+        return whole
+    across, along = ((points[:, :2] - box.centre) @ box.axes[k] for k in (axis, 1 - axis))
+    count = max(math.ceil((whole[1] - whole[0]) / _BIN), 1)
+    bins = np.clip(((along - whole[0]) / _BIN).astype(int), 0, count - 1)
+    least, most = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(least, bins, across)
+    np.maximum.at(most, bins, across)
+    width = np.maximum(most - least, 0.0)
+    wide = np.flatnonzero(width >= _WIDE * width.max())
+    return whole[0] + _BIN * float(wide[0]), min(whole[0] + _BIN * float(wide[-1] + 1), whole[1])

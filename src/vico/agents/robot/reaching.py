@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.body import ArmBody
+from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.grasps import Grasp, ThingBox
 from vico.kinematics.inverse import free_reach
 from vico.kinematics.limbs import Limbs, with_held
 from vico.kinematics.planning import Arm, free_way, is_free, way_is_free
-from vico.kinematics.room import Room, room_of
+from vico.kinematics.room import Room, room_of, seen_nothing
 from vico.kinematics.ways import straight_way
 
 Array = NDArray[np.float64]
@@ -30,6 +30,10 @@ _NEARER = (0.0, -0.01, -0.02, _CLOSE)
 # Where things are carried: hand in the base's frame, the first that can be reached.
 _CARRY = ((0.46, -0.17, 0.78), (0.50, 0.0, 0.70), (0.42, -0.25, 0.70))
 _CLEAR = 0.06  # metres that pads are long below their middle, and more
+_THERE = 0.03  # metres that a hand may miss the end of its way by
+# Metres before a person, and above the ground, that things are held out to them.
+_ARM_LENGTH, _HELD_OUT = 0.5, 0.75
+_OVER = 0.10  # metres above what it is put on that a thing is brought near
 _BALL = 0.018  # metres: radius of the balls that a held thing is made of
 _TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))  # of what is held, about the vertical
 
@@ -142,6 +146,22 @@ def carry_way(body: ArmBody, room: Room, now: Array, held: Held | None, *, openi
     return None
 
 
+def raise_way(body: ArmBody, now: Array, held: Held, height: float) -> Array | None:
+    """Return a way straight up, until a held thing's underside is above a height in the base's frame; None if it is.
+
+    Where the arm does not reach that far, the way ends lower.
+    """
+    pose = body.hand(now)
+    arm = Arm(body.chain, held.on(body.limbs(held.opening)), seen_nothing(body.posts), 0.0)
+    for up in np.arange(height + held.below + _OVER - float(pose[2, 3]), 0.02, -0.04).tolist():
+        goal = pose.copy()
+        goal[2, 3] += up
+        way = straight_way(body.chain, now, pose, goal)
+        if way is not None and _comes(arm, way):
+            return way
+    return None
+
+
 class Held(NamedTuple):
     """A thing in the jaw.
 
@@ -156,6 +176,8 @@ class Held(NamedTuple):
     rotation
         Of the hand as it closed, in the base's frame, shape ``(3, 3)``: turned about the vertical alone, the thing
         stands as it stood.
+    middle
+        From the hand to the thing's middle as it closed, level, in the base's frame, metres, shape ``(2,)``.
     """
 
     points: Array
@@ -163,6 +185,7 @@ class Held(NamedTuple):
     above: float
     opening: float
     rotation: Array
+    middle: Array
 
     def on(self, limbs: Limbs) -> Limbs:
         """Return limbs with the thing."""
@@ -170,12 +193,47 @@ class Held(NamedTuple):
 
     def turned(self, turn: float) -> Array:
         """Return the rotation of the hand with the thing turned about the vertical, rad, shape ``(3, 3)``."""
-        c, s = math.cos(turn), math.sin(turn)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ self.rotation
+        return _about_vertical(turn) @ self.rotation
 
     def pose_over(self, spot: Array, turn: float) -> Array:
-        """Return the pose of the hand with which the thing's underside is at a spot."""
-        return np.column_stack([self.turned(turn), spot + np.array([0.0, 0.0, self.below])])
+        """Return the pose of the hand with which the middle of the thing's underside is at a spot."""
+        off = _about_vertical(turn) @ np.array([*self.middle, -self.below])
+        return np.column_stack([self.turned(turn), spot - off])
+
+
+def came_off(body: ArmBody, now: Array, there: Array, held: Held) -> bool:
+    """Return whether an open hand went so far from where it let go that its fingers are off what it put down."""
+    gone = body.hand(now)[:, 3] - body.hand(there)[:, 3]
+    return float(np.linalg.norm(gone)) > held.above - _THERE
+
+
+def held_out_at(person: Array, stance: Stance) -> Array:
+    """Return where a thing is held out to somebody who stands at a point, before them, ENU metres."""
+    away = stance.position[:2] - person[:2]
+    return person + np.array([*(away / max(float(np.hypot(*away)), 1e-6) * _ARM_LENGTH), _HELD_OUT])
+
+
+def go_along(way: Array, point: int, servos: Array, most: Array) -> int:
+    """Bring servos on along a way, in place, as far as a period allows; return which of its points is next.
+
+    Parameters
+    ----------
+    way
+        Angles, shape ``(m, 7)``, of which those before `point` are behind.
+    most
+        That each may move, rad, shape ``(7,)``.
+    """
+    left = 1.0
+    while left > 1e-9 and point < len(way):
+        missing = way[point] - servos
+        longest = float(np.max(np.abs(missing) / most))
+        share = min(1.0, left / longest) if longest > 0.0 else 1.0
+        servos += share * missing
+        left -= longest * share
+        if share < 1.0:
+            break
+        point += 1
+    return point
 
 
 def held_thing(body: ArmBody, angles: Array, box: ThingBox, opening: float) -> Held:
@@ -199,7 +257,13 @@ def held_thing(body: ArmBody, angles: Array, box: ThingBox, opening: float) -> H
         float(max(box.high - pose[2, 3], 0.0)) + _CLEAR,
         opening,
         pose[:, :3].copy(),
+        box.centre - pose[:2, 3],
     )
+
+
+def _about_vertical(turn: float) -> Array:
+    c, s = math.cos(turn), math.sin(turn)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _there(

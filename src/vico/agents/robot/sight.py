@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -9,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.perception import points_from_depth
-from vico.agents.robot.body import Stance
+from vico.agents.robot.body import ArmBody, Stance
 
 Array = NDArray[np.float64]
 
 # Fewer pixels are no sight of a thing.
 _PIXELS = 6
+# Metres round a spot in which points tell its height, and how many there are at least.
+_SUPPORT, _FEWEST = 0.06, 8
 # Points farther away say nothing about what an arm can do, metres.
 _FARTHEST = 6.0
 
@@ -81,3 +84,17 @@ def seen_at(observation: Mapping[str, Any], info: Mapping[str, Any], name: str) 
     if len(points) < _PIXELS:
         return None
     return Seen(entity, np.array([*np.median(points[:, :2], axis=0), points[:, 2].min()]))
+
+
+def height_at(points: Array, spot: Array) -> float:
+    """Return how high what was seen round a spot is, in the points' frame; the spot's own height if that is little."""
+    near = points[np.hypot(*(points[:, :2] - spot[:2]).T) < _SUPPORT]
+    return float(np.median(near[:, 2])) if len(near) >= _FEWEST else float(spot[2])
+
+
+def room_ahead(body: ArmBody, points: Array) -> float:
+    """Return how far the base can go before it comes to one of some points, metres; in its frame, shape ``(n, 3)``."""
+    low, high, radius = -body.stand + 0.08, 1.2, body.radius
+    in_the_way = (points[:, 2] > low) & (points[:, 2] < high) & (np.abs(points[:, 1]) < radius) & (points[:, 0] > 0.0)
+    ahead = points[in_the_way]
+    return float((ahead[:, 0] - np.sqrt(radius**2 - ahead[:, 1] ** 2)).min()) if len(ahead) else math.inf

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,21 @@ from numpy.typing import NDArray
 from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.driving import Drive
 from vico.agents.robot.grasps import ThingBox, grasps_of, thing_box
-from vico.agents.robot.reaching import Held, Reach, carry_way, held_thing, reach_spot, reach_thing, room_around
-from vico.agents.robot.sight import Look, look
+from vico.agents.robot.reaching import (
+    Held,
+    Reach,
+    came_off,
+    carry_way,
+    go_along,
+    held_out_at,
+    held_thing,
+    raise_way,
+    reach_spot,
+    reach_thing,
+    room_around,
+)
+from vico.agents.robot.sight import Look, height_at, look, room_ahead
+from vico.agents.robot.stages import Stage, Work
 from vico.agents.state import AgentState
 
 Array = NDArray[np.float64]
@@ -28,8 +40,8 @@ _BESIDE = 0.9  # cosine of the angle by which the side it comes from may be anot
 _STRAIGHT, _TURN, _GAIN = 0.25, 0.7, 1.5
 # Ground that is left between the base and what was seen ahead of it, metres.
 _ROOM_AHEAD = 0.06
-# Seconds: for fingers to close, for each stage, without getting nearer.
-_GRIP_TIME, _STALE, _STUCK = 1.6, 20.0, 1.0
+# Seconds: for fingers to close, for each stage, without getting nearer, for coming as near as it can.
+_GRIP_TIME, _STALE, _STUCK, _SETTLES = 1.6, 20.0, 1.0, 12.0
 # Newtons on both fingers that are a grip, and metres that fingers stay apart if there is something in between.
 _FELT, _APART = 4.0, 0.004
 # Angles, rad, that count as there, and that tell moving from leaning on something, from one look to the next.
@@ -40,33 +52,9 @@ _LEANS = 8.0
 _LOST = 0.6
 # Of its speed an arm goes with, and with something in the jaw.
 _SPEED, _LADEN = 0.8, 0.5
-# Metres before a person, and above the ground, that things are held out to them; seconds that they have to take them.
-_ARM_LENGTH, _HELD_OUT, _TAKES = 0.5, 0.95, 60.0
-_SUPPORT = 0.06  # metres round a spot in which what is seen tells its height
-
-
-class Stage(StrEnum):
-    """What the arm is at."""
-
-    IDLE = "idle"
-    COME = "come"
-    ALIGN = "align"
-    LOOK = "look"
-    OVER = "over"
-    THERE = "there"
-    GRIP = "grip"
-    AWAY = "away"
-    CARRY = "carry"
-
-
-class Work(StrEnum):
-    """What it does."""
-
-    NOTHING = "nothing"
-    PICK = "picked"
-    PLACE = "placed"
-    OFFER = "handed_over"
-    FOLD = "folded"
+_TAKES = 60.0  # seconds that people have to take what is held out to them
+# What is so high above the ground is no ground; from there the base goes back so far first, metres.
+_HIGH, _BACK = 0.2, 0.35
 
 
 class ArmWorker:
@@ -90,6 +78,8 @@ class ArmWorker:
         Of the last piece of work.
     forces
         Largest force on the weaker finger since the last grip, newtons.
+    tries
+        How often the last piece of work was begun anew.
     """
 
     def __init__(self, body: ArmBody, *, period: float) -> None:
@@ -106,11 +96,12 @@ class ArmWorker:
         self._angles = body.rest.copy()  # as they were felt last
         self._knows = False
         self._timer = self._stuck = 0.0
-        self._tries = 0
+        self.tries = 0
         self._skip: set[int] = set()
         self._reach: Reach | None = None
         self._way: Array | None = None
         self._point = 0
+        self._from = np.zeros(2)  # where going back began, ENU metres
         self._box: ThingBox | None = None  # round the thing, as it stood when the hand went there
 
     # What it is told.
@@ -181,7 +172,7 @@ class ArmWorker:
     def _begin(self, work: Work, target: Array, entity: int) -> None:
         self.work, self._entity, self._target = work, entity, np.array(target, np.float64)
         self.outcome = self.why = ""
-        self._tries, self._skip, self._beside = 0, set(), None
+        self.tries, self._skip, self._beside = 0, set(), None
         self._next(Stage.COME)
 
     # What it does.
@@ -213,15 +204,27 @@ class ArmWorker:
         side = away / max(distance, 1e-6) if self._beside is None else self._beside
         if not self._drive.busy:
             if distance <= _NEAR and float(side @ away) > _BESIDE * distance:
-                self._next(Stage.ALIGN)
-                return self._hold()
+                return self._is_near()
             self._drive.begin(self._target[:2] + side * (_NEAR - 0.35), near=_NEAR - 0.35)
         action = self._drive.act(observation)
         if self._drive.busy:
             return action
         if not self._drive.arrived:
             return self._fail("no way there")
-        self._next(Stage.ALIGN)
+        return self._is_near()
+
+    def _is_near(self) -> Action:
+        self._next(Stage.RAISE if self.work is Work.PLACE and self.held is not None else Stage.ALIGN)
+        return self._hold()
+
+    def _raise(self, observation: Mapping[str, Any], angles: Array) -> Action:
+        """Lift what is held above what it is put on, before it is in the way of coming near."""
+        assert self.held is not None
+        if self._way is None:
+            spot = Stance.of(observation).inside(self._target)
+            self._way, self._point = raise_way(self.body, self._set[:7], self.held, float(spot[2])), 0
+        if self._way is None or self._follow(angles):
+            self._next(Stage.ALIGN)
         return self._hold()
 
     def _align(self, observation: Mapping[str, Any], angles: Array) -> Action:
@@ -229,23 +232,28 @@ class ArmWorker:
         stance = Stance.of(observation)
         target = stance.inside(self._goal(stance))
         error = math.atan2(float(target[1]), float(target[0]))
-        missing = float(np.hypot(*target[:2])) - STANDOFFS[self._tries % len(STANDOFFS)]
+        missing = float(np.hypot(*target[:2])) - STANDOFFS[self.tries % len(STANDOFFS)]
         moves = float(np.abs(observation["sensors"]["base_velocity"]).max()) > 0.02
         # The square bumper's corners touch before the round base does.
         self._stuck = 0.0 if moves or abs(error) > _ALIGNED else self._stuck + self.period
-        if missing > _EXACT and (self._stuck > _STUCK or self._room_ahead(observation) < _ROOM_AHEAD):
+        if missing > _EXACT and (
+            self._stuck > _STUCK or room_ahead(self.body, look(observation, step=3).without(self._entity)) < _ROOM_AHEAD
+        ):
             missing = 0.0  # as near as the ground is free
         forward = turn = 0.0
         if abs(error) > _ALIGNED:
             turn = min(max(_GAIN * error, -_TURN), _TURN)
         elif abs(missing) > _EXACT:
             forward, turn = min(max(missing, -_STRAIGHT), _STRAIGHT), error
-        elif not moves:
-            self._next(Stage.LOOK)
+        if self._timer > _SETTLES or (forward == turn == 0.0 and not moves):
+            self._next(Stage.LOOK)  # as near as it comes, and turned as far
+            return self._hold()
         return self._hold(forward, turn)
 
     def _look(self, observation: Mapping[str, Any], angles: Array) -> Action:
         """Plan from where the base stands now, by what is seen."""
+        if self.held is None and self.work is not Work.PICK:
+            return self._fail("nothing in the jaw")
         stance, seen = Stance.of(observation), look(observation)
         self._set = angles.copy() if self.held is None else self._set
         plan = {Work.PICK: self._plan_pick, Work.PLACE: self._plan_place, Work.OFFER: self._plan_offer}[self.work]
@@ -262,7 +270,7 @@ class ArmWorker:
             self.why = "not seen"
             return None
         self._target = stance.outside(np.array([*box.centre, box.low]))
-        grasps = grasps_of(box, self.body)
+        grasps = grasps_of(box, self.body, points)
         if not grasps:
             self.why = "too wide for the jaw"
             return None
@@ -271,21 +279,14 @@ class ArmWorker:
         return reach_thing(self.body, rooms, self._set[:7], grasps, skip=self._skip)
 
     def _plan_place(self, stance: Stance, seen: Look) -> Reach | None:
-        if self.held is None:
-            self.why = "nothing in the jaw"
-            return None
+        assert self.held is not None
         spot = stance.inside(self._target)
         around = seen.without(self._entity)
-        near = around[np.hypot(*(around[:, :2] - spot[:2]).T) < _SUPPORT]
-        if len(near) >= 8:
-            spot[2] = float(np.median(near[:, 2]))
-        spot[2] += 0.01
+        spot[2] = height_at(around, spot) + 0.01
         return reach_spot(self.body, room_around(self.body, around), self._set[:7], spot, self.held)
 
     def _plan_offer(self, stance: Stance, seen: Look) -> Reach | None:
-        if self.held is None:
-            self.why = "nothing in the jaw"
-            return None
+        assert self.held is not None
         spot = stance.inside(self._goal(stance))
         room = room_around(self.body, seen.without(self._entity))
         return reach_spot(self.body, room, self._set[:7], spot, self.held)
@@ -330,17 +331,30 @@ class ArmWorker:
     def _away(self, observation: Mapping[str, Any], angles: Array) -> Action:
         if not self._follow(angles):
             return self._hold()
+        assert self._reach is not None
         if self.work is Work.PICK:
-            apart, felt = float(angles[7:].min()), float(np.min(observation["sensors"]["contacts"]))
-            if not self._by_oracle(observation) and (apart < _APART or felt < _FELT):
-                assert self._reach is not None
-                self._skip.add(self._reach.number)
-                return self._again("it slipped" if self.forces > _FELT else "the jaw closed on nothing")
-            assert self._reach is not None
             assert self._box is not None
-            self.held = held_thing(self.body, self._reach.there[-1], self._box, apart)
-        else:
-            self.held = None
+            if not self._grips(observation, angles):
+                return self._slipped()
+            self.held = held_thing(self.body, self._reach.there[-1], self._box, float(angles[7:].min()))
+        stance = Stance.of(observation)
+        # Turned about on the spot, what is held sweeps over tables and decks.
+        high = self.work is not Work.OFFER and float(stance.inside(self._target)[2]) > _HIGH - self.body.stand
+        if self.work is not Work.PICK:
+            assert self.held is not None
+            off = came_off(self.body, angles[:7], self._reach.there[-1], self.held)
+            high, self.held = high and off, None
+        self._from = stance.position[:2].copy()
+        self._next(Stage.BACK if high else Stage.CARRY)
+        return self._hold()
+
+    def _back(self, observation: Mapping[str, Any], angles: Array) -> Action:
+        """Go back the way it came from a table, or a deck, before the arm comes down."""
+        gone = float(np.hypot(*(Stance.of(observation).position[:2] - self._from)))
+        moves = float(np.abs(observation["sensors"]["base_velocity"]).max()) > 0.02
+        self._stuck = 0.0 if moves else self._stuck + self.period
+        if gone < _BACK and self._stuck <= _STUCK:
+            return self._hold(-_STRAIGHT)
         self._next(Stage.CARRY)
         return self._hold()
 
@@ -354,44 +368,39 @@ class ArmWorker:
             self._point = 0
             if self._way is None:
                 return self._done()  # it stays where it is, which is free
-        if self._follow(angles):
-            return self._done()
-        return self._hold()
+        if not self._follow(angles):
+            return self._hold()
+        if self.work is Work.PICK and not self._grips(observation, angles):
+            return self._slipped()
+        return self._done()
 
     # How it does it.
+
+    def _grips(self, observation: Mapping[str, Any], angles: Array) -> bool:
+        """Return whether both fingers feel something between them, or an oracle says that they hold the thing."""
+        if self._by_oracle(observation):
+            return True
+        return float(angles[7:].min()) >= _APART and float(np.min(observation["sensors"]["contacts"])) >= _FELT
+
+    def _slipped(self) -> Action:
+        """Try another grasp for one that did not hold."""
+        assert self._reach is not None
+        self.held = None
+        self._skip.add(self._reach.number)
+        return self._again("it slipped" if self.forces > _FELT else "the jaw closed on nothing")
 
     def _goal(self, stance: Stance) -> Array:
         """Return what the base turns to and the arm reaches for, ENU metres."""
         if self.work is not Work.OFFER:
             return self._target
-        away = stance.position[:2] - self._target[:2]
-        away = away / max(float(np.hypot(*away)), 1e-6)
-        return self._target + np.array([*(away * _ARM_LENGTH), _HELD_OUT])
-
-    def _room_ahead(self, observation: Mapping[str, Any]) -> float:
-        """Return how far the base can go before it comes to what it sees, metres."""
-        ahead = look(observation, step=3).without(self._entity)
-        low, high, radius = -self.body.stand + 0.08, 1.2, self.body.radius
-        ahead = ahead[(ahead[:, 2] > low) & (ahead[:, 2] < high) & (np.abs(ahead[:, 1]) < radius) & (ahead[:, 0] > 0.0)]
-        if not len(ahead):
-            return math.inf
-        return float((ahead[:, 0] - np.sqrt(radius**2 - ahead[:, 1] ** 2)).min())
+        return held_out_at(self._target, stance)
 
     def _follow(self, angles: Array) -> bool:
         """Bring the servos on along the way; return whether the arm is at its end."""
         way = self._way
         assert way is not None
         most = self.body.fastest[:7] * self.period * (_SPEED if self.held is None else _LADEN)
-        left = 1.0
-        while left > 1e-9 and self._point < len(way):
-            missing = way[self._point] - self._set[:7]
-            longest = float(np.max(np.abs(missing) / most))
-            share = min(1.0, left / longest) if longest > 0.0 else 1.0
-            self._set[:7] += share * missing
-            left -= longest * share
-            if share < 1.0:
-                break
-            self._point += 1
+        self._point = go_along(way, self._point, self._set[:7], most)
         return self._point >= len(way) and float(np.abs(way[-1] - angles[:7]).max()) < _THERE
 
     def _fingers(self, goal: float) -> bool:
@@ -412,9 +421,9 @@ class ArmWorker:
 
     def _again(self, why: str) -> Action:
         """Try once more from another standoff, or give up."""
-        self._tries += 1
+        self.tries += 1
         self.why = why
-        if self._tries >= len(STANDOFFS):
+        if self.tries >= len(STANDOFFS):
             return self._fail(why)
         self._next(Stage.ALIGN)
         return self._hold()
@@ -448,11 +457,12 @@ class ArmWorker:
             "angles": self._angles.copy(),
             "knows": self._knows,
             "numbers": [self._timer, self._stuck, self.forces],
-            "tries": self._tries,
+            "tries": self.tries,
             "skip": sorted(self._skip),
             "reach": None if reach is None else {**reach._asdict()},
             "way": None if self._way is None else self._way.copy(),
             "point": self._point,
+            "from": self._from.copy(),
             "drive": self._drive.state(),
             "box": None if self._box is None else {**self._box._asdict()},
         }
@@ -462,7 +472,7 @@ class ArmWorker:
         self.work, self.stage = Work(state["work"]), Stage(state["stage"])
         self.held = None if state["held"] is None else Held(**state["held"])
         self.outcome, self.why = state["outcome"]
-        self._entity, self._tries, self._point = int(state["entity"]), int(state["tries"]), int(state["point"])
+        self._entity, self.tries, self._point = int(state["entity"]), int(state["tries"]), int(state["point"])
         self._target, self._set = np.array(state["target"]), np.array(state["set"])
         self._beside = None if state["beside"] is None else np.array(state["beside"])
         self._angles = np.array(state["angles"])
@@ -472,17 +482,23 @@ class ArmWorker:
         self._drive.restore(state["drive"])
         self._reach = None if state["reach"] is None else Reach(**state["reach"])
         self._way = None if state["way"] is None else np.array(state["way"])
+        self._from = np.array(state["from"])
         self._box = None if state["box"] is None else ThingBox(**state["box"])
 
 
 _STAGES = {
     Stage.IDLE: lambda worker, observation, angles: worker._hold(),
     Stage.COME: ArmWorker._come,
+    Stage.RAISE: ArmWorker._raise,
     Stage.ALIGN: ArmWorker._align,
     Stage.LOOK: ArmWorker._look,
     Stage.OVER: ArmWorker._over,
     Stage.THERE: ArmWorker._down,
     Stage.GRIP: ArmWorker._grip,
     Stage.AWAY: ArmWorker._away,
+    Stage.BACK: ArmWorker._back,
     Stage.CARRY: ArmWorker._carry,
 }
+
+
+__all__ = ["STANDOFFS", "ArmWorker", "Stage", "Work"]

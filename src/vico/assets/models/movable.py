@@ -30,11 +30,14 @@ class MovableKind:
         Extent along x, y, z at rest, metres.
     sentence
         What it is, for instructions: "a {colour} backpack".
+    tasks
+        Challenges whose tasks may be about it: assistant, robot.
     """
 
     kind: str
     size: tuple[float, float, float]
     sentence: str
+    tasks: tuple[str, ...] = ()
 
     def described(self, colour: str) -> str:
         """Return what it is, with its colour and the right article."""
@@ -63,7 +66,14 @@ def _entries() -> dict[str, _Painted]:
 @cached_data
 def movable_kinds() -> dict[str, MovableKind]:
     """Return every kind of thing, ours and the user's, by its name."""
-    return {kind: MovableKind(kind, it.entry.size, it.entry.sentence) for kind, it in _entries().items()}
+    return {
+        kind: MovableKind(kind, it.entry.size, it.entry.sentence, it.entry.tasks) for kind, it in _entries().items()
+    }
+
+
+def kinds_for(challenge: str) -> dict[str, MovableKind]:
+    """Return the kinds that a challenge's tasks may be about, by name."""
+    return {name: kind for name, kind in movable_kinds().items() if challenge in kind.tasks}
 
 
 @cached_data
@@ -77,16 +87,21 @@ def movable_prototype(kind: str, colour: str) -> str:
     return f"good/{kind}/{colour}"
 
 
+def movable_entry(prototype: str) -> MovableEntry | None:
+    """Return what the catalogue says of a prototype; None of one that is not made from it."""
+    found = _entries().get(prototype.split("/")[1]) if prototype.startswith("good/") else None
+    return None if found is None else found.entry
+
+
 #: Smaller ones are carried in a hand, ones as wide and as deep as the second before the chest, metres.
 _IN_HAND, _IN_ARMS = 0.22, 0.26
 
 
 def movable_grip(prototype: str, size: ArrayLike) -> Grip:
     """Return how a thing is carried: as its entry says, else by its extents, metres, shape ``(3,)``."""
-    kind = prototype.split("/")[1] if prototype.startswith("good/") else ""
-    entry = _entries().get(kind)
-    if entry is not None and entry.entry.grip is not None:
-        return entry.entry.grip
+    entry = movable_entry(prototype)
+    if entry is not None and entry.grip is not None:
+        return entry.grip
     small, middle, large = sorted(np.asarray(size, np.float64).tolist())
     if large <= _IN_HAND or (middle <= 0.5 * _IN_HAND and large <= 2 * _IN_HAND):
         return "hand"

@@ -277,15 +277,61 @@ class ModelFile(DataRecord):
     model: dict[str, ModelEntry] = Field(default_factory=dict)
 
 
+class _SolidPlaced(DataRecord):
+    """Where a convex solid of a thing is: `pitch` about y comes before `yaw` about z, degrees."""
+
+    at: Point = (0.0, 0.0, 0.0)
+    pitch: Number = 0.0
+    yaw: Number = 0.0
+
+
+class SolidBox(_SolidPlaced):
+    """A solid box of extents `size` around `at`."""
+
+    shape: Literal["box"]
+    size: tuple[Length, Length, Length]
+
+
+class SolidCylinder(_SolidPlaced):
+    """A solid cylinder whose foot is at `at`."""
+
+    shape: Literal["cylinder"]
+    radius: Length
+    length: Length
+
+
+class SolidBall(_SolidPlaced):
+    """A solid ball around `at`."""
+
+    shape: Literal["ball"]
+    radius: Length
+
+
+SolidPart = Annotated[SolidBox | SolidCylinder | SolidBall, Field(discriminator="shape")]
+Challenge = Literal["assistant", "robot"]
+
+
 class MovableEntry(DataRecord):
     """A thing people carry: `sentence` names it in instructions ("a {colour} backpack"); `size` is at rest.
 
-    `grip` says how it is carried: hanging from its handle, in one hand around its middle, or before the chest.
+    Attributes
+    ----------
+    grip
+        How it is carried: hanging from its handle, in one hand around its middle, or before the chest.
+    mass
+        Kilograms; None for what a box of its size would weigh.
+    solid
+        Convex solids that stand for it in physics; none for the box of its size.
+    tasks
+        Challenges whose tasks may be about it.
     """
 
     sentence: str
     grip: Grip | None = None
     size: tuple[Length, Length, Length]
+    mass: Annotated[float, Field(strict=True, ge=0.05, le=60.0)] | None = None
+    solid: Annotated[list[SolidPart], Field(max_length=6)] = Field(default_factory=list)
+    tasks: tuple[Challenge, ...] = ("assistant", "robot")
     parts: Parts
 
 

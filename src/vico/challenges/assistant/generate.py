@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.requester import first_name
-from vico.assets.models.movable import movable_kinds
+from vico.assets.models.movable import kinds_for
 from vico.assets.people.words import looks_in_words
 from vico.challenges.assistant.choose import Chooser, Question, choose, seeded_chooser
 from vico.challenges.assistant.model import Category, Person, Region, Start, Subtask, Task
@@ -57,7 +57,7 @@ class Draw:
 
     def kind(self, question: str, into: dict[str, list[str]], who: Resident) -> str:
         """Have the kind of a thing chosen."""
-        kinds = [str(kind) for kind in self.chance.permutation(sorted(movable_kinds()))[:CANDIDATES]]
+        kinds = [str(kind) for kind in self.chance.permutation(sorted(kinds_for("assistant")))[:CANDIDATES]]
         return kinds[self.pick(question, kinds, into, who)]
 
     def names_for(self, index: int) -> list[str]:

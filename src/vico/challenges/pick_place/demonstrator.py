@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from vico.agents.robot.body import Stance
 from vico.agents.robot.increments import JOINTS
-from vico.agents.robot.worker import ArmWorker, Stage
+from vico.agents.robot.stages import Stage
+from vico.agents.robot.worker import ArmWorker
 from vico.assets.robots import robot_model
 from vico.challenges.pick_place.episode import Observation
 from vico.challenges.pick_place.task import PickPlaceTask

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from vico.agents.robot.grasps import ROOM
-from vico.assets.models.movable import MovableKind, movable_colours, movable_kinds
+from vico.assets.models.movable import MovableKind, kinds_for, movable_colours, movable_kinds
 from vico.assets.robots import MobileManipulator, robot_model
 from vico.challenges.pick_place.field import TABLE, level_field
 from vico.errors import EmptyInputError, InputError
@@ -114,7 +114,7 @@ def fitting_kinds() -> dict[str, MovableKind]:
     widest = 2.0 * (settings.opening - ROOM)
     return {
         name: kind
-        for name, kind in movable_kinds().items()
+        for name, kind in kinds_for("robot").items()
         if min(kind.size[:2]) < widest and kind.size[2] <= _TALLEST and max(kind.size) <= 2.0 * _TALLEST
     }
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.models.movable import MovableKind, movable_colours, movable_kinds
+from vico.assets.models.movable import MovableKind, kinds_for, movable_colours, movable_kinds
 from vico.assets.people.words import looks_in_words
 from vico.assets.robots import robot_model
 from vico.challenges.assistant.choose import Chooser, Question, choose, seeded_chooser
@@ -92,7 +92,7 @@ def portable_kinds() -> list[MovableKind]:
     opening = arm_body(robot_model("manipulator")).opening
     return [
         kind
-        for kind in movable_kinds().values()
+        for kind in kinds_for("robot").values()
         if min(kind.size[:2]) / 2 + JAW_ROOM <= opening and LOWEST <= kind.size[2] <= HIGHEST
     ]
 

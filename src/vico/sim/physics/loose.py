@@ -8,15 +8,17 @@ The rest of the world's things cost nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.models.solids import movable_mass, movable_solids
 from vico.errors import SchemaError
 from vico.quaternions import matrix_of
 from vico.sim.physics.engine import PhysicsEngine
-from vico.sim.physics.records import RigidObject
+from vico.sim.physics.records import RigidObject, RigidPart
 from vico.sim.state import MovableObjects
 
 #: Things enter physics within the first distance of a robot's base, and leave beyond the second, metres.
@@ -24,7 +26,7 @@ ENTER, LEAVE = 2.5, 3.5
 #: What is higher than this above what is below it falls; what reaches deeper into ground or kerb is lifted out of it
 #: when it enters, but not by more than the second: then it lies in something that physics takes for solid, metres.
 _IN_THE_AIR, _TOO_DEEP = 0.03, 0.15
-#: Kilograms a cubic metre of a thing's box, and bounds of its mass, kg: nobody says what things weigh.
+#: Kilograms a cubic metre of a thing's box, and bounds of its mass, kg, where no entry says what it weighs.
 _DENSITY, _LIGHTEST, _HEAVIEST = 150.0, 0.05, 60.0
 # Where it is asked what lies below a thing: its middle and near its corners, shares of its half extents.
 _PROBES = np.array([[0.0, 0.0], [0.9, 0.9], [0.9, -0.9], [-0.9, 0.9], [-0.9, -0.9]])
@@ -33,6 +35,14 @@ _PROBES = np.array([[0.0, 0.0], [0.9, 0.9], [0.9, -0.9], [-0.9, 0.9], [-0.9, -0.
 def mass_of(size: NDArray[np.float64]) -> float:
     """Kilograms of a thing of some extents, metres, shape ``(3,)``."""
     return float(np.clip(_DENSITY * np.prod(size), _LIGHTEST, _HEAVIEST))
+
+
+def _parts(prototype: str, height: float) -> tuple[RigidPart, ...]:
+    """Return a thing's convex parts about the middle of its box."""
+    lift = np.array([0.0, 0.0, height / 2])
+    return tuple(
+        RigidPart(solid.shape, solid.half, solid.middle - lift, solid.quaternion) for solid in movable_solids(prototype)
+    )
 
 
 class LooseObjects:
@@ -149,8 +159,9 @@ class LooseObjects:
         objects = self._objects
         middle = objects.position[k] + matrix_of(objects.orientation[k])[:, 2] * objects.size[k, 2] / 2
         middle[2] += lift
-        size = objects.size[k]
-        self._engine.place_object(slot, RigidObject(size, mass_of(size), middle, objects.orientation[k].copy()))
+        size, prototype = objects.size[k], objects.prototypes[k]
+        thing = RigidObject(size, movable_mass(prototype) or mass_of(size), middle, objects.orientation[k].copy())
+        self._engine.place_object(slot, replace(thing, parts=_parts(prototype, float(size[2]))))
         self.entity[slot] = objects.entity[k]
         self._falling[k] = False
 

@@ -30,6 +30,7 @@ from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
 from vico.sim.physics.mujoco_views import base_motion, begin_frame, motion_of, place_bodies, solved_contacts
 from vico.sim.physics.mujoco_warnings import heard, listen, report, solve
+from vico.sim.physics.object_parts import parts_of
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, RigidObject
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -298,14 +299,9 @@ class MujocoEngine:
     def place_object(self, slot: int, thing: RigidObject) -> None:
         """Put an object into a slot, awake."""
         self._check_slot(slot)
-        size = np.asarray(thing.size, np.float64)
-        if size.shape != (3,) or not (np.isfinite(size).all() and size.min() > 0.0 and thing.mass > 0.0):
-            raise InputError(
-                f"physics: an object needs three positive extents and a mass, not {size.tolist()}, {thing.mass} kg"
-            )
+        parts = parts_of(thing)
         self._move_to(self.compiled.full)
-        self._parameters.object_half[slot], self._parameters.object_mass[slot] = size / 2, thing.mass
-        self._parameters.changed()
+        self._parameters.set_object(slot, parts, thing.mass)
         q, v = self.compiled.object_at(slot)
         # Written to another pose than the parked one, it is awake from the next step on.
         self._qpos[q : q + 7] = np.concatenate([thing.position, thing.quaternion])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vico.assets.robots import BUMP, BUMPER, LIMB, TOUCH, RobotModel
 from vico.errors import InputError
 from vico.sim.physics.frames import COARSE, SOLVER_STEPS
-from vico.sim.physics.records import Capacity, StaticScene
+from vico.sim.physics.records import BALL, BOX, CYLINDER, PARTS, Capacity, StaticScene
 from vico.world.heights import HeightField
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
@@ -34,6 +34,13 @@ _OUTLINES = 4
 #: Extents and kilograms that objects are compiled with; every engine writes its own.
 OBJECT_HALF, OBJECT_MASS = 0.15, 1.0
 _FRICTION = [0.6, 0.005, 0.0001]
+#: What objects touch: contype and conaffinity of their parts.
+OBJECT_BITS = TOUCH | SOLID, TOUCH | LIMB
+_SHAPES = {
+    BOX: mujoco.mjtGeom.mjGEOM_BOX,
+    CYLINDER: mujoco.mjtGeom.mjGEOM_CYLINDER,
+    BALL: mujoco.mjtGeom.mjGEOM_SPHERE,
+}
 #: How much harder friction is than contact, by whether it has to hold things. Held things creep out of a grasp where
 #: friction is soft, 5 kg 24 mm a minute at 10 and less than 1 mm at 100; wheels and feet follow commands alike at 1, at
 #: 60 % of the cost.
@@ -200,21 +207,22 @@ def _add_movers(spec: Any, capacity: Capacity) -> None:
 
 
 def _add_objects(spec: Any, capacity: Capacity) -> None:
-    """Add free boxes that movable objects near robots are taken from, asleep and parked."""
+    """Add free bodies that movable objects near robots are taken from, asleep and parked; the first part is a box."""
     for index in range(capacity.objects):
         body = spec.worldbody.add_body(name=f"object{index}", pos=parked_object(index))
         body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_INIT
         body.add_freejoint()
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[OBJECT_HALF] * 3,
-            mass=OBJECT_MASS,
-            condim=4,
-            friction=_FRICTION,
-            solref=[0.01, 1.0],
-            contype=TOUCH | SOLID,
-            conaffinity=TOUCH | LIMB,
-        )
+        for number, shape in enumerate(PARTS):
+            body.add_geom(
+                type=_SHAPES[shape],
+                size=[OBJECT_HALF] * 3,
+                mass=0.0 if number else OBJECT_MASS,
+                condim=4,
+                friction=_FRICTION,
+                solref=[0.01, 1.0],
+                contype=OBJECT_BITS[0],
+                conaffinity=OBJECT_BITS[1],
+            )
 
 
 def parked_robot(robot: int) -> list[float]:

@@ -8,8 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
-from vico.sim.physics.mujoco_model import OBJECT_HALF, OBJECT_MASS
+from vico.sim.physics.mujoco_model import OBJECT_BITS, OBJECT_HALF, OBJECT_MASS
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
+from vico.sim.physics.object_parts import PartRows, box_parts
+from vico.sim.physics.records import PARTS
+
+# Groups of shapes that are in use, which rays meet, and of those that are not.
+_SHOWN, _UNUSED = 0, 5
 
 
 class Parameters:
@@ -21,8 +26,10 @@ class Parameters:
         Of the servos that follow angles, Nm/rad and Nms/rad, shape ``(servos,)``.
     mover_half
         Half extents of people and vehicles, metres, shape ``(movers, 3)``.
-    object_half, object_mass
-        Half extents, metres, shape ``(objects, 3)``, and kilograms, shape ``(objects,)``.
+    object_parts
+        Of each object, as in `PartRows`, shape ``(objects, parts, 10)``.
+    object_mass, object_inertia
+        Kilograms, shape ``(objects,)``, and moments about their axes, kg m2, shape ``(objects, 3)``.
     grip
         Share of their dry friction that ground, tyres and feet have, shape ``(1,)``.
     numbers
@@ -34,20 +41,29 @@ class Parameters:
     def __init__(self, scene: CompiledScene) -> None:
         self._scene = scene
         servos, movers, objects = len(scene.servos), len(scene.mover_body), len(scene.object_body)
-        shapes = [(servos,), (servos,), (movers, 3), (objects, 3), (objects,), (1,)]
+        shapes = [(servos,), (servos,), (movers, 3), (objects, len(PARTS), 10), (objects,), (objects, 3), (1,)]
         ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
         # One array, so that two engines' numbers are compared at once.
         self.numbers = np.zeros(int(ends[-1]))
         parts = [part.reshape(shape) for part, shape in zip(np.split(self.numbers, ends[:-1]), shapes, strict=True)]
-        self.stiffness, self.damping, self.mover_half, self.object_half, self.object_mass, self.grip = parts
+        self.stiffness, self.damping, self.mover_half, self.object_parts = parts[:4]
+        self.object_mass, self.object_inertia, self.grip = parts[4:]
         self.stiffness[:], self.damping[:] = scene.stiffness, scene.damping
-        self.mover_half[:], self.object_half[:], self.object_mass[:] = 0.25, OBJECT_HALF, OBJECT_MASS
-        self.grip[:] = 1.0
+        self.mover_half[:], self.grip[:] = 0.25, 1.0
+        cube = box_parts(np.full(3, OBJECT_HALF))
+        self.object_parts[:], self.object_mass[:] = cube.rows, OBJECT_MASS
+        self.object_inertia[:] = cube.inertia(OBJECT_MASS)
         self.token = object()
 
     def changed(self) -> None:
         """Note that some of the numbers were written."""
         self.token = object()
+
+    def set_object(self, slot: int, parts: PartRows, mass: float) -> None:
+        """Say what an object is made of, and weighs, kilograms."""
+        self.object_parts[slot], self.object_mass[slot] = parts.rows, mass
+        self.object_inertia[slot] = parts.inertia(mass)
+        self.changed()
 
     def hold(self, model: SharedModel) -> None:
         """Have a model say what these say."""
@@ -68,20 +84,31 @@ class Parameters:
         people = s.capacity.people
         size = self.mover_half.copy()
         size[:people, 1], size[:people, 2] = self.mover_half[:people, 2], 0.0  # cylinders: radius, half height
-        for geoms, bodies, half, sizes in (
-            (s.mover_geom, s.mover_body, self.mover_half, size),
-            (s.object_geom, s.object_body, self.object_half, self.object_half),
-        ):
-            model.geom_size[geoms] = sizes
-            model.geom_rbound[geoms] = np.sqrt((half * half).sum(axis=1))
-            model.geom_aabb[geoms, 3:] = half
-            model.bvh_aabb[model.body_bvhadr[bodies], 3:] = half
-        self._write_masses(model)
+        half = self.mover_half
+        model.geom_size[s.mover_geom] = size
+        model.geom_rbound[s.mover_geom] = np.sqrt((half * half).sum(axis=1))
+        model.geom_aabb[s.mover_geom, 3:] = half
+        model.bvh_aabb[model.body_bvhadr[s.mover_body], 3:] = half
+        if s.slots:
+            self._write_parts(model)
+            self._write_masses(model)
+
+    def _write_parts(self, model: Any) -> None:
+        s, parts = self._scene, PartRows(self.object_parts)
+        geoms, used = s.object_geoms, parts.used
+        model.geom_size[geoms], model.geom_rbound[geoms] = parts.sizes, parts.radii
+        model.geom_aabb[geoms, 3:] = parts.half
+        model.geom_pos[geoms], model.geom_quat[geoms] = parts.position, parts.quaternion
+        model.geom_contype[geoms] = np.where(used, OBJECT_BITS[0], 0)
+        model.geom_conaffinity[geoms] = np.where(used, OBJECT_BITS[1], 0)
+        model.geom_group[geoms] = np.where(used, _SHOWN, _UNUSED)
+        # All boxes of a body's tree hold all of its parts: there are too few of those to tell them apart sooner.
+        middle, reach = parts.bounds()
+        nodes = s.object_nodes
+        model.bvh_aabb[nodes, :3], model.bvh_aabb[nodes, 3:] = middle[:, None], reach[:, None]
 
     def _write_masses(self, model: Any) -> None:
-        bodies, half, mass = self._scene.object_body, self.object_half, self.object_mass
-        squares = half * half
-        inertia = mass[:, None] / 3.0 * (squares.sum(axis=1)[:, None] - squares)
+        bodies, mass, inertia = self._scene.object_body, self.object_mass, self.object_inertia
         model.body_mass[bodies] = mass
         model.body_subtreemass[bodies] = mass
         model.body_inertia[bodies] = inertia

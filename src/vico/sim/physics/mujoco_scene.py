@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.sim.physics.mujoco_model import SLEEP, SOLID, compiled_model, thruster
-from vico.sim.physics.records import Capacity, Party, StaticScene
+from vico.sim.physics.records import PARTS, Capacity, Party, StaticScene
 from vico.sim.physics.solids import SolidCells
 from vico.world.heights import HeightField
 
@@ -198,7 +198,10 @@ class CompiledScene:
         self.mover_mocap = np.asarray(m.body_mocapid[self.mover_body], np.int64)
         self.mover_geom = np.asarray(m.body_geomadr[self.mover_body], np.int64)
         self.object_body = np.array([m.body(f"object{i}").id for i in range(self.slots)], np.int64)
-        self.object_geom = np.asarray(m.body_geomadr[self.object_body], np.int64)
+        self.object_geoms = np.add.outer(np.asarray(m.body_geomadr[self.object_body], np.int64), np.arange(len(PARTS)))
+        m.geom_sameframe[self.object_geoms] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # each engine says where they are
+        nodes = 2 * len(PARTS) - 1
+        self.object_nodes = np.add.outer(np.asarray(m.body_bvhadr[self.object_body], np.int64), np.arange(nodes))
         joint = m.body_jntadr[self.object_body]
         self.object_pose = _run_of(np.add.outer(m.jnt_qposadr[joint], np.arange(7)).ravel())
         self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())

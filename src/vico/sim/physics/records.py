@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,16 +134,41 @@ class Imu:
     specific_force: NDArray[np.float64]
 
 
+#: Shapes that a free rigid object may be made of.
+BOX, CYLINDER, BALL = "box", "cylinder", "ball"
+
+
+class RigidPart(NamedTuple):
+    """A convex part of a free rigid object.
+
+    Attributes
+    ----------
+    shape
+        `BOX`, `CYLINDER` (along its z) or `BALL`.
+    half
+        Half its extents along its own axes, metres, shape ``(3,)``.
+    position, quaternion
+        Of its middle in the object's frame, metres, shape ``(3,)``; its turn, w, x, y, z.
+    """
+
+    shape: str
+    half: NDArray[np.float64]
+    position: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class RigidObject:
-    """A free rigid box.
+    """A free rigid box, or several convex parts in one.
 
     Attributes
     ----------
     size
-        Extents, metres, shape ``(3,)``.
+        Extents of its box, metres, shape ``(3,)``.
     mass
-        Kilograms, spread evenly.
+        Kilograms, spread evenly about the middle of the box.
+    parts
+        What it touches others with: of each shape as many as an engine has room for (`PARTS`); none for the box.
     position
         Middle, ENU metres, shape ``(3,)``.
     quaternion
@@ -157,6 +183,11 @@ class RigidObject:
     quaternion: NDArray[np.float64]
     velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     angular_velocity_body: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    parts: tuple[RigidPart, ...] = ()
+
+
+#: Parts that an object has room for, in the order in which engines keep them.
+PARTS = (BOX, BOX, BOX, CYLINDER, CYLINDER, BALL)
 
 
 @dataclass(frozen=True)
