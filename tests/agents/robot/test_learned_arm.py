@@ -11,7 +11,7 @@ import pytest
 from felt_arm import sensors
 from robot_field import drawn_field
 from vico.agents.robot.body import Stance
-from vico.agents.robot.following import advanced, turned_aside
+from vico.agents.robot.following import go_along, turned_aside
 from vico.agents.robot.grasps import grasps_of
 from vico.agents.robot.learned import LearnedArm, Stage
 from vico.agents.robot.policy_clock import PolicyClock
@@ -73,7 +73,7 @@ class Planned:
             self.servos[7:] += np.clip(opening - self.servos[7:], -most[7:], most[7:])
             self.waits += 1
             if len(self.ways) > 1 or self.waits > 30:  # fingers first
-                self.servos[:7], reached = advanced(self.servos[:7], way, 0, most[:7])
+                reached = go_along(way, 0, self.servos[:7], most[:7])
                 rest = way[reached:]
                 self.ways[0] = rest, opening
                 felt = np.asarray(observation["sensors"]["joint_position"])[:7]

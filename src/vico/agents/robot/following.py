@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def advanced(servos: Array, way: Array, point: int, most: Array) -> tuple[Array, int]:
-    """Return servos a period further along a way, and the number of the point they go to next.
+def go_along(way: Array, point: int, servos: Array, most: Array) -> int:
+    """Bring servos on along a way, in place, as far as a period allows; return which of its points is next.
 
     Parameters
     ----------
-    servos
-        Where they are told to be, rad, shape ``(7,)``.
     way
-        Angles, shape ``(m, 7)``.
+        Angles, shape ``(m, 7)``, of which those before `point` are behind.
     most
         That each may move, rad, shape ``(7,)``.
     """
@@ -27,12 +25,12 @@ def advanced(servos: Array, way: Array, point: int, most: Array) -> tuple[Array,
         missing = way[point] - servos
         longest = float(np.max(np.abs(missing) / most))
         share = min(1.0, left / longest) if longest > 0.0 else 1.0
-        servos = servos + share * missing
+        servos += share * missing
         left -= longest * share
         if share < 1.0:
             break
         point += 1
-    return servos, point
+    return point
 
 
 def turned_aside(spot: Array, away: float) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
-from vico.agents.robot.following import advanced, turned_aside
+from vico.agents.robot.following import go_along, turned_aside
 from vico.agents.robot.reaching import GAP, Held, held_thing, reach_spot, room_around
 from vico.agents.robot.sight import look
 from vico.agents.robot.skill import ArmPolicy, Errand
@@ -184,7 +184,7 @@ class LearnedArm:
         ready, angles = self.policy.ready, np.asarray(observation["sensors"]["joint_position"], np.float64)
         assert ready is not None
         most = self.body.fastest * self.period * _SPEED
-        self._servos[:7], self._point = advanced(self._servos[:7], self._way, self._point, most[:7])
+        self._point = go_along(self._way, self._point, self._servos[:7], most[:7])
         if not self._places:
             self._servos[7:] += np.clip(ready.opening - self._servos[7:], -most[7:], most[7:])
         told = self._point >= len(self._way)

@@ -213,29 +213,6 @@ def held_out_at(person: Array, stance: Stance) -> Array:
     return person + np.array([*(away / max(float(np.hypot(*away)), 1e-6) * _ARM_LENGTH), _HELD_OUT])
 
 
-def go_along(way: Array, point: int, servos: Array, most: Array) -> int:
-    """Bring servos on along a way, in place, as far as a period allows; return which of its points is next.
-
-    Parameters
-    ----------
-    way
-        Angles, shape ``(m, 7)``, of which those before `point` are behind.
-    most
-        That each may move, rad, shape ``(7,)``.
-    """
-    left = 1.0
-    while left > 1e-9 and point < len(way):
-        missing = way[point] - servos
-        longest = float(np.max(np.abs(missing) / most))
-        share = min(1.0, left / longest) if longest > 0.0 else 1.0
-        servos += share * missing
-        left -= longest * share
-        if share < 1.0:
-            break
-        point += 1
-    return point
-
-
 def held_thing(body: ArmBody, angles: Array, box: ThingBox, opening: float) -> Held:
     """Return what a hand holds.
 

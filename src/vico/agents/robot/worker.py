@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.driving import Drive
+from vico.agents.robot.following import go_along
 from vico.agents.robot.grasps import ThingBox, grasps_of, thing_box
 from vico.agents.robot.reaching import (
     Held,
     Reach,
     came_off,
     carry_way,
-    go_along,
     held_out_at,
     held_thing,
     raise_way,

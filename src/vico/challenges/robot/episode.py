@@ -20,7 +20,7 @@ from vico.agents.robot.learned import LearnedArm
 from vico.agents.robot.thing_watch import ThingPose, Truth
 from vico.agents.schedule import followers_of
 from vico.agents.wrappers import usage_of
-from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
+from vico.assets.models.movable import movable_kinds
 from vico.assets.robots import robot_model
 from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
@@ -29,18 +29,17 @@ from vico.challenges.robot.judge import RobotJudge
 from vico.challenges.robot.model import RobotTask
 from vico.challenges.robot.policy_files import LEARNED, read_arm_policy
 from vico.challenges.robot.thresholds import PACE_HOME, PERIOD, RESIDENTS, WAITS
+from vico.challenges.staging import ReportedSeconds, put_thing, robots_from_elsewhere
+from vico.challenges.task_files import check_made_for
 from vico.clock import seconds_of_day
 from vico.community import build_community
-from vico.community.folder import digest_of
 from vico.community.model import Community
 from vico.envs import Simulation, make
-from vico.errors import InputError, SchemaError
 from vico.quaternions import matrix_of
 from vico.runner.faults import FaultLog
-from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
+from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
-from vico.runner.loading import AgentSeat
-from vico.runner.loop import Hook, Runner, Step
+from vico.runner.loop import Runner
 from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
 from vico.world.public import PublicMap
@@ -96,7 +95,7 @@ def play_robot_task(
         If the method's policy cannot be used; see `vico.challenges.robot.policy_files.policy_setting`.
     """
     began = time.perf_counter()
-    _check_made_for(task, world, community)
+    check_made_for(task, world, community)
     setting = setting or {}
     period = float(setting.get("period", PERIOD))
     starts = {MANIPULATOR: task.manipulator, CARRIER: task.carrier}
@@ -127,7 +126,8 @@ def play_robot_task(
     agents = Gatherer(residents | robots, trusted=trusted, deadline=terms.deadline, workers=terms.workers)
     runner = Runner(sim, agents, hooks=[judge])
     if progress is not None:
-        runner.hooks.append(_Reported(progress, task, sim))
+        label = f"{task.world}, {task.category}, seed {task.seed}"
+        runner.hooks.append(ReportedSeconds(progress, sim, label=label, limit=task.steps))
     with ExitStack() as stack:
         stack.callback(agents.close)
         if recording is not None:
@@ -147,40 +147,9 @@ def play_robot_task(
 
 def set_up(simulation: Simulation, task: RobotTask) -> None:
     """Put the thing where it is at the start, and whoever waits with it."""
-    kind = movable_kinds()[task.thing.kind]
-    shape, prototype = movable_surfaces(kind.kind, task.thing.colour), movable_prototype(kind.kind, task.thing.colour)
-    if task.waits_at is None:
-        simulation.scenario.add_object(
-            task.thing.name, prototype, shape, task.thing.position, size=kind.size, yaw=task.thing.yaw
-        )
-        return
-    simulation.scenario.place_agent(task.person.agent, (*task.waits_at.position, 0.0), yaw=task.waits_at.yaw)
-    simulation.scenario.hand_object(task.thing.name, prototype, shape, task.person.agent, size=kind.size)
-
-
-class _Reported(Hook):
-    """Tells how far an episode is."""
-
-    def __init__(self, progress: Progress, task: RobotTask, sim: Simulation) -> None:
-        self._progress, self._label = progress, f"{task.world}, {task.category}, seed {task.seed}"
-        self._sim, self._steps, self._start = sim, task.steps, sim.state.second
-
-    def stepped(self, step: Step) -> None:
-        """Tell it."""
-        self._progress(self._label, int(self._sim.state.second - self._start), self._steps)
-
-
-def _check_made_for(task: RobotTask, world: World, community: Community) -> None:
-    if task.world_digest != world.digest:
-        raise SchemaError(
-            f"task: made for another world ({task.world!r}, {task.world_digest[:12]}) than {world.manifest.name!r} "
-            f"({world.digest[:12]}); give that world, or generate the task for this one"
-        )
-    if task.community_digest != (digest := digest_of(community)):
-        raise SchemaError(
-            f"task: made for another community ({task.community_digest[:12]}) than this one ({digest[:12]}); give that "
-            "community, or generate the task for this one"
-        )
+    if task.waits_at is not None:
+        simulation.scenario.place_agent(task.person.agent, (*task.waits_at.position, 0.0), yaw=task.waits_at.yaw)
+    put_thing(simulation, task.thing)
 
 
 def residents_of_robot_task(task: RobotTask, community: Community, public_map: PublicMap) -> dict[str, Agent]:
@@ -199,13 +168,7 @@ def _robots(method: str, task: RobotTask, world: World, terms: Terms, period: fl
     if method in METHODS:
         team = team_of(robot_model(TEAM[0]), robot_model(TEAM[1]))
         return dict(make_robots(method, told, PublicMap.from_world(world), team, seed=task.seed))
-    made: dict[str, Agent] = {}
-    for i, name in enumerate((MANIPULATOR, CARRIER)):
-        try:
-            made |= foreign_agents(method, [AgentSeat(name, task.seed, [told], i, len(TEAM))], world, terms)
-        except InputError as error:
-            made[name] = AbsentAgent(str(error))
-    return made
+    return robots_from_elsewhere(method, (MANIPULATOR, CARRIER), told, world, terms, seed=task.seed)
 
 
 def _learned_arm(method: str, setting: Setting, task: RobotTask, sim: Simulation, period: float) -> LearnedArm:
