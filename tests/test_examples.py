@@ -162,5 +162,5 @@ def test_a_program_watches_a_run_and_reaches_into_it(
 
 def test_what_was_shown_is_done_again(tmp_path: Path) -> None:
     printed = run("19_imitation.py", "--out", str(tmp_path / "demos"), "--episodes", "1")
-    assert "frames: Pick up the blue shopping bag and put it down next to the pink umbrella." in printed
+    assert "frames: Pick up the blue shoe box and put it down next to the pink thermos flask." in printed
     assert "seed 7 done again: done" in printed

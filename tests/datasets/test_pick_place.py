@@ -54,7 +54,7 @@ def test_a_frame_holds_picture_joints_increments_and_the_instruction(plain: Data
     assert plain.about.features == {"observation.state": list(STATE), "action": list(INCREMENTS)}
     assert (plain.about.episodes, plain.about.successes) == (2, 2)
     first = plain.episodes()[0]
-    assert first["instructions"] == ["Pick up the blue shopping bag and put it down next to the pink umbrella."]
+    assert first["instructions"] == ["Pick up the blue shoe box and put it down next to the pink thermos flask."]
     assert (first["challenge"], first["category"], first["method"]) == ("pick_place", "ground to ground", "arm_worker")
     frames = list(plain.frames(0))
     assert len(frames) == first["frames"]
