@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 from vico.agents.base import Agent
@@ -12,8 +14,10 @@ from vico.challenges.records import Progress
 from vico.envs import Simulation
 from vico.errors import InputError
 from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
+from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
-from vico.runner.loop import Hook, Step
+from vico.runner.loop import Hook, Runner, Step
+from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
 
 
@@ -66,3 +70,29 @@ class ReportedSeconds(Hook):
     def stepped(self, step: Step) -> None:
         """Tell it."""
         self._progress(self._label, int(self._sim.state.second - self._start), self._limit)
+
+
+def play_out(
+    runner: Runner, agents: Gatherer, *, over: Callable[[], bool], seconds: int, period: float, recording: Path | None
+) -> None:
+    """Let an episode go on until it is over, or its time is; in the end its agents are let go.
+
+    Parameters
+    ----------
+    over
+        Says whether there is a verdict.
+    period
+        Seconds between two actions of a robot.
+    recording
+        Folder to which the run is recorded; None records nothing.
+    """
+    sim = runner.sim
+    with ExitStack() as stack:
+        stack.callback(agents.close)
+        if recording is not None:
+            recorded: RecordedOnce = stack.enter_context(
+                recorded_in(recording, sim, runner.faults, wanted=round(seconds / period))
+            )
+            runner.hooks.append(recorded)
+        end = sim.state.second + seconds
+        runner.run(100 * seconds, until=lambda: over() or sim.state.second >= end)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -29,7 +28,7 @@ from vico.challenges.robot.judge import RobotJudge
 from vico.challenges.robot.model import RobotTask
 from vico.challenges.robot.policy_files import LEARNED, read_arm_policy
 from vico.challenges.robot.thresholds import PACE_HOME, PERIOD, RESIDENTS, WAITS
-from vico.challenges.staging import ReportedSeconds, put_thing, robots_from_elsewhere
+from vico.challenges.staging import ReportedSeconds, play_out, put_thing, robots_from_elsewhere
 from vico.challenges.task_files import check_made_for
 from vico.clock import seconds_of_day
 from vico.community import build_community
@@ -40,7 +39,6 @@ from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
-from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
 from vico.world.public import PublicMap
 
@@ -128,18 +126,14 @@ def play_robot_task(
     if progress is not None:
         label = f"{task.world}, {task.category}, seed {task.seed}"
         runner.hooks.append(ReportedSeconds(progress, sim, label=label, limit=task.steps))
-    with ExitStack() as stack:
-        stack.callback(agents.close)
-        if recording is not None:
-            recorded: RecordedOnce = stack.enter_context(
-                recorded_in(recording, sim, runner.faults, wanted=round(task.steps / period))
-            )
-            runner.hooks.append(recorded)
-        end = sim.state.second + task.steps
-        runner.run(
-            100 * task.steps,
-            until=lambda: judge.over or sim.state.second >= end or (learned is not None and bool(learned.broken)),
-        )
+    play_out(
+        runner,
+        agents,
+        over=lambda: judge.over or (learned is not None and bool(learned.broken)),
+        seconds=task.steps,
+        period=period,
+        recording=recording,
+    )
     if learned is not None and learned.broken:
         judge.ended_by = UNUSABLE
     return _record(task, method, setting, judge, sim, runner.faults, robots, time.perf_counter() - began)

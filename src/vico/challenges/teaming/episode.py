@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from vico.agents.teaming.visitor import Visitor
 from vico.agents.wrappers import usage_of
 from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
-from vico.challenges.staging import ReportedSeconds, put_thing, robots_from_elsewhere
+from vico.challenges.staging import ReportedSeconds, play_out, put_thing, robots_from_elsewhere
 from vico.challenges.task_files import check_made_for
 from vico.challenges.teaming.accompany import Accompany
 from vico.challenges.teaming.guide import Guide
@@ -33,7 +32,6 @@ from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
-from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
 from vico.world.public import PublicMap
 
@@ -106,15 +104,14 @@ def play_teaming_task(
     if progress is not None:
         label = f"{task.world}, {task.category}, seed {task.seed}"
         runner.hooks.append(ReportedSeconds(progress, sim, label=label, limit=task.steps))
-    with ExitStack() as stack:
-        stack.callback(agents.close)
-        if recording is not None:
-            recorded: RecordedOnce = stack.enter_context(
-                recorded_in(recording, sim, runner.faults, wanted=round(task.steps / period))
-            )
-            runner.hooks.append(recorded)
-        end = sim.state.second + task.steps
-        runner.run(100 * task.steps, until=lambda: judge.over or sim.state.second >= end)
+    play_out(
+        runner,
+        agents,
+        over=lambda: judge.over,
+        seconds=task.steps,
+        period=period,
+        recording=recording,
+    )
     return _record(task, method, setting, judge, sim, runner.faults, robots, time.perf_counter() - began)
 
 
