@@ -41,7 +41,7 @@ demo: .venv/assets
 
 # Many tests start processes: none need compile the sources' byte code, whatever the environment says.
 test: .venv/dev
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
 
 # The Khronos glTF validator, for a test; without npm that test is skipped.
 .venv/gltf:

@@ -37,7 +37,8 @@ from vico.geo.tiles3d.mesh import TileMesh
 from vico.seeds import rng
 from vico.threads import WORKERS, workers
 from vico.world.folder import read_world, stage_seconds
-from vico.world.mesh import Surface, glb_bytes
+from vico.world.glb import glb_bytes
+from vico.world.mesh import Surface
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap

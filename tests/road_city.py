@@ -12,7 +12,8 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, polygons_of, read_osm
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph, read_lanes
+from vico.world.lane_reader import read_lanes
+from vico.world.lanes import LaneGraph
 from vico.world.model import Roads, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import RoadNetwork, road_network

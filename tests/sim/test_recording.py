@@ -26,7 +26,7 @@ from vico.sim.recording.action_text import LONGEST_ACTION, action_text
 from vico.sim.recording.schema import SEGMENT_STEPS
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
-from vico.world.lanes import read_lanes
+from vico.world.lane_reader import read_lanes
 from vico.world.model import BikeStation, Transit
 from vico.world.public import PublicMap
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vico.world.mesh import Material, Surface, glb_bytes, read_glb
+from vico.world.glb import glb_bytes, read_glb
+from vico.world.mesh import Material, Surface
 
 _SCRIPT = Path(__file__).parents[2] / "scripts" / "validate_gltf.cjs"
 _MODULES = Path(sys.prefix) / "gltf" / "node_modules"

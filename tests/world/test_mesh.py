@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from vico.seeds import rng
 from vico.threads import WORKERS
-from vico.world.mesh import Material, Surface, glb_bytes, read_glb, write_glb
+from vico.world.glb import glb_bytes, read_glb, write_glb
+from vico.world.mesh import Material, Surface
 
 
 def corners(surface: Surface) -> list[np.ndarray]:

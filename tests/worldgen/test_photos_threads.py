@@ -6,7 +6,8 @@ import pytest
 from vico.geo.tiles3d.mesh import TileMesh
 from vico.seeds import rng
 from vico.threads import WORKERS
-from vico.world.mesh import Surface, glb_bytes
+from vico.world.glb import glb_bytes
+from vico.world.mesh import Surface
 from vico.worldgen.photos import baking
 from vico.worldgen.photos.texturing import (
     Texturing,

@@ -12,7 +12,7 @@ from vico.assets.things import pack as things
 from vico.assets.things.pack import baked_things, our_models, read_things
 from vico.errors import MissingExtraError
 from vico.io.files import sha256_of, write_json
-from vico.world.mesh import write_glb
+from vico.world.glb import write_glb
 from vico.world.objects import Objects
 from vico.worldgen.objects.models import models_of
 from vico.worldgen.sources import Sources

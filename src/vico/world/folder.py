@@ -37,8 +37,9 @@ from vico.io.files import read_json, sha256_of, write_bytes, write_json
 from vico.io.npz import read_npz
 from vico.version import __version__
 from vico.world import model
+from vico.world.glb import read_glb
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface, read_glb
+from vico.world.mesh import Surface
 from vico.world.model import Building, Entrance, Manifest, ParkingSpot, Place, Record, Roads, Room, Transit
 from vico.world.objects import Objects, read_objects
 from vico.world.routing import Router
@@ -169,7 +170,7 @@ class World:
     @cached_property
     def lanes(self) -> LaneGraph:
         """The lane graph of the road network."""
-        from vico.world.lanes import read_lanes
+        from vico.world.lane_reader import read_lanes
 
         return read_lanes(self.file("roads.net.xml"))
 

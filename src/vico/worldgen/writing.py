@@ -12,9 +12,11 @@ import numpy as np
 from vico.io.files import sha256_of, write_bytes
 from vico.version import __version__
 from vico.world.folder import World, write_record, write_records, write_terrain
+from vico.world.glb import write_glb
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph, read_lanes
-from vico.world.mesh import Surface, write_glb
+from vico.world.lane_reader import read_lanes
+from vico.world.lanes import LaneGraph
+from vico.world.mesh import Surface
 from vico.world.model import (
     Building,
     Dropped,

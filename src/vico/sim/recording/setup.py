@@ -19,7 +19,7 @@ from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
 from vico.sim.recording.schema import SETUP, SETUP_SHAPES
 from vico.sim.scenario import AddedObject, GivenCash, HandedObject, PlacedAgent, Scenario
-from vico.world.mesh import read_glb, write_glb
+from vico.world.glb import read_glb, write_glb
 from vico.world.model import Record
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from vico.world.check.finding import WorldFinding
 from vico.world.check.solids import CoplanarPairs, coplanar_overlaps
 from vico.world.folder import World
+from vico.world.glb import read_glb
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface, read_glb
+from vico.world.mesh import Surface
 from vico.world.model import OPEN_KINDS, Building
 
 _SEATED = 0.5  # metres a ground floor may lie above the highest ground at its walls

@@ -12,7 +12,8 @@ import numpy as np
 
 from vico.io.files import write_bytes
 from vico.world.folder import World
-from vico.world.mesh import Surface, glb_bytes
+from vico.world.glb import glb_bytes
+from vico.world.mesh import Surface
 
 _SEEN = ("ground", "buildings", "roofs")
 # ENU, z up, to glTF's axes, y up.
