@@ -28,7 +28,7 @@ from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.junction_rule import JunctionRule
-from vico.sim.traffic.state import TOP_SPEED
+from vico.sim.traffic.records import TOP_SPEED
 from vico.world.folder import World, read_world
 from vico.world.lanes import LaneGraph
 from vico.worldgen.streets.netconvert import netconvert_binary

@@ -30,7 +30,7 @@ from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.signals import SignalsShown
-from vico.sim.traffic.state import PedestrianGaits
+from vico.sim.traffic.walking_gaits import PedestrianGaits
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
 from vico.world.lanes import LaneGraph

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.records import NONE
 
 _BACK_UP_AFTER = 3.0  # s that both have stood
 _ALIKE = 0.85  # cosine of the angle between two headings that count as the same

@@ -11,8 +11,8 @@ from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.leader import NO_GAP
 from vico.sim.traffic.letting_in import room_to_change
 from vico.sim.traffic.path import footprint
+from vico.sim.traffic.records import NONE
 from vico.sim.traffic.route import NEVER, is_lane_of_stop
-from vico.sim.traffic.state import NONE
 from vico.sim.traffic.stopping import distance_to_place, speed_into_place
 
 COMFORTABLE_BRAKING = 2.0  # m/s^2 on dry ground; what vehicles do now is `vehicle.braking`

@@ -10,7 +10,8 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.sim.traffic.path import PATH_POINT
-from vico.sim.traffic.state import STOPPING_PLACE, LaneNetwork, Records
+from vico.sim.traffic.records import STOPPING_PLACE, Records
+from vico.sim.traffic.state import LaneNetwork
 from vico.sim.traffic.stopping import WAY_LEAD
 from vico.world.lanes import LaneGraph
 from vico.world.model import ParkingSpot

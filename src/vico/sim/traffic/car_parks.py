@@ -20,8 +20,8 @@ from vico.sim.traffic.car_following import (
 from vico.sim.traffic.leader import TOUCH, VehicleView, find_leader, nearby_bodies, touched_at
 from vico.sim.traffic.lights import BRAKE, LEFT, RIGHT
 from vico.sim.traffic.path import footprint, point_on_path, vehicle_outline
+from vico.sim.traffic.records import BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, PRESENT, STANDING
 from vico.sim.traffic.route import NEVER
-from vico.sim.traffic.state import BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, PRESENT, STANDING
 from vico.sim.traffic.stopping import STAY, is_car_park_busy, stand
 
 _SPEED, _REVERSE = 2.8, 1.2  # m/s, and backwards

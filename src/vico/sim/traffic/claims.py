@@ -8,8 +8,8 @@ it to itself even then: its rear leaves its lane in bends.
 from __future__ import annotations
 
 from vico.io.compiled import compiled
+from vico.sim.traffic.records import HELD_JUNCTIONS, NONE, PREVIOUS_LANES, SEVERAL
 from vico.sim.traffic.route import STANDING_ROOM
-from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PREVIOUS_LANES, SEVERAL
 
 #: What stands against entering a junction: nothing, one who cannot leave it before, others.
 FREE, LETS_OUT, TAKEN = 0, 1, 2

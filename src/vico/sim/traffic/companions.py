@@ -9,8 +9,8 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.seeds import rng
+from vico.sim.traffic.records import NONE, Records
 from vico.sim.traffic.shapes import is_disc
-from vico.sim.traffic.state import NONE, Records
 from vico.world.walkways import CROSSING as _CROSSING_KIND
 
 _GROUPS, _OF_THREE = 0.182, 0.25  # share of groups among those who walk alone and groups; of threes among groups

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
-from vico.sim.traffic.state import APPROACHING, NONE, PRESENT, PREVIOUS_LANES
+from vico.sim.traffic.records import APPROACHING, NONE, PRESENT, PREVIOUS_LANES
 
 _CAR_PATIENCE = 10.0  # s that cars let pedestrians go first at a crossing
 _CALLED_AFTER = 4.0  # s that a pedestrian has waited before cars let it go first

@@ -10,7 +10,7 @@ from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.makes import VEHICLE_MODELS
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.records import NONE
 from vico.world.lanes import LaneGraph
 
 #: Half a cyclist's width, and how high one reaches, metres.
@@ -67,7 +67,7 @@ def equip_cyclists(fleet: np.recarray, seed: int) -> NDArray[np.int32]:
     Parameters
     ----------
     fleet
-        Their rows, dtype `vico.sim.traffic.state.VEHICLE`; their parameters are set.
+        Their rows, dtype `vico.sim.traffic.records.VEHICLE`; their parameters are set.
     seed
         Decides paints and speeds.
 

@@ -11,7 +11,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from vico.errors import InputError
 from vico.sim.traffic.placed import Point
-from vico.sim.traffic.state import NONE, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.records import NONE
+from vico.sim.traffic.state import LaneNetwork, WalkwayNetwork
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import SIDEWALK, Walkways
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.records import NONE
 
 #: Who has stood still, or walked on the spot, for so long is stuck, s.
 STUCK_AFTER = 60.0

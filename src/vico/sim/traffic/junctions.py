@@ -12,8 +12,8 @@ from vico.sim.traffic.claims import LETS_OUT, TAKEN, counted_wait, is_overtaken,
 from vico.sim.traffic.crossings import yields_to_pedestrians
 from vico.sim.traffic.leader import bodies_around, touched_at
 from vico.sim.traffic.path import point_on_path
+from vico.sim.traffic.records import NONE
 from vico.sim.traffic.route import NEVER, STANDING_ROOM, clear_of_tracks, is_lane_of_stop
-from vico.sim.traffic.state import NONE
 from vico.sim.traffic.track_crossings import crosses_called_track
 
 _HESITATION = 3.0  # s that a vehicle let in may stand before the junction goes back

@@ -16,8 +16,8 @@ from vico.sim.traffic.path import (
     point_on_path,
     project_on_polyline,
 )
+from vico.sim.traffic.records import APPROACHING, DRIVING, NONE, PRESENT
 from vico.sim.traffic.route import advance_on_route
-from vico.sim.traffic.state import APPROACHING, DRIVING, NONE, PRESENT
 
 _REAR_GAP, _FRONT_GAP = 7.0, 8.0  # m that have to be free on the other lane behind the front's place and ahead of it
 _LET_IN_GAP, _CUT_IN_GAP = 2.0, 3.0  # m behind a bus that is let in, and ahead of it

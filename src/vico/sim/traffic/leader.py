@@ -11,8 +11,8 @@ from vico.io.compiled import compiled, inlined
 from vico.sim.footprints import Rectangle, point_gap, separation
 from vico.sim.neighbours import NeighbourGrid, search
 from vico.sim.traffic.path import Outline, axles_at, footprint, footprint_between, point_on_path
+from vico.sim.traffic.records import NONE
 from vico.sim.traffic.shapes import Shapes, share_level, within
-from vico.sim.traffic.state import NONE
 
 #: A body near a vehicle: centre, heading cosine and sine, half sides of its footprint's core, rounding of that, radius
 #: of the circle around it (metres), and index into `Shapes`. Whoever is round is a person.

@@ -7,7 +7,7 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.traffic.follow_point import room_at
 from vico.sim.traffic.path import project_on_polyline
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.records import NONE
 
 #: Of a pedestrian's body, m.
 RADIUS = 0.25

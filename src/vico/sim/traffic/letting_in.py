@@ -6,8 +6,8 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.path import LANE_CHANGE, STRAIGHT, end_of_lane_change, project_on_polyline
+from vico.sim.traffic.records import DRIVING, DRIVING_OUT, LEAVING, NONE, STANDING
 from vico.sim.traffic.route import NEVER, route_lane
-from vico.sim.traffic.state import DRIVING, DRIVING_OUT, LEAVING, NONE, STANDING
 
 _REAR_GAP = 4.0  # m behind a bus that are left for it
 _SET_BACK = 5.0  # m before a lane's end at which vehicles stay out of the way of who does not get past there ...

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.assets.vehicles import BICYCLE_PAINTS, CAR_KINDS, vehicle_size
 from vico.seeds import rng
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.records import NONE
 
 #: Models that vehicles can be, by name.
 VEHICLE_MODELS = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
@@ -30,7 +30,7 @@ def choose_models(
     Parameters
     ----------
     fleet
-        Cars, then buses, dtype `vico.sim.traffic.state.VEHICLE`; their parameters are set.
+        Cars, then buses, dtype `vico.sim.traffic.records.VEHICLE`; their parameters are set.
     buses
         Route of each bus.
     models

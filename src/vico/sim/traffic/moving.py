@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.io.compiled import inlined
 from vico.sim.traffic.path import end_of_lane_change, footprint
-from vico.sim.traffic.state import BACKING_IN
+from vico.sim.traffic.records import BACKING_IN
 
 
 @inlined

@@ -11,7 +11,8 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.sim.traffic.path import PATH_POINT
-from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, TRACK_CROSSING, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.records import LANE, SPOT, STOPPING_PLACE, TRACK_CROSSING, WALKWAY
+from vico.sim.traffic.state import LaneNetwork, WalkwayNetwork
 from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, stop_lines
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vico.io.compiled import compiled, inlined
-from vico.sim.traffic.state import NONE, PREVIOUS_LANES
+from vico.sim.traffic.records import NONE, PREVIOUS_LANES
 
 #: A point of a path: x, y (ENU metres) and `s`, metres from the start of the lane the vehicle is on.
 PATH_POINT = np.dtype([("x", np.float64), ("y", np.float64), ("s", np.float64)])

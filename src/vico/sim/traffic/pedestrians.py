@@ -22,9 +22,9 @@ from vico.sim.traffic.companions import (
 from vico.sim.traffic.follow_point import FollowPoint, follow_point
 from vico.sim.traffic.leaving import RADIUS, leave_crossing, project_on_walkway
 from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.records import AMBER, CROWD, GAIT_TIME, NONE
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
 from vico.sim.traffic.standing import note_standing, stop_at_spot, turn_towards
-from vico.sim.traffic.state import AMBER, CROWD, GAIT_TIME, NONE
 from vico.world.walkways import CORNER as _CORNER_KIND
 from vico.world.walkways import CROSSING as _CROSSING_KIND
 

@@ -23,6 +23,7 @@ from vico.sim.traffic.levels import TrafficLevels, shapes_of
 from vico.sim.traffic.makes import choose_models
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import advance_pedestrians
+from vico.sim.traffic.records import AWAY, COMING, PEDESTRIAN_RECORD, TOP_SPEED, VEHICLE_STATE
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
 from vico.sim.traffic.seen import SeenTraffic
 from vico.sim.traffic.shapes import Shapes
@@ -30,17 +31,7 @@ from vico.sim.traffic.signal_heads import SignalHeads
 from vico.sim.traffic.signals import Circles, SignalClock, SignalsShown
 from vico.sim.traffic.standing import stand_at_start
 from vico.sim.traffic.starting import Starting
-from vico.sim.traffic.state import (
-    AWAY,
-    COMING,
-    PEDESTRIAN_RECORD,
-    TOP_SPEED,
-    VEHICLE_STATE,
-    BusRoutes,
-    new_fleet,
-    new_junctions,
-    new_pedestrians,
-)
+from vico.sim.traffic.state import BusRoutes, new_fleet, new_junctions, new_pedestrians
 from vico.sim.traffic.stopping_places import without_deliveries
 from vico.sim.traffic.track_crossings import crossed_tracks
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
@@ -315,7 +306,7 @@ class Traffic(SeenTraffic):
         Parameters
         ----------
         crossings
-            Lane by lane, dtype `vico.sim.traffic.state.TRACK_CROSSING`.
+            Lane by lane, dtype `vico.sim.traffic.records.TRACK_CROSSING`.
 
         Returns
         -------

@@ -14,8 +14,10 @@ from vico.sim.traffic.axles import axle_transforms
 from vico.sim.traffic.drawing import TrafficDrawing
 from vico.sim.traffic.jams import JamLog
 from vico.sim.traffic.levels import TrafficLevels
+from vico.sim.traffic.records import GAIT_TIME, NONE, PRESENT
 from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.state import GAIT_TIME, NONE, PRESENT, LaneNetwork, PedestrianGaits, StairGaits, WalkwayNetwork
+from vico.sim.traffic.state import LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.walking_gaits import PedestrianGaits, StairGaits
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface

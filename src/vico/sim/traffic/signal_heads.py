@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vico.assets.signal_lights import signal_prototypes
 from vico.sim.bodies import Drawn
+from vico.sim.traffic.records import DARK, GREEN
 from vico.sim.traffic.signals import LIGHT_NAMES
-from vico.sim.traffic.state import DARK, GREEN
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
 from vico.seeds import rng
-from vico.sim.traffic.state import AMBER, DARK, GREEN, RED, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.records import AMBER, DARK, GREEN, RED
+from vico.sim.traffic.state import LaneNetwork, WalkwayNetwork
 from vico.world.lanes import LaneGraph
 from vico.world.signals import SignalProgram
 from vico.world.walkways import Walkways

@@ -11,8 +11,9 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.seeds import rng
 from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.records import LED, NONE, STOP, TALK, Records
 from vico.sim.traffic.shapes import Shapes, disc_touches
-from vico.sim.traffic.state import LED, NONE, STOP, TALK, Records, WalkwayNetwork
+from vico.sim.traffic.state import WalkwayNetwork
 
 #: Share of those who pass a free spot that take it, and how long they stand, s; by kind of spot.
 _CHANCE = np.array([0.0, 0.1, 0.2, 0.25])

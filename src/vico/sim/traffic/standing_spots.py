@@ -12,7 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.sim.traffic.state import NONE, SPOT, STOP, TALK, WINDOW, Records, WalkwayNetwork
+from vico.sim.traffic.records import NONE, SPOT, STOP, TALK, WINDOW, Records
+from vico.sim.traffic.state import WalkwayNetwork
 from vico.world.folder import World
 from vico.world.model import Category, Point2
 from vico.world.walkable import CROSSING, ROADWAY

@@ -13,8 +13,9 @@ from vico.seeds import rng
 from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.cyclists import starts_of_cyclists
 from vico.sim.traffic.pedestrians import place_pedestrian
+from vico.sim.traffic.records import NONE
 from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.state import NONE, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.state import LaneNetwork, WalkwayNetwork
 from vico.sim.traffic.vehicles import place_vehicle
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import SIDEWALK, Walkways

@@ -15,8 +15,8 @@ from vico.sim.traffic.lights import LEFT, RIGHT
 from vico.sim.traffic.moving import move_vehicle
 from vico.sim.traffic.path import path_polyline, vehicle_outline
 from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.records import APPROACHING, BACKING_IN, DRIVING, DRIVING_IN, LEAVING, NONE, STANDING
 from vico.sim.traffic.route import NEVER
-from vico.sim.traffic.state import APPROACHING, BACKING_IN, DRIVING, DRIVING_IN, LEAVING, NONE, STANDING
 
 #: m of lane that belong to a way into a car park, before that leaves it.
 WAY_LEAD = 8.0

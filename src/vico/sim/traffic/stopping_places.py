@@ -10,7 +10,8 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.sim.traffic.car_park_ways import places_in_car_parks
-from vico.sim.traffic.state import NONE, STOPPING_PLACE, LaneNetwork, Records
+from vico.sim.traffic.records import NONE, STOPPING_PLACE, Records
+from vico.sim.traffic.state import LaneNetwork
 from vico.world.folder import World
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import CROSSING, Walkways

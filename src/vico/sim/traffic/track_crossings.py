@@ -11,8 +11,8 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.claims import holds_junction
+from vico.sim.traffic.records import DRIVING, NONE, PRESENT, PREVIOUS_LANES
 from vico.sim.traffic.route import NEVER, STANDING_ROOM
-from vico.sim.traffic.state import DRIVING, NONE, PRESENT, PREVIOUS_LANES
 
 _BEFORE = 0.6  # m kept before tracks where a vehicle waits
 _ON_TRACK = 0.3  # m before tracks from which on a vehicle is taken to be on them

@@ -60,9 +60,9 @@ from vico.sim.traffic.path import (
     vehicle_outline,
 )
 from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.records import APPROACHING, AWAY, DRIVING, NONE, PRESENT
 from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lanes, step_back_lane
 from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
-from vico.sim.traffic.state import APPROACHING, AWAY, DRIVING, NONE, PRESENT
 from vico.sim.traffic.stopping import choose_place, come_to_place, is_behind_delivery, stay_at_place
 from vico.sim.traffic.track_crossings import asks_with_track, distance_to_track, look_over, track_ahead, waits_for_tram
 

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from vico.sim.traffic import Traffic
-from vico.sim.traffic.state import PRESENT
+from vico.sim.traffic.records import PRESENT
 from vico.sim.transit.bus_plan import BusPlan
 from vico.world.lanes import LaneGraph
 

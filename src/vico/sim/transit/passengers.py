@@ -15,8 +15,8 @@ from vico.seeds import rng
 from vico.sim.avatars import free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.traffic.population import Traffic
+from vico.sim.traffic.records import BOARD, NONE, STOP
 from vico.sim.traffic.seen import Seating
-from vico.sim.traffic.state import BOARD, NONE, STOP
 from vico.world.model import Stop, TramStop, Transit
 from vico.world.walkable import WalkableMap
 from vico.world.walkways import SIDEWALK

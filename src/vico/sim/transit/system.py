@@ -19,7 +19,7 @@ from vico.rules import BUS_DWELL as DWELL
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.state import FIRST_TRAM
 from vico.sim.traffic import Traffic
-from vico.sim.traffic.state import PRESENT
+from vico.sim.traffic.records import PRESENT
 from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan
 from vico.sim.transit.detours import Detours

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.traffic import Traffic
-from vico.sim.traffic.state import TRACK_CROSSING
+from vico.sim.traffic.records import TRACK_CROSSING
 from vico.sim.transit.tram_outlines import first_taken
 from vico.world.lanes import LaneGraph
 from vico.world.rails import ACROSS_REACH, STEP, TRAM_BRAKING, TRAM_LENGTH, Track

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.traffic.state import DARK, GREEN
+from vico.sim.traffic.records import DARK, GREEN
 from vico.world.lanes import LaneGraph
 from vico.world.rails import STEP, TRAM_BRAKING, Track
 
