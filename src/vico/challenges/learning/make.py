@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vico.challenges.assistant.episode import world_and_people
 from vico.challenges.assistant.model import Category
@@ -20,6 +20,9 @@ from vico.community import build_community
 from vico.community.model import Community
 from vico.envs.vector import VectorAgentEnv, makers
 from vico.world.folder import World, read_world
+
+if TYPE_CHECKING:
+    from vico.challenges.learning.robot_team import RobotTeamEnv
 
 _OF_ENV = ("tasks", "seed", "render_mode")
 
@@ -104,11 +107,38 @@ def make_robot_work(world: World | Path | str, category: RobotCategory, **option
     Parameters
     ----------
     options
-        Those of `vico.challenges.learning.robot.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
+        Those of `vico.challenges.learning.robot_stage.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
     """
-    from vico.challenges.learning.robot import RobotOptions, RobotWork  # physics, slow to import
+    from vico.challenges.learning.robot import RobotWork  # physics, slow to import
+    from vico.challenges.learning.robot_stage import RobotOptions
 
     return _env(partial(RobotWork, *_robot_stage(world), category), RobotOptions, options)
+
+
+def make_robot_team(world: World | Path | str, category: RobotCategory, **options: Any) -> RobotTeamEnv:
+    """Make a PettingZoo environment of the community robot challenge for both of its robots.
+
+    Parameters
+    ----------
+    options
+        Those of `vico.challenges.learning.robot_stage.RobotOptions`, of `RobotTeamEnv` (`tasks`, `seed`) and of
+        `vico.envs.spec.EnvSpec`; ``form`` is rich unless told.
+    """
+    from vico.challenges.learning.robot_stage import RobotOptions
+    from vico.challenges.learning.robot_team import RobotTeamEnv
+
+    of_task, rest = _split(options, [field.name for field in fields(RobotOptions)])
+    return RobotTeamEnv(*_robot_stage(world), category, RobotOptions(**of_task), **rest)
+
+
+def make_robot_carry_team(world: World | Path | str, **options: Any) -> RobotTeamEnv:
+    """Make ``vico/RobotCarry-v0`` for both robots; see `make_robot_team`."""
+    return make_robot_team(world, "carry", **options)
+
+
+def make_robot_deliver_team(world: World | Path | str, **options: Any) -> RobotTeamEnv:
+    """Make ``vico/RobotDeliver-v0`` for both robots; see `make_robot_team`."""
+    return make_robot_team(world, "deliver", **options)
 
 
 def _robot_stage(world: World | Path | str) -> tuple[World, Community]:
