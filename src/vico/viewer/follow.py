@@ -57,11 +57,15 @@ class Angle(Record):
         Degrees round it: 0 is behind, 90 to its right.
     up
         Degrees above the horizon.
+    ahead_of
+        Name of an agent: degrees round are counted from the line from it to what is followed, as if that looked away
+        from it; else from where that looks. A thing in a hand is seen from the side of the arm so, however it is turned.
     """
 
     away: Annotated[float, Field(ge=0.3, le=200.0)]
     around: float = 0.0
     up: Annotated[float, Field(ge=-20.0, le=89.0)] = 15.0
+    ahead_of: str = ""
 
 
 @dataclass

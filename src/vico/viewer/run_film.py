@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,13 +166,21 @@ def _watcher(repeated: RepeatedRun, settings: FilmSettings) -> Callable[[Simulat
     renderer = SceneRenderer(repeated.sim, detail="full")
 
     def look(state: SimulationState) -> _Seen:
-        return _Seen(moment_of(renderer.show(state), state.second), target_of(state, settings.follow))
+        return _Seen(moment_of(renderer.show(state), state.second), _target(state, settings))
 
     return look
 
 
+def _target(state: SimulationState, settings: FilmSettings) -> Target:
+    target = target_of(state, settings.follow)
+    if settings.angle is None or not settings.angle.ahead_of:
+        return target
+    dx, dy, _ = (target.position - target_of(state, settings.angle.ahead_of).position).tolist()
+    return target._replace(yaw=math.atan2(dy, dx))
+
+
 def _frames(repeated: RepeatedRun, settings: FilmSettings, first: int, last: int) -> Iterator[NDArray[np.uint8]]:
-    target_of(repeated.sim.state, settings.follow)
+    _target(repeated.sim.state, settings)
     repeated.go_to(first)
     look = _watcher(repeated, settings)
     camera = FollowCamera(settings.view, settings.width, settings.height, settings.angle)
