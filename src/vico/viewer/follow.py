@@ -58,8 +58,8 @@ class Angle(Record):
     up
         Degrees above the horizon.
     ahead_of
-        Name of an agent: degrees round are counted from the line from it to what is followed, as if that looked away
-        from it; else from where that looks. A thing in a hand is seen from the side of the arm so, however it is turned.
+        Name of an agent: degrees round are counted as if what is followed looked away from it; else from where that
+        looks. A thing in a hand is seen from beside the arm so, however it is turned.
     """
 
     away: Annotated[float, Field(ge=0.3, le=200.0)]

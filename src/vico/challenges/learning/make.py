@@ -207,7 +207,7 @@ def _world(folder: Path) -> World:
     return read_world(folder)
 
 
-def _env(make: Callable[..., Any], of_options: type, options: Mapping[str, Any], *, form: Any = "arrays") -> TaskEnv:
+def _env(make: Callable[..., Any], of_options: Any, options: Mapping[str, Any], *, form: Any = "arrays") -> TaskEnv:
     """Make an environment of a task.
 
     Parameters
