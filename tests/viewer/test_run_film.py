@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +14,21 @@ import toy_city
 from vico.agents.schedule import followers_of
 from vico.assets.shapes import box, pose_matrix
 from vico.errors import InputError, SchemaError
+from vico.io.files import write_json
 from vico.render import Scene
 from vico.render.between import between, moment_of, show_between
 from vico.render.film import read_film
 from vico.render.limbs import LIMBS
+from vico.render.quality import PLAIN
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.recording import Run, read_run
 from vico.sim.simulation import Simulation
-from vico.viewer.follow import FollowCamera, Target, target_between, target_of
+from vico.viewer.follow import FollowCamera
 from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, still, write_run_film
+from vico.viewer.run_film import FilmSettings, Span, still, write_film_of_shots, write_run_film
+from vico.viewer.shots import read_shots
+from vico.viewer.targets import Target, target_between, target_of
 from vico.world.mesh import joined
 from vico.world.public import PublicMap
 
@@ -84,6 +89,39 @@ def test_a_film_has_all_its_frames_and_shows_who_is_followed(run: Run, tmp_path:
     assert shown[0].shape == (64, 96, 3)
     eyes = FilmSettings(follow="resident_0", width=96, height=64, view="eyes", samples=1)
     assert still(repeated(run), eyes, 5).std() > 5
+
+
+def test_a_film_cuts_between_the_shots_of_a_file(run: Run, tmp_path: Path) -> None:
+    shots = [
+        {"start": "4", "stop": "6", "follow": "resident_0", "view": "above", "speed": 2.0},
+        {"start": "8", "stop": "9", "follow": "resident_1", "angle": {"away": 1.2, "around": 90.0}},
+    ]
+    path = tmp_path / "shots.json"
+    write_json(path, {"schema_name": "vico.shots", "version": 1, "shots": shots})
+    plain = FilmSettings(follow="", width=96, height=64, rate=10, samples=1, quality=PLAIN)
+    read = [
+        Span(replace(plain, follow=s.follow, view=s.view, angle=s.angle, speed=s.speed), int(s.start), int(s.stop))
+        for s in read_shots(path)
+    ]
+    assert write_film_of_shots(tmp_path / "film.mp4", repeated(run), read) == 11 + 11
+    shown = list(read_film(tmp_path / "film.mp4"))
+    changes = [float(np.abs(b.astype(float) - a).mean()) for a, b in itertools.pairwise(shown)]
+    assert int(np.argmax(changes)) == 10  # the cut
+    with pytest.raises(InputError, match="filmed forwards"):
+        write_film_of_shots(tmp_path / "film.mp4", repeated(run), read[::-1])
+    write_json(path, {"schema_name": "vico.shots", "version": 1, "shots": [shots[0] | {"zoom": 2}]})
+    with pytest.raises(SchemaError, match=r"shots\.json: shots\.0\.zoom: Extra inputs"):
+        read_shots(path)
+
+
+def test_a_thing_can_be_looked_at_from_near_by() -> None:
+    sim = Simulation(toy_city.world(), toy_city.community(), SimConfig(observe=()))
+    sim.scenario.add_object("red box", "parcel", [box((0.2, 0.2, 0.2), (0, 0, 0.1))], (2.0, 1.0, 0.0), yaw=0.5)
+    target = target_of(sim.state, "red box")
+    assert (target.yaw, target.size) == (pytest.approx(0.5), pytest.approx(0.2))
+    eye = FollowCamera("close", 64, 36).look(Scene([box((80, 80, 1), (0, 0, -0.5))]), target, 0.04)
+    assert 0.8 < float(np.linalg.norm(eye.position[0] - target.position)) < 1.5
+    assert eye.hidden_entity == 0
 
 
 def test_another_run_is_refused(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from vico.agents.base import Agent
+from vico.agents.wrappers import usage_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
-from vico.challenges.assistant.model import TaskObject
-from vico.challenges.records import Progress
-from vico.envs import Simulation
+from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
+from vico.challenges.assistant.model import Start, TaskObject
+from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
+from vico.challenges.task_files import PlacedTask
+from vico.clock import seconds_of_day
+from vico.community import build_community
+from vico.community.model import Community
+from vico.envs import CommunityEnv, Simulation, make
 from vico.errors import InputError
 from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
 from vico.runner.gather import Gatherer
@@ -19,6 +26,56 @@ from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World
+
+
+@lru_cache(maxsize=2)
+def world_and_people(folder: Path, residents: int) -> tuple[World, Community]:
+    """Read a world, and make the people among whom its episodes take place: always the same ones."""
+    world = world_in(folder)
+    return world, build_community(world, residents=residents, seed=0)
+
+
+def make_stage(
+    world: World,
+    community: Community,
+    task: PlacedTask,
+    *,
+    team: Mapping[str, tuple[str, Start]],
+    period: float,
+    setup: Callable[[Simulation], None],
+    oracle_grasp: bool = False,
+) -> CommunityEnv:
+    """Make what an episode takes place in: the world of a task with its people, traffic and robots.
+
+    Parameters
+    ----------
+    team
+        Model and start of each robot, by its name, in order.
+    period
+        Seconds between two actions of a robot.
+    setup
+        Puts things and people where they are at the start.
+    """
+    return make(
+        world,
+        community,
+        seed=task.seed,
+        start=task.start,
+        robots=tuple(model for model, _ in team.values()),
+        robot_places={name: (*start.position, start.yaw) for name, (_, start) in team.items()},
+        cars=for_size(CARS, world),
+        pedestrians=for_size(PEDESTRIANS, world),
+        observe=tuple(team),
+        periods=dict.fromkeys(team, period),
+        oracle_grasp=oracle_grasp,
+        max_steps=round(task.steps / min(period, 1.0)),
+        setup=setup,
+    )
+
+
+def place_waiting(simulation: Simulation, name: str, waits: Start) -> None:
+    """Put somebody where they wait."""
+    simulation.scenario.place_agent(name, (*waits.position, 0.0), yaw=waits.yaw)
 
 
 def put_thing(simulation: Simulation, thing: TaskObject) -> None:
@@ -96,3 +153,60 @@ def play_out(
             runner.hooks.append(recorded)
         end = sim.state.second + seconds
         runner.run(100 * seconds, until=lambda: over() or sim.state.second >= end)
+
+
+class Verdict(NamedTuple):
+    """What came of an episode: figures by the keys of its metrics, and the one part that it has."""
+
+    metrics: dict[str, float]
+    part: Part
+
+
+def verdict_on(name: str, done_at: float | None, cause: str, limit: int, more: Mapping[str, float]) -> Verdict:
+    """Return the verdict on what was asked for.
+
+    Parameters
+    ----------
+    done_at
+        Second at which it was done; None if it was not: then Ts is the limit.
+    cause
+        Why not; "" if it was.
+    more
+        Figures beside SR and Ts.
+    """
+    done = done_at is not None
+    metrics = {"SR": 100.0 if done else 0.0, "Ts": float(limit if done_at is None else min(done_at, limit))}
+    return Verdict(metrics | dict(more), Part(name, done, cause, None if done_at is None else int(done_at)))
+
+
+def record_of(
+    task: PlacedTask,
+    runner: Runner,
+    robots: Mapping[str, Agent],
+    verdict: Verdict,
+    *,
+    challenge: str,
+    method: str,
+    setting: Setting,
+    wall_seconds: float,
+) -> EpisodeRecord:
+    """Condense an episode that was played out."""
+    sim, faults = runner.sim, runner.faults
+    return EpisodeRecord(
+        challenge=challenge,
+        category=task.category,
+        method=method,
+        setting=dict(setting) | {"steps": task.steps},
+        world=task.world,
+        seed=task.seed,
+        metrics=verdict.metrics,
+        parts=[verdict.part],
+        steps=round(sim.state.second) - seconds_of_day(task.start),
+        limit=task.steps,
+        wall_seconds=wall_seconds,
+        state_hash=sim.state_hash(),
+        tokens=sum(usage_of(robot).tokens for robot in robots.values()),
+        cost=sum(usage_of(robot).cost for robot in robots.values()),
+        fault_counts=faults.by_kind(),
+        faults=faults.first,
+    )

@@ -4,19 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.challenges.assistant.model import Region, TaskObject
 from vico.community.folder import digest_of
 from vico.community.model import Community
 from vico.errors import SchemaError
-from vico.io.files import read_json
+from vico.io.files import read_json, write_json
 from vico.world.folder import World
+from vico.world.model import Record
 
 Model = TypeVar("Model", bound=BaseModel)
+
+
+class PlacedTask(Record):
+    """One episode's task in a world, among people.
+
+    Attributes
+    ----------
+    world_digest, community_digest
+        Identity of the world and of the community the task belongs to.
+    start
+        Time of day at which it begins, ``HH:MM``.
+    steps
+        Seconds at most.
+    """
+
+    schema_name: str
+    version: int
+    category: str
+    world: str
+    world_digest: str
+    community_digest: str
+    seed: int
+    start: Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")]
+    steps: Annotated[int, Field(ge=1)]
+
+
+def frame_of(world: World, community: Community, category: str, *, seed: int, steps: int) -> dict[str, Any]:
+    """Return what a `PlacedTask` is begun with, whatever is drawn."""
+    return {
+        "category": category,
+        "world": world.manifest.name,
+        "world_digest": world.digest,
+        "community_digest": digest_of(community),
+        "seed": seed,
+        "steps": steps,
+    }
 
 
 class OfWorld(Protocol):
@@ -33,6 +70,11 @@ class OfWorld(Protocol):
     @property
     def community_digest(self) -> str:
         """Identity of the people."""
+
+
+def write_task_file(path: Path, task: PlacedTask) -> None:
+    """Write a task file."""
+    write_json(path, task.model_dump(mode="json"))
 
 
 def read_task_file(path: Path, model: type[Model], *, schema: str, version: int, what: str) -> Model:

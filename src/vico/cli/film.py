@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,18 @@ from vico.errors import InputError, MissingFileError, OutputExistsError
 from vico.render.quality import RenderQuality
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, write_run_film, write_still
+from vico.viewer.run_film import FilmSettings, Span, write_film_of_shots, write_still
 from vico.viewer.server import require_server
+from vico.viewer.shots import read_shots
 
 
 def film(options: FilmOptions) -> int:
     """Write a film of a run."""
     out = options.out
+    if bool(options.follow) == (options.shots is not None):
+        raise InputError("film: give either --follow with a name, or --shots with a list of shots")
+    if options.shots is not None and options.headless:
+        raise InputError("film: the page films one shot; leave out --headless, or --shots")
     _check(out, force=options.force)
     width, height = size_of(options.size)
     settings = FilmSettings(
@@ -37,17 +43,29 @@ def film(options: FilmOptions) -> int:
     recorded = read_run(options.run)
     if options.headless:
         return _film_of_page(options, recorded)
-    first = step_of(recorded, options.start, default=0)
-    last = step_of(recorded, options.stop, default=recorded.last)
+    spans = _spans(options, settings, recorded)
     with progress_bars() as report:
         report("reading the run", 0, 1)
         repeated = RepeatedRun.of_folders(recorded, world=options.world, community=options.community)
         report("reading the run", 1, 1)
-        frames = write_run_film(
-            out, repeated, settings, first=first, last=last, report=lambda done, count: report("film", done, count)
-        )
+        frames = write_film_of_shots(out, repeated, spans, report=lambda done, count: report("film", done, count))
     print(f"{out}: {frames} frames, {frames / settings.rate:.1f} s")
     return 0
+
+
+def _spans(options: FilmOptions, settings: FilmSettings, run: Run) -> list[Span]:
+    """Return the shots that are asked for, and their steps."""
+    if options.shots is None:
+        first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
+        return [Span(settings, first, last)]
+    return [
+        Span(
+            replace(settings, follow=shot.follow, view=shot.view, angle=shot.angle, speed=shot.speed),
+            step_of(run, shot.start, default=0),
+            step_of(run, shot.stop, default=run.last),
+        )
+        for shot in read_shots(options.shots)
+    ]
 
 
 def still(options: StillOptions) -> int:

@@ -163,7 +163,9 @@ class FilmOptions:
     run
         Run folder.
     follow
-        Name of the agent that the camera follows.
+        Name of the agent, thing or vehicle that the camera follows.
+    shots
+        Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
     out
         File to write (.mp4).
     size
@@ -191,13 +193,14 @@ class FilmOptions:
     """
 
     run: Positional[Path]
-    follow: str
+    follow: str = ""
+    shots: Path | None = None
     out: Path = Path("film.mp4")
     size: str = "1920x1080"
     start: str = ""
     stop: str = ""
     fps: int = 25
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit"] = "behind"
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
     samples: int = 2
     quality: Literal["plain", "fine"] = "fine"
     world: Path | None = None
@@ -243,7 +246,7 @@ class StillOptions:
     at: str = ""
     out: Path = Path("still.png")
     size: str = "1920x1080"
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit"] = "behind"
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
     samples: int = 3
     quality: Literal["plain", "fine"] = "fine"
     world: Path | None = None

@@ -22,6 +22,11 @@ TASKS = {
     "vico/RobotDeliver-v0": "make_robot_deliver",
     "vico/Influence-v0": "make_influence",
 }
+#: Tasks for two robots at once, in PettingZoo's registry.
+TEAM_TASKS = {
+    "vico/RobotCarry-v0": "make_robot_carry_team",
+    "vico/RobotDeliver-v0": "make_robot_deliver_team",
+}
 _LEARNING = "vico.challenges.learning.make"
 #: Tasks of an arm and a box, which need no world, and what makes them.
 ARM_TASKS = {
@@ -57,5 +62,9 @@ def register_ids() -> None:
                     disable_env_checker=True,
                 )
     registry = getattr(pettingzoo, "parallel_registry", None)
-    if registry is not None and ID not in registry:
-        pettingzoo.register("parallel", ID, entry_point="vico.envs.parallel:make")
+    if registry is None:
+        return
+    teams = {name: f"{_LEARNING}:{maker}" for name, maker in TEAM_TASKS.items()}
+    for name, entry_point in ({ID: "vico.envs.parallel:make"} | teams).items():
+        if name not in registry:
+            pettingzoo.register("parallel", name, entry_point=entry_point)

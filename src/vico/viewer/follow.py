@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from vico.errors import InputError
 from vico.render.cameras import Cameras
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.scene import Scene
-from vico.sim.bodies import Bodies
-from vico.sim.moves import eye_height
-from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
+from vico.viewer.targets import LEAP, Target
+from vico.world.model import Record
 
-VIEWS = ("behind", "front", "eyes", "above", "side", "orbit")
+View = Literal["behind", "front", "eyes", "above", "side", "orbit", "close"]
+VIEWS: tuple[View, ...] = get_args(View)
 
 # Where the camera is from what it looks at: metres back along the heading, degrees round it (0 is behind), degrees up,
 # and so many in rooms: over clothes racks, counters and beds.
@@ -28,11 +29,11 @@ _PLACES = {
     "side": (3.6, 80.0, 8.0, 40.0),
     "above": (15.0, 0.0, 62.0, 62.0),
     "orbit": (4.5, 0.0, 15.0, 38.0),
+    "close": (2.6, 105.0, 18.0, 30.0),
 }
 _ORBIT = math.radians(14.0)  # a second
 # How far back for those who ride, as a multiple.
 _RIDING = {Vehicle.NONE: 1.0, Vehicle.BIKE: 1.3, Vehicle.BUS: 3.6}
-_LEAP = 4.0
 _FOV, _EYES_FOV = math.radians(42.0), math.radians(60.0)
 # Seconds in which the camera makes up for two thirds of a change.
 _TURNS, _SHIFTS, _WIDENS, _NARROWS = 0.55, 0.12, 0.9, 0.12
@@ -42,112 +43,29 @@ _RIM = 0.25  # metres to whatever is behind the camera
 # Who comes as near to the camera as the first makes it rise, metres; at the second it is so far above them.
 _RISES, _RISEN, _ABOVE = 2.6, 1.2, 0.4
 _LIFTS = 0.3  # seconds, as above
-_AROUND = 9.0
 _NEAREST = 0.45
 
 
-class Target(NamedTuple):
-    """Somebody who is followed.
+class Angle(Record):
+    """From where something is looked at.
 
     Attributes
     ----------
-    position
-        Where it stands, ENU metres.
-    yaw, pitch
-        Where it looks, radians.
-    eye
-        Height of its eyes or camera, metres.
-    entity
-        Its body.
-    size
-        Its largest extent, metres.
-    room
-        Index of the room it is in, -1 for none.
-    riding
-        A `Vehicle`.
-    others
-        The highest points of the others near by, ENU metres, shape ``(k, 3)``; None for nobody.
+    away
+        Metres from it, whatever its size.
+    around
+        Degrees round it: 0 is behind, 90 to its right.
+    up
+        Degrees above the horizon.
+    ahead_of
+        Name of an agent: degrees round are counted as if what is followed looked away from it; else from where that
+        looks. A thing in a hand is seen from beside the arm so, however it is turned.
     """
 
-    position: NDArray[np.float64]
-    yaw: float
-    pitch: float
-    eye: float
-    entity: int
-    size: float = 1.75
-    room: int = -1
-    riding: int = Vehicle.NONE
-    others: NDArray[np.float64] | None = None
-
-
-def target_of(state: SimulationState, name: str) -> Target:
-    """Return how an agent stands, or a vehicle or passer-by, by the name that the cast has for it (``car 3``).
-
-    Raises
-    ------
-    InputError
-        If nobody has that name.
-    """
-    if name not in state.names:
-        return _target_in_traffic(state, name)
-    i = state.names.index(name)
-    people = state.people
-    if i < len(people):
-        return Target(
-            people.position[i].copy(),
-            float(people.yaw[i]),
-            float(people.pitch[i]),
-            float(eye_height(state)[i]),
-            int(people.entity[i]),
-            float(people.height[i]),
-            int(people.room[i]),
-            int(people.vehicle[i]),
-            _others(state, people.position[i], int(people.entity[i])) if people.vehicle[i] == Vehicle.NONE else None,
-        )
-    assert state.robots is not None
-    k = i - len(people)
-    return _target_of_body(state.robots.bodies(), k, float(state.robots.camera_heights()[k]))
-
-
-def _others(state: SimulationState, position: NDArray[np.float64], entity: int) -> NDArray[np.float64]:
-    """Return the highest points of the bodies within some metres of somebody, shape ``(k, 3)``."""
-    bodies = state.obstacles()
-    near = np.abs(bodies.position[:, :2] - position[:2]).max(axis=1) < _AROUND
-    near &= (bodies.entity != entity) & (np.abs(bodies.position[:, 2] - position[2]) < 3.0)
-    return bodies.position[near] + np.column_stack([np.zeros((int(near.sum()), 2)), bodies.height[near]])
-
-
-def _target_in_traffic(state: SimulationState, name: str) -> Target:
-    entity = next((entity for entity, known in state.entities.items() if known["name"] == name), None)
-    for owner in state.owners():
-        bodies = owner.bodies()
-        found: list[int] = np.flatnonzero(bodies.entity == entity).tolist() if entity is not None else []
-        if found:
-            return _target_of_body(bodies, found[0], 0.85 * float(bodies.height[found[0]]))
-    raise InputError(
-        f"follow: nobody is called {name!r}, or is not there now; there are {', '.join(state.names)}, and traffic, "
-        "such as 'car 0'"
-    )
-
-
-def _target_of_body(bodies: Bodies, k: int, eye: float) -> Target:
-    size = 2.0 * max(float(bodies.half_length[k]), float(bodies.half_width[k]), 0.5 * float(bodies.height[k]))
-    return Target(bodies.position[k].copy(), float(bodies.yaw[k]), 0.0, eye, int(bodies.entity[k]), size)
-
-
-def target_between(a: Target, b: Target, share: float) -> Target:
-    """Return somebody part of the way from one moment to the next; who leapt stays until then."""
-    if share >= 1.0:
-        return b
-    if a.room != b.room or float(np.linalg.norm(b.position - a.position)) > _LEAP:
-        return a
-    turn = math.remainder(b.yaw - a.yaw, 2 * math.pi)
-    return a._replace(
-        position=a.position + share * (b.position - a.position),
-        yaw=a.yaw + share * turn,
-        pitch=a.pitch + share * (b.pitch - a.pitch),
-        eye=a.eye + share * (b.eye - a.eye),
-    )
+    away: Annotated[float, Field(ge=0.3, le=200.0)]
+    around: float = 0.0
+    up: Annotated[float, Field(ge=-20.0, le=89.0)] = 15.0
+    ahead_of: str = ""
 
 
 @dataclass
@@ -160,11 +78,14 @@ class FollowCamera:
         One of `VIEWS`.
     width, height
         Of the pictures, pixels.
+    angle
+        From where it looks, if not as the view has it.
     """
 
     view: str
     width: int
     height: int
+    angle: Angle | None = None
     _heading: float = 0.0
     _pitch: float = 0.0
     _focus: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
@@ -183,7 +104,7 @@ class FollowCamera:
         """Return the camera of the next frame, `dt` seconds after the last one."""
         focus = target.position + np.array([0.0, 0.0, target.eye if self.view == "eyes" else 0.82 * target.eye])
         # At first, and through a door, it is simply there.
-        cut = self._room != target.room or float(np.linalg.norm(focus - self._focus)) > _LEAP
+        cut = self._room != target.room or float(np.linalg.norm(focus - self._focus)) > LEAP
         self._room = target.room
         if cut:
             self._heading, self._pitch, self._focus = target.yaw, target.pitch, focus
@@ -206,11 +127,9 @@ class FollowCamera:
         return self._from_outside(scene, target, dt, cut=cut)
 
     def _from_outside(self, scene: Scene, target: Target, dt: float, *, cut: bool) -> Cameras:
-        away, around, outdoors, indoors = _PLACES[self.view]
-        up = indoors if target.room >= 0 else outdoors
+        wanted, around, up = self._place_from(target)
         if self.view == "orbit":
             self._angle += dt * _ORBIT
-        wanted = away * _RIDING[Vehicle(target.riding)] * float(np.clip(target.size / 1.75, 0.5, 4.0))
         turn = self._heading + math.pi + math.radians(around) + self._angle
         aside = self._roomiest(scene, turn, math.radians(up), wanted)
         self._aside = aside if cut else self._aside + _part(dt, _TURNS) * math.remainder(aside - self._aside, math.tau)
@@ -228,8 +147,16 @@ class FollowCamera:
         # Near a wall, it looks over the shoulder.
         near = max(0.0, 1.0 - self._distance / 1.5)
         ahead = -back * (1.0 - near) + near * np.array([math.cos(self._heading), math.sin(self._heading), -0.1])
-        hidden = target.entity if self._distance < 0.7 else 0
+        hidden = target.entity if self._distance < min(0.7, target.size) else 0
         return self._cameras(place, ahead, _FOV, hidden)
+
+    def _place_from(self, target: Target) -> tuple[float, float, float]:
+        """Return how far away from what it follows the camera would like to be, metres, and where, degrees."""
+        if self.angle is not None:
+            return self.angle.away, self.angle.around, self.angle.up
+        away, around, outdoors, indoors = _PLACES[self.view]
+        size = _RIDING[Vehicle(target.riding)] * float(np.clip(target.size / 1.75, 0.5, 4.0))
+        return away * size, around, indoors if target.room >= 0 else outdoors
 
     def _over(self, others: NDArray[np.float64] | None, place: NDArray[np.float64], wanted: float) -> float:
         """Return how steeply the camera has to look down, radians, to be above those who come near it."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -18,8 +20,9 @@ from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import FINE, RenderQuality
 from vico.sim.scene import SceneRenderer
 from vico.sim.simulation_state import SimulationState
-from vico.viewer.follow import FollowCamera, Target, target_between, target_of
+from vico.viewer.follow import Angle, FollowCamera
 from vico.viewer.repeat import RepeatedRun
+from vico.viewer.targets import Target, target_between, target_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +32,13 @@ class FilmSettings:
     Attributes
     ----------
     follow
-        Name of an agent.
+        Name of an agent, of a thing, or of something in traffic.
     view
         One of `vico.viewer.follow.VIEWS`.
+    angle
+        From where it is looked at, if not as the view has it.
+    speed
+        Seconds of the run in a second of the film.
     width, height
         Pixels, even.
     rate
@@ -44,6 +51,8 @@ class FilmSettings:
 
     follow: str
     view: str = "behind"
+    angle: Angle | None = None
+    speed: float = 1.0
     width: int = 1920
     height: int = 1080
     rate: int = 25
@@ -53,8 +62,18 @@ class FilmSettings:
     def __post_init__(self) -> None:
         if self.width % 2 or self.height % 2 or not (64 <= self.width <= 7680 and 64 <= self.height <= 4320):
             raise InputError(f"film: {self.width}x{self.height}; sides have to be even, 64x64 to 7680x4320")
+        if not 0.0 < self.speed <= 100.0:
+            raise InputError(f"film: a speed of {self.speed:g}; above 0 to 100 make sense")
         if not 1 <= self.rate <= 120:
             raise InputError(f"film: {self.rate} frames a second; 1 to 120 make sense")
+
+
+class Span(NamedTuple):
+    """A shot, and the steps of the run that it shows."""
+
+    settings: FilmSettings
+    first: int
+    last: int
 
 
 class _Seen(NamedTuple):
@@ -78,13 +97,36 @@ def write_run_film(
     InputError
         If the steps were not recorded, or nobody has the name.
     """
-    frames = film_frames(repeated, settings, first=first, last=last)
-    seconds = float(repeated.run.times[last] - repeated.run.times[first])
-    count = int(seconds * settings.rate)
-    with FilmWriter(path, rate=settings.rate, crf=20, threads=2) as film:
-        for number, frame in enumerate(frames):
-            film.add(frame)
-            report(min(number + 1, count), count)
+    return write_film_of_shots(path, repeated, [Span(settings, first, last)], report=report)
+
+
+def write_film_of_shots(
+    path: Path,
+    repeated: RepeatedRun,
+    shots: Sequence[Span],
+    *,
+    report: Callable[[int, int], None] = lambda done, all_of: None,
+) -> int:
+    """Film shots of a run, one after the other, of one size and rate; return the number of frames.
+
+    Raises
+    ------
+    InputError
+        If steps were not recorded, nobody has a name, or a shot begins before the one before it has ended.
+    """
+    for before, after in itertools.pairwise(shots):
+        if after.first < before.last:
+            raise InputError(
+                f"film: a shot of steps {after.first} to {after.last} after one to step {before.last}; a run is "
+                "filmed forwards: sort the shots by time"
+            )
+    times = repeated.run.times
+    count = sum(int(float(times[s.last] - times[s.first]) / s.settings.speed * s.settings.rate) for s in shots)
+    with FilmWriter(path, rate=shots[0].settings.rate, crf=20, threads=2) as film:
+        for settings, first, last in shots:
+            for frame in film_frames(repeated, settings, first=first, last=last):
+                film.add(frame)
+                report(min(film.frames, count), count)
         return film.frames
 
 
@@ -109,7 +151,7 @@ def still(repeated: RepeatedRun, settings: FilmSettings, step: int) -> NDArray[n
         raise InputError(f"still: step {step}; the run has steps 0 to {repeated.run.last}")
     repeated.go_to(step)
     seen = _watcher(repeated, settings)(repeated.sim.state)
-    camera = FollowCamera(settings.view, settings.width, settings.height)
+    camera = FollowCamera(settings.view, settings.width, settings.height, settings.angle)
     return _picture(seen, seen, 1.0, camera, settings, 1.0)
 
 
@@ -124,22 +166,30 @@ def _watcher(repeated: RepeatedRun, settings: FilmSettings) -> Callable[[Simulat
     renderer = SceneRenderer(repeated.sim, detail="full")
 
     def look(state: SimulationState) -> _Seen:
-        return _Seen(moment_of(renderer.show(state), state.second), target_of(state, settings.follow))
+        return _Seen(moment_of(renderer.show(state), state.second), _target(state, settings))
 
     return look
 
 
+def _target(state: SimulationState, settings: FilmSettings) -> Target:
+    target = target_of(state, settings.follow)
+    if settings.angle is None or not settings.angle.ahead_of:
+        return target
+    dx, dy, _ = (target.position - target_of(state, settings.angle.ahead_of).position).tolist()
+    return target._replace(yaw=math.atan2(dy, dx))
+
+
 def _frames(repeated: RepeatedRun, settings: FilmSettings, first: int, last: int) -> Iterator[NDArray[np.uint8]]:
-    target_of(repeated.sim.state, settings.follow)
+    _target(repeated.sim.state, settings)
     repeated.go_to(first)
     look = _watcher(repeated, settings)
-    camera = FollowCamera(settings.view, settings.width, settings.height)
+    camera = FollowCamera(settings.view, settings.width, settings.height, settings.angle)
     before = look(repeated.sim.state)
     start, number = before.moment.second, 0
     for tenths in repeated.moments(last, look):
         for after in tenths:
             # In whole numbers, so that no frame is lost to rounding.
-            while (second := start + number / settings.rate) <= after.moment.second + 1e-9:
+            while (second := start + number * settings.speed / settings.rate) <= after.moment.second + 1e-9:
                 length = max(after.moment.second - before.moment.second, 1e-9)
                 share = min(max((second - before.moment.second) / length, 0.0), 1.0)
                 yield _picture(before, after, share, camera, settings, 1.0 / settings.rate)

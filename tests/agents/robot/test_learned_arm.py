@@ -13,10 +13,12 @@ from robot_field import drawn_field
 from vico.agents.robot.body import Stance
 from vico.agents.robot.following import go_along, turned_aside
 from vico.agents.robot.grasps import grasps_of
-from vico.agents.robot.learned import LearnedArm, Stage
+from vico.agents.robot.held import held_thing
+from vico.agents.robot.learned import LearnedArm
 from vico.agents.robot.policy_clock import PolicyClock
-from vico.agents.robot.reaching import Reach, held_thing, reach_spot, reach_thing, room_around
+from vico.agents.robot.reaching import Reach, reach_spot, reach_thing, room_around
 from vico.agents.robot.skill import Errand, Ready
+from vico.agents.robot.stages import PolicyStage
 from vico.agents.robot.thing_watch import ThingPose, ThingWatch, pose_of_box
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
@@ -121,7 +123,7 @@ class Trial:
             ThingPose(objects.position[0] + rotation[:, 2] * half[2], rotation, half) if entity == self.thing else None
         )
 
-    def until_done(self, *, seconds: float = 60.0, stage: Stage | None = None) -> None:
+    def until_done(self, *, seconds: float = 60.0, stage: PolicyStage | None = None) -> None:
         for _ in range(round(seconds / PERIOD)):
             action = self.arm.act(self.observation)
             if not self.arm.busy or self.arm.stage is stage:
@@ -138,7 +140,7 @@ class Trial:
 def test_what_a_policy_does_is_picking_and_placing(oracle: bool) -> None:
     trial = Trial(Planned(), oracle=oracle)
     trial.arm.pick(trial.thing, np.array([1.4, 0.2, 0.0]))
-    trial.until_done(stage=Stage.POLICY)
+    trial.until_done(stage=PolicyStage.POLICY)
     # It begins as training did: hand down before the base, the thing where the arm reaches it, seen as it is.
     felt = np.asarray(trial.observation["sensors"]["joint_position"])
     np.testing.assert_allclose(felt[:7], ready_angles(), atol=0.06)
@@ -154,7 +156,7 @@ def test_what_a_policy_does_is_picking_and_placing(oracle: bool) -> None:
     assert trial.arm.held is not None
     assert trial.position[2] > 0.25
     trial.arm.place(np.array([0.2, -1.6, 0.0]))
-    trial.until_done(stage=Stage.POLICY)
+    trial.until_done(stage=PolicyStage.POLICY)
     errand = trial.policy.errands[1]
     assert errand.goal is not None
     beside = errand.thing.middle - errand.goal
@@ -168,7 +170,7 @@ def test_what_a_policy_does_is_picking_and_placing(oracle: bool) -> None:
 def test_a_restored_arm_does_what_it_would_have_done() -> None:
     trial = Trial(Planned())
     trial.arm.pick(trial.thing, np.array([1.4, 0.2, 0.0]))
-    for stage in (Stage.READY, Stage.POLICY):
+    for stage in (PolicyStage.READY, PolicyStage.POLICY):
         trial.until_done(stage=stage)
         again = LearnedArm(BODY, Planned(), period=PERIOD)
         again.restore(decode(encode(trial.arm.state())))
@@ -179,7 +181,7 @@ def test_a_policy_that_does_nothing_fails_in_time_and_one_that_gives_no_numbers_
     trial = Trial(Planned())
     trial.policy.seconds = 1.0
     trial.arm.pick(trial.thing, np.array([1.4, 0.2, 0.0]))
-    trial.until_done(stage=Stage.POLICY)
+    trial.until_done(stage=PolicyStage.POLICY)
     trial.policy.ways = []
     trial.until_done()
     assert (trial.arm.outcome, trial.arm.why) == ("failed", "the jaw closed on nothing")

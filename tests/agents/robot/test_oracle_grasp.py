@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from robot_field import drawn_field
-from vico.agents.robot.worker import ArmWorker, Stage
+from vico.agents.robot.stages import Stage
+from vico.agents.robot.worker import ArmWorker
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.challenges.robot.bodies import arm_body

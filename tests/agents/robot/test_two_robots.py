@@ -10,10 +10,11 @@ import pytest
 from vico.agents.robot import METHODS, make_robots
 from vico.agents.robot.depositor import Depositor
 from vico.agents.robot.driving import Drive
-from vico.agents.robot.heuristic import Manipulator, Stage
+from vico.agents.robot.held import Held
+from vico.agents.robot.heuristic import Manipulator
 from vico.agents.robot.scout import Scout
+from vico.agents.robot.stages import ErrandStage
 from vico.agents.robot.team import says_come, says_seen, told_come, told_seen, told_where
-from vico.agents.robot.worker import Held
 from vico.assets.robots import robot_model
 from vico.challenges.robot.bodies import team_of
 from vico.io.plain_data import decode, encode
@@ -108,18 +109,18 @@ def test_a_scout_stands_once_the_thing_is_held_and_goes_with_a_person() -> None:
 
 def test_what_slips_out_of_the_jaw_is_looked_for_where_that_was() -> None:
     arm = Manipulator(told(), TEAM, carrier="robot_1", uses_deck=False)
-    arm.stage = Stage.BRING
+    arm.stage = ErrandStage.BRING
     arm.worker.held = Held(np.zeros((1, 3)), 0.1, 0.1, 0.05, np.eye(3), np.zeros(2))
     for _ in range(10):
         arm.act(observation((40.0, 0.0), grip=30.0), info(sees=False))
-    assert arm.stage is Stage.BRING
+    assert arm.stage is ErrandStage.BRING
     for _ in range(10):
         arm.act(observation((41.0, 0.0)), info(sees=False))
-    assert arm.stage is Stage.SEARCH
+    assert arm.stage is ErrandStage.SEARCH
     assert arm.worker.held is None
     for _ in range(6):
         arm.act(observation((41.0, 0.0), sees=True), info(sees=True))
-    assert arm.stage is Stage.PICK
+    assert arm.stage is ErrandStage.PICK
 
 
 def test_pictures_are_wanted_where_they_are_looked_at() -> None:
@@ -130,7 +131,7 @@ def test_pictures_are_wanted_where_they_are_looked_at() -> None:
         wanted.append(sees is not None)
         arm.act(observation(sees=sees), info(sees=False))
     assert 1 <= sum(wanted) <= 3
-    assert arm.stage is Stage.GO
+    assert arm.stage is ErrandStage.GO
     assert not Manipulator(told("carry"), TEAM, carrier="robot_1").wants_picture
 
 

@@ -15,8 +15,9 @@ from command_line import vico
 from robot_field import drawn_field
 from vico.agents.robot.chunk_policy import ChunkPolicy, new_network
 from vico.agents.robot.chunk_shape import ChunkShape
-from vico.agents.robot.learned import LearnedArm, Stage
+from vico.agents.robot.learned import LearnedArm
 from vico.agents.robot.skill import Errand
+from vico.agents.robot.stages import PolicyStage
 from vico.agents.robot.thing_watch import ThingPose
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
@@ -256,7 +257,7 @@ def test_a_policy_of_pictures_drives_and_moves_the_arm(tmp_path: Path) -> None:
     vectors: list[list[float]] = []
     while len(vectors) < 8:
         action = arm.act(observation)
-        if arm.stage is Stage.POLICY:
+        if arm.stage is PolicyStage.POLICY:
             vectors.append(action["vector"])
         observation = sim.step({"robot_0": action}).observations["robot_0"]
         assert observation["state"]["action_status"] in ("ok", "ongoing")

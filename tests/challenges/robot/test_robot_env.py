@@ -7,16 +7,19 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pettingzoo
 import pytest
 from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_api_test
 
 import vico.envs  # noqa: F401  (registers the ids)
 from vico.challenges.learning.make import make_robot_deliver
-from vico.challenges.learning.robot import GOAL
+from vico.challenges.learning.robot_stage import GOAL
 from vico.challenges.robot.thresholds import DESTINATION_RADIUS
 from vico.errors import InputError
 
 SMALL = {"tasks": 1, "image": 48, "seconds": 4, "period": 0.1, "cars": 0, "pedestrians": 2}
+BOTH = ("robot_0", "robot_1")
 IDS = ("vico/RobotDeliver-v0", "vico/RobotCarry-v0")
 # Pictures of extents that have no bounds, and vectors that are no shares, are what they are.
 quiet = pytest.mark.filterwarnings("ignore::UserWarning")
@@ -59,13 +62,13 @@ def test_rewards_are_the_papers_and_success_ends_the_episode(helsinki_path: Path
     wait = {"type": "wait"}
     _, reward, *_ = env.step(wait)
     objects = work.env.sim.state.objects
-    k = objects.names.index(work._task.thing.name)
-    away = float(np.hypot(*(objects.position[k, :2] - work._goal[:2])))
+    k = objects.names.index(work.stage.task.thing.name)
+    away = float(np.hypot(*(objects.position[k, :2] - work.stage.goal_at[:2])))
     assert away > DESTINATION_RADIUS + 0.1
-    robot = work._bodies()[0]
+    robot = work.stage.bodies()[0]
     hand = float(np.hypot(*(objects.position[k, :2] - robot[:2])))
     assert reward == pytest.approx(-0.02 * (min(hand, 10.0) + min(away, 10.0)), abs=0.02)
-    objects.position[k] = work._goal
+    objects.position[k] = work.stage.goal_at
     over, rewards, cut, info = False, [], False, {}
     while not over and not cut:
         _, reward, over, cut, info = env.step(wait)
@@ -83,7 +86,7 @@ def test_what_is_asked_is_told_in_numbers_and_the_thing_where_it_is_seen(helsink
     assert seen["goal"][20:].tolist() == [0.0] * 7  # it is far off
     work: Any = env.task
     objects, robot = work.env.sim.state.objects, work._stance()
-    k = objects.names.index(work._task.thing.name)
+    k = objects.names.index(work.stage.task.thing.name)
     ahead = robot.outside(np.array([1.2, 0.0, 0.0]))
     ahead[2] = float(work.env.world.height(ahead[:2]))
     objects.position[k] = ahead
@@ -91,7 +94,7 @@ def test_what_is_asked_is_told_in_numbers_and_the_thing_where_it_is_seen(helsink
         seen = env.step({"type": "wait"})[0]
     found = seen["goal"][20:]
     assert found[0] == 1.0
-    size = np.array(work._truth(work._entity).half)
+    size = np.array(work.stage._truth(work.stage._entity).half)
     assert found[1:3] == pytest.approx([1.2, 0.0], abs=0.15)
     assert np.sort(found[4:6]) == pytest.approx(np.sort(size[:2]), abs=0.05)
 
@@ -111,3 +114,32 @@ def test_an_action_that_is_no_number_ends_the_episode(helsinki_path: Path) -> No
 def test_odd_options_are_refused(options: dict[str, Any], says: str, helsinki_path: Path) -> None:
     with pytest.raises(InputError, match=says):
         make_robot_deliver(helsinki_path, **options)
+
+
+@quiet
+@pytest.mark.parametrize("form", ["rich", "arrays"])
+def test_both_robots_learn_at_once_in_a_pettingzoo_environment(form: str, helsinki_path: Path) -> None:
+    env: Any = pettingzoo.make("parallel", IDS[0], world=helsinki_path, form=form, **SMALL | {"seconds": 1})
+    parallel_api_test(env, num_cycles=12)
+    hashes = []
+    for _ in range(2):
+        seen, infos = env.reset(seed=0)
+        assert form == "arrays" or infos["robot_1"]["instructions"]["category"] == "deliver"
+        for name in BOTH:
+            env.action_space(name).seed(5)
+        for _ in range(10):
+            assert all(env.observation_space(name).contains(seen[name]) for name in BOTH)
+            assert env.agents == list(BOTH)
+            seen, rewards, ended, cut, infos = env.step({name: env.action_space(name).sample() for name in BOTH})
+        assert rewards["robot_0"] == rewards["robot_1"] < 0.0
+        assert (ended, cut, env.agents) == (dict.fromkeys(BOTH, False), dict.fromkeys(BOTH, True), [])
+        assert infos["robot_0"]["is_success"] == 0.0
+        hashes.append(env.state_hash())
+    assert hashes[0] == hashes[1]
+    assert env.render().shape == (48, 96, 3)
+    env.reset(seed=0)
+    broken = {"type": "control", "vector": [np.nan, 0.0]}
+    _, rewards, ended, _, infos = env.step({"robot_0": {"type": "wait"}, "robot_1": broken})
+    assert (set(rewards.values()), set(ended.values()), env.agents) == ({0.0}, {True}, [])
+    with pytest.raises(InputError, match="reset"):
+        env.step({})

@@ -13,12 +13,20 @@ from vico.assets.models.movable import movable_kinds
 from vico.assets.robots import robot_model
 from vico.challenges.assistant.rules import entrance_of
 from vico.challenges.robot.bodies import arm_body
-from vico.challenges.robot.episode import world_and_people
 from vico.challenges.robot.generate import generate_robot_task, portable_kinds
 from vico.challenges.robot.judge import CAUSES, RobotJudge
-from vico.challenges.robot.model import CATEGORIES, RobotTask, read_robot_task, write_robot_task
-from vico.challenges.robot.thresholds import APART, CARRIER_COMES, CARRY_REACH, DESTINATION_RADIUS, GOAL_COMES
-from vico.challenges.robot.ways import Ways
+from vico.challenges.robot.model import CATEGORIES, RobotTask, read_robot_task
+from vico.challenges.robot.thresholds import (
+    APART,
+    CARRIER_COMES,
+    CARRY_REACH,
+    DESTINATION_RADIUS,
+    GOAL_COMES,
+    RESIDENTS,
+)
+from vico.challenges.staging import world_and_people
+from vico.challenges.task_files import write_task_file
+from vico.challenges.ways import Ways
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
 from vico.world.folder import World
@@ -26,7 +34,7 @@ from vico.world.folder import World
 
 @pytest.fixture(scope="module")
 def tasks(helsinki_path: Path) -> dict[str, RobotTask]:
-    world, people = world_and_people(helsinki_path)
+    world, people = world_and_people(helsinki_path, RESIDENTS)
     return {category: generate_robot_task(world, people, category, seed=3) for category in CATEGORIES}
 
 
@@ -34,7 +42,7 @@ def tasks(helsinki_path: Path) -> dict[str, RobotTask]:
 def test_a_seed_gives_the_same_task_and_another_seed_another(
     category: Any, tasks: dict[str, RobotTask], helsinki_path: Path
 ) -> None:
-    world, people = world_and_people(helsinki_path)
+    world, people = world_and_people(helsinki_path, RESIDENTS)
     assert generate_robot_task(world, people, category, seed=3) == tasks[category]
     assert generate_robot_task(world, people, category, seed=4) != tasks[category]
 
@@ -60,7 +68,7 @@ def test_both_robots_have_ways_to_the_thing_and_to_its_destination(
     category: str, tasks: dict[str, RobotTask], helsinki: World
 ) -> None:
     task, arm, husky = tasks[category], robot_model("manipulator"), robot_model("husky")
-    ways = Ways(helsinki, arm, husky)
+    ways = Ways(helsinki)
     door = entrance_of(task.destination, helsinki) if category == "carry" else np.array(task.destination.centre)
     for model, start, near in ((arm, task.manipulator, GOAL_COMES), (husky, task.carrier, CARRIER_COMES)):
         points = [(np.array(task.thing.position), near), (door, near)]
@@ -86,7 +94,7 @@ def test_a_task_file_is_read_back_and_nonsense_is_refused(
     tasks: dict[str, RobotTask], helsinki: World, tmp_path: Path
 ) -> None:
     path = tmp_path / "task.json"
-    write_robot_task(path, tasks["carry"])
+    write_task_file(path, tasks["carry"])
     assert read_robot_task(path, world=helsinki) == tasks["carry"]
     content = read_json(path)
     for change, says in (

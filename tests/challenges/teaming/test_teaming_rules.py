@@ -13,9 +13,9 @@ import pytest
 from vico.agents.teaming.newcomer import GAVE_UP, I_FOLLOW
 from vico.agents.teaming.visitor import LETS_GO
 from vico.challenges.assistant.rules import entrance_of
+from vico.challenges.staging import world_and_people
 from vico.challenges.teaming import accompany, guide, spot
 from vico.challenges.teaming import thresholds as t
-from vico.challenges.teaming.episode import world_and_people
 from vico.challenges.teaming.generate import generate_teaming_task
 from vico.challenges.teaming.judge import TeamingJudge
 from vico.challenges.teaming.looking import Look
@@ -27,7 +27,7 @@ FAR = np.array([500.0, 500.0, 0.0])
 
 @pytest.fixture(scope="module")
 def tasks(helsinki_path: Path) -> dict[Category, TeamingTask]:
-    world, people = world_and_people(helsinki_path)
+    world, people = world_and_people(helsinki_path, t.RESIDENTS)
     return {category: generate_teaming_task(world, people, category, seed=3) for category in CATEGORIES}
 
 
@@ -67,7 +67,7 @@ def test_who_waits_at_the_door_until_they_have_gone_in_has_accompanied(
 ) -> None:
     task = with_stay(tasks["accompany"], None)
     film, door = walked(task, helsinki, apart=t.WITH_DISTANCE - 0.1)
-    assert film.rules.share() == 100.0
+    assert film.rules.company.share() == 100.0
     film.show(place=task.destination.place, outdoors=False)
     assert film.show(5, robots=beside(door, t.DOOR_DISTANCE + 0.1)) == "person never came"
     assert not film.rules.over
@@ -117,7 +117,7 @@ def test_who_comes_to_the_destination_with_the_person_has_guided(
     assert film.show(5, person=goal + 30.0, robots=beside(goal, 0.0)) == "not met"
     assert film.show(5, said=(I_FOLLOW,), robots=beside(goal + 30.0, t.FOLLOWS_WITHIN - 0.1)) == "out of time"
     assert film.show(5, robots=beside(goal + 30.0, t.FOLLOWS_WITHIN + 0.1)) == "out of time"
-    assert film.rules.share() == 50.0
+    assert film.rules.company.share() == 50.0
     assert film.show(5, robots=beside(goal, t.ARRIVED - 0.1)) == "left behind"
     assert film.show(1, person=goal, robots=beside(goal, t.ARRIVED - 0.1)) == ""
     assert film.rules.over

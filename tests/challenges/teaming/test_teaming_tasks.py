@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vico.challenges.assistant.thresholds import CANDIDATES
+from vico.challenges.staging import world_and_people
+from vico.challenges.task_files import write_task_file
 from vico.challenges.teaming import thresholds as t
 from vico.challenges.teaming.drawing import visible_kinds
-from vico.challenges.teaming.episode import world_and_people
 from vico.challenges.teaming.generate import generate_teaming_task
-from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask, read_teaming_task, write_teaming_task
+from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask, read_teaming_task
 from vico.errors import SchemaError
 from vico.io.files import write_json
 from vico.world.folder import World
@@ -21,7 +23,7 @@ MODELS = {"accompany": [{"h1"}], "guide": [{"go2"}], "spot": [{"drone"}, {"go2",
 
 @pytest.fixture(scope="module")
 def tasks(helsinki_path: Path) -> dict[Category, TeamingTask]:
-    world, people = world_and_people(helsinki_path)
+    world, people = world_and_people(helsinki_path, t.RESIDENTS)
     return {category: generate_teaming_task(world, people, category, seed=3) for category in CATEGORIES}
 
 
@@ -29,7 +31,7 @@ def tasks(helsinki_path: Path) -> dict[Category, TeamingTask]:
 def test_a_seed_gives_the_same_task_and_another_seed_another(
     category: Category, tasks: dict[Category, TeamingTask], helsinki_path: Path
 ) -> None:
-    world, people = world_and_people(helsinki_path)
+    world, people = world_and_people(helsinki_path, t.RESIDENTS)
     assert generate_teaming_task(world, people, category, seed=3) == tasks[category]
     assert generate_teaming_task(world, people, category, seed=4) != tasks[category]
 
@@ -46,7 +48,7 @@ def test_a_team_has_its_robots_on_free_ground_and_the_way_is_short(
         assert helsinki.walkable.clearance_of(*member.start.position) >= 1.0
     away = np.hypot(*np.subtract(task.team[-1].start.position, task.destination.centre[:2]))
     assert away <= t.MOST_WALK
-    assert max(len(names) for names in task.candidates.values()) <= t.CANDIDATES
+    assert max(len(names) for names in task.candidates.values()) <= CANDIDATES
 
 
 @pytest.mark.parametrize("category", ["accompany", "guide"])
@@ -80,7 +82,7 @@ def test_a_task_file_is_read_back_and_nonsense_is_refused(
 ) -> None:
     path = tmp_path / "task.json"
     for task in tasks.values():
-        write_teaming_task(path, task)
+        write_task_file(path, task)
         assert read_teaming_task(path, world=helsinki) == task
     spot, guide = (tasks[category].model_dump(mode="json") for category in ("spot", "guide"))
     accompany = tasks["accompany"].model_dump(mode="json")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vico.kinematics.arm import Chain, hand_pose
 from vico.kinematics.limbs import Jaw, Limbs, limbs_of
@@ -83,3 +83,8 @@ class Stance(NamedTuple):
     def outside(self, points: Array) -> Array:
         """Return points of the base's frame in the world, shape ``(..., 3)``."""
         return np.asarray(points @ self.rotation.T + self.position)
+
+
+def metres_apart(a: ArrayLike, b: ArrayLike) -> float:
+    """Return how far two points are from each other on the map, whatever their heights, metres."""
+    return float(np.hypot(*(np.asarray(a, np.float64)[:2] - np.asarray(b, np.float64)[:2])))

@@ -8,50 +8,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
-from vico.agents.robot.following import go_along, turned_aside
-from vico.agents.robot.reaching import GAP, Held, held_thing, reach_spot, room_around
-from vico.agents.robot.sight import look
+from vico.agents.robot.following import go_along
+from vico.agents.robot.held import Held, held_thing
+from vico.agents.robot.readying import way_beside, way_to_ready
 from vico.agents.robot.skill import ArmPolicy, Errand
+from vico.agents.robot.stages import PolicyStage
+from vico.agents.robot.stages import Stage as WorkerStage
 from vico.agents.robot.thing_watch import ThingPose, ThingWatch, Truth, presses
 from vico.agents.robot.worker import ArmWorker
-from vico.agents.robot.worker import Stage as WorkerStage
 from vico.agents.state import AgentState
 from vico.errors import InputError
-from vico.kinematics.planning import Arm, free_way
 
 Array = NDArray[np.float64]
 Action = dict[str, Any]
 
-# A policy that drives takes over once it is so near to facing the thing, rad.
-_FACES = 0.4
+_FACES = 0.4  # rad off facing the thing at which a policy that drives takes over
 # A thing was picked once it has been lifted so far, metres, and pressed on so long; it was put down once no finger has
 # pressed on it for so long, seconds.
 _LIFTED, _HOLDS, _LETS_GO = 0.08, 0.25, 0.5
 # Fingers that did not pick a thing open by so much, metres.
 _LETS_GO_BY = 0.02
-# Before it is put down a thing is held so far beside its goal, metres, on either side of it.
-_BESIDE = 0.22
-# Gaps that are tried on the way to where a policy begins, metres; of their speed arms go with there; angles that count
-# as there, rad; seconds for it.
-_GAPS, _SPEED, _THERE, _READY_TIME = (GAP, 0.0, -0.02), 0.5, 0.03, 20.0
+# Of its speed the arm goes with to where a policy begins; angles that count as there, rad; seconds for it.
+_SPEED, _THERE, _READY_TIME = 0.5, 0.03, 20.0
 _SERVOS = 9
-
-
-class Stage(StrEnum):
-    """What the arm is at."""
-
-    IDLE = "idle"
-    COME = "come"
-    READY = "ready"
-    POLICY = "policy"
-    FOLD = "fold"
 
 
 class LearnedArm:
@@ -78,7 +63,7 @@ class LearnedArm:
 
     def __init__(self, body: ArmBody, policy: ArmPolicy, *, period: float, truth: Truth | None = None) -> None:
         self.body, self.policy, self.period = body, policy, period
-        self.stage = Stage.IDLE
+        self.stage = PolicyStage.IDLE
         self.outcome = self.why = self.broken = ""
         self._worker = ArmWorker(body, period=period)
         self._watch = ThingWatch(body, truth=truth)
@@ -95,14 +80,14 @@ class LearnedArm:
     @property
     def busy(self) -> bool:
         """Whether it is at work."""
-        return self.stage is not Stage.IDLE
+        return self.stage is not PolicyStage.IDLE
 
     @property
     def wants_picture(self) -> bool:
         """Whether it looks at what is around it the next time."""
-        if self.stage is Stage.POLICY:
+        if self.stage is PolicyStage.POLICY:
             return self._watch.looks or self.policy.drives
-        return self.stage is Stage.READY or self._worker.wants_picture
+        return self.stage is PolicyStage.READY or self._worker.wants_picture
 
     @property
     def held(self) -> Held | None:
@@ -115,19 +100,19 @@ class LearnedArm:
             self._watch.forget()
         self._places, self._entity, self._spot = False, entity, np.array(position, np.float64)
         self._worker.pick(entity, position, beside=beside)
-        self._next(Stage.COME)
+        self._next(PolicyStage.COME)
 
     def place(self, spot: Array, *, beside: Array | None = None) -> None:
         """Begin to put down what is held, with its underside at a spot, ENU metres; see `ArmWorker.place`."""
         self._places, self._spot = True, np.array(spot, np.float64)
         self._worker.place(spot, beside=beside)
-        self._next(Stage.COME)
+        self._next(PolicyStage.COME)
 
     def fold(self) -> None:
         """Begin to bring the arm to where things are carried, or to its rest; no policy is asked."""
         self.outcome, self.why = "folded", ""
         self._worker.fold()
-        self._next(Stage.FOLD)
+        self._next(PolicyStage.FOLD)
 
     def lost(self, observation: Mapping[str, Any]) -> bool:
         """Return whether a jaw that held something feels it no more; see `ArmWorker.lost`."""
@@ -149,12 +134,9 @@ class LearnedArm:
             If the policy gives no usable action.
         """
         self._timer += self.period
-        if self.stage in (Stage.READY, Stage.POLICY) and self.wants_picture and "depth" not in observation:
+        if self.stage in (PolicyStage.READY, PolicyStage.POLICY) and self.wants_picture and "depth" not in observation:
             return self._hold()  # until there is one
         return _STAGES[self.stage](self, observation)
-
-    def _rest(self, observation: Mapping[str, Any]) -> Action:
-        return self._worker.act(observation)
 
     def _come(self, observation: Mapping[str, Any]) -> Action:
         """Drive to where the policy takes over."""
@@ -170,12 +152,18 @@ class LearnedArm:
         thing = self._watch.where(observation, self._entity)
         if thing is None or (self._places and self.held is None):
             return self._finish(observation, "failed", "not seen" if thing is None else "nothing in the jaw", thing)
-        if self.policy.ready is None:
+        ready = self.policy.ready
+        if ready is None:
             return self._begin(observation, thing)
-        way = self._way_to_ready(observation)
+        now = self._servos[:7].copy()
+        if self._places:
+            assert self.held is not None
+            way: Array | None = way_beside(self.body, observation, now, self.held, self._spot, entity=self._entity)
+        else:
+            way = way_to_ready(self.body, observation, now, ready)
         if way is None:
             return self._finish(observation, "failed", "no way to where the policy begins", thing)
-        self._next(Stage.READY)
+        self._next(PolicyStage.READY)
         self._way, self._point = way, 0
         return self._hold()
 
@@ -204,7 +192,7 @@ class LearnedArm:
             goal = Stance.of(observation).inside(self._spot) + np.array([0.0, 0.0, float(thing.middle[2]) - thing.low])
         self._low = thing.low
         self.policy.begin(Errand(self._entity, thing, goal), self._servos)
-        self._next(Stage.POLICY)
+        self._next(PolicyStage.POLICY)
         return self._ask(observation)
 
     def _ask(self, observation: Mapping[str, Any]) -> Action:
@@ -242,7 +230,7 @@ class LearnedArm:
             self._worker.held = None
         self._worker.moved(self._servos)
         self._worker.fold()
-        self._next(Stage.FOLD)
+        self._next(PolicyStage.FOLD)
         return self._hold()
 
     def _fold(self, observation: Mapping[str, Any]) -> Action:
@@ -260,41 +248,15 @@ class LearnedArm:
         x, y, _ = Stance.of(observation).inside(self._spot).tolist()
         return abs(math.atan2(y, x)) < _FACES
 
-    def _way_to_ready(self, observation: Mapping[str, Any]) -> Array | None:
-        """Return angles that bring the arm to where episodes of training began, shape ``(m, 7)``; None if none is free.
-
-        To pick: to `Ready.angles`. To place: to hold the thing beside its goal, a little above what that lies on; where
-        no such place can be reached it begins with the arm as it is.
-        """
-        seen, stance = look(observation), Stance.of(observation)
-        now = self._servos[:7].copy()
-        if self._places:
-            held, spot = self.held, stance.inside(self._spot)
-            assert held is not None
-            room = room_around(self.body, seen.without(self._entity))
-            for side in (_BESIDE, -_BESIDE):
-                reach = reach_spot(self.body, room, now, turned_aside(spot, side), held)
-                if reach is not None:
-                    return reach.over
-            return now[None]
-        ready = self.policy.ready
-        assert ready is not None
-        room, limbs = room_around(self.body, seen.points), self.body.limbs(ready.opening)
-        for gap in _GAPS:
-            way = free_way(Arm(self.body.chain, limbs, room, gap), now, ready.angles)
-            if way is not None:
-                return way
-        return None
-
     def _hold(self) -> Action:
         return {"type": "control", "vector": [*self._servos.tolist(), 0.0, 0.0]}
 
-    def _next(self, stage: Stage) -> None:
+    def _next(self, stage: PolicyStage) -> None:
         self.stage, self._timer, self._counted = stage, 0.0, 0.0
 
     def _end(self, outcome: str, why: str, action: Action) -> Action:
         self.outcome, self.why = outcome, why
-        self._next(Stage.IDLE)
+        self._next(PolicyStage.IDLE)
         return action
 
     # Saved and restored.
@@ -321,7 +283,7 @@ class LearnedArm:
         self._worker.restore(state["worker"])
         self._watch.restore(state["watch"])
         self.policy.restore(state["policy"])
-        self.stage = Stage(state["stage"])
+        self.stage = PolicyStage(state["stage"])
         self.outcome, self.why, self.broken = (str(text) for text in state["said"])
         self._places, self._entity, self._point = bool(state["places"]), int(state["entity"]), int(state["point"])
         self._spot, self._servos, self._way = (np.array(state[name]) for name in ("spot", "servos", "way"))
@@ -329,9 +291,9 @@ class LearnedArm:
 
 
 _STAGES = {
-    Stage.IDLE: LearnedArm._rest,
-    Stage.COME: LearnedArm._come,
-    Stage.READY: LearnedArm._ready,
-    Stage.POLICY: LearnedArm._ask,
-    Stage.FOLD: LearnedArm._fold,
+    PolicyStage.IDLE: lambda arm, observation: arm._worker.act(observation),
+    PolicyStage.COME: LearnedArm._come,
+    PolicyStage.READY: LearnedArm._ready,
+    PolicyStage.POLICY: LearnedArm._ask,
+    PolicyStage.FOLD: LearnedArm._fold,
 }

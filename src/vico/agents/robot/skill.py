@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.reaching import Held
+from vico.agents.robot.held import Held
 from vico.agents.robot.thing_watch import ThingPose
 from vico.agents.state import AgentState
 
@@ -17,16 +17,15 @@ Action = dict[str, Any]
 
 
 class ArmSkill(Protocol):
-    """Does one piece of work after the other; asked as often as its robot acts.
+    """Does one piece of work after the other; asked as often as its robot acts."""
 
-    Attributes
-    ----------
-    outcome, why
-        Of the last piece of work: ``"picked"``, ``"placed"`` or ``"failed"``, and why that.
-    """
+    @property
+    def outcome(self) -> str:
+        """What came of the last piece of work: ``"picked"``, ``"placed"`` or ``"failed"``."""
 
-    outcome: str
-    why: str
+    @property
+    def why(self) -> str:
+        """Why it failed."""
 
     @property
     def busy(self) -> bool:

@@ -1,4 +1,4 @@
-"""What an arm can be told to do, and the stages of doing it."""
+"""What an arm can be told to do, the stages of doing it, and those of a robot that has a thing to bring."""
 
 from __future__ import annotations
 
@@ -29,3 +29,29 @@ class Work(StrEnum):
     PLACE = "placed"
     OFFER = "handed_over"
     FOLD = "folded"
+
+
+class ErrandStage(StrEnum):
+    """What a robot that brings a thing is at."""
+
+    GO = "go to the source"
+    CALL = "call the person"
+    SEARCH = "look for the thing"
+    PICK = "pick it"
+    LOAD = "put it on the carrier"
+    ALONG = "go along with the carrier"
+    UNLOAD = "take it off the carrier"
+    FOLLOW = "follow the person"
+    BRING = "bring it"
+    PLACE = "put it down"
+    END = "end"
+
+
+class PolicyStage(StrEnum):
+    """What an arm is at whose policy was learned."""
+
+    IDLE = "idle"
+    COME = "come"
+    READY = "ready"
+    POLICY = "policy"
+    FOLD = "fold"

@@ -6,7 +6,7 @@ What a task is (whose it is, what is asked, when it is over, what is rewarded) i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -15,6 +15,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from vico.challenges.learning.goals import with_goal, with_goal_space
 from vico.envs import CommunityEnv, StepResult
 from vico.envs.arrays.form import ArrayForm
 from vico.errors import InputError, VicoError
@@ -127,8 +128,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self.task, self.render_mode = task, render_mode
         self._tasks, self._first_seed = tasks, seed
         self._form = task.env.forms[task.agent]
-        self._is_flat = isinstance(self._form.observation_space, spaces.Box)
-        self.observation_space = self._with_goal(self._form.observation_space)
+        self.observation_space = with_goal_space(self._form.observation_space, task.goal_space)
         self.action_space = self._form.action_space
         self._last: StepResult | None = None
         self._over = True
@@ -146,7 +146,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             super().reset(seed=seed)
         else:
             super().reset(seed=seed)
-        number, self._last = self._begun(seed)
+        number, self._last = begun(self.task.begin, seed, tasks=self._tasks, random=self.np_random)
         self._over = False
         if isinstance(self._form, ArrayForm):
             self._form.allows = self.task.allows
@@ -190,33 +190,38 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self.task.env.close()
         self._last, self._over = None, True
 
-    def _begun(self, seed: int | None) -> tuple[int, StepResult]:
-        """Start the episode of a seed; of the first number drawn that the world holds, where there is none."""
-        if seed is not None:
-            number = seed if self._tasks is None else seed % self._tasks
-            return number, self.task.begin(number)
-        for _ in range(_TRIES - 1):
-            number = int(self.np_random.integers(self._tasks or _MANY))
-            try:
-                return number, self.task.begin(number)
-            except VicoError:
-                continue
-        number = int(self.np_random.integers(self._tasks or _MANY))
-        return number, self.task.begin(number)
-
     def _told(self, result: StepResult) -> tuple[Any, dict[str, Any]]:
         observation, info = self.task.env.told(self.task.agent, result)
-        goal = np.clip(self.task.goal(result), self.task.goal_space.low, self.task.goal_space.high).astype(np.float32)
-        if self._is_flat:
-            return np.concatenate([observation, goal.reshape(-1)]), info
-        return {**observation, "goal": goal}, info
+        return with_goal(observation, self.task.goal(result), self.task.goal_space), info
 
-    def _with_goal(self, space: spaces.Space[Any]) -> spaces.Space[Any]:
-        goal = self.task.goal_space
-        if isinstance(space, spaces.Box):
-            low, high = (
-                np.concatenate([a, b.reshape(-1)]) for a, b in ((space.low, goal.low), (space.high, goal.high))
-            )
-            return spaces.Box(low, high, dtype=np.float32)
-        assert isinstance(space, spaces.Dict)
-        return spaces.Dict({**space.spaces, "goal": goal})
+
+def begun(
+    begin: Callable[[int], StepResult], seed: int | None, *, tasks: int | None, random: np.random.Generator
+) -> tuple[int, StepResult]:
+    """Start the episode of a seed; of the first number drawn that the world holds, where there is none.
+
+    Parameters
+    ----------
+    begin
+        Starts the episode of a number.
+    tasks
+        How many different episodes there are; None sets no limit.
+    random
+        Draws numbers.
+
+    Raises
+    ------
+    VicoError
+        If the world does not hold the task with this seed; or none of many, where no seed is given.
+    """
+    if seed is not None:
+        number = seed if tasks is None else seed % tasks
+        return number, begin(number)
+    for _ in range(_TRIES - 1):
+        number = int(random.integers(tasks or _MANY))
+        try:
+            return number, begin(number)
+        except VicoError:
+            continue
+    number = int(random.integers(tasks or _MANY))
+    return number, begin(number)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vico.challenges.assistant.episode import world_and_people
 from vico.challenges.assistant.model import Category
@@ -21,6 +21,9 @@ from vico.community.model import Community
 from vico.envs.vector import VectorAgentEnv, makers
 from vico.world.folder import World, read_world
 
+if TYPE_CHECKING:
+    from vico.challenges.learning.robot_team import RobotTeamEnv
+
 _OF_ENV = ("tasks", "seed", "render_mode")
 
 
@@ -33,10 +36,8 @@ def make_point_goal(world: World | Path | str, **options: Any) -> TaskEnv:
         Those of `PointGoalOptions`, of `TaskEnv` (`tasks`, `seed`, `render_mode`) and of `vico.envs.spec.EnvSpec`
         (`observe`, `image`, `form`, ...).
     """
-    of_env, rest = _split(options, _OF_ENV)
-    of_task, settings = _split(rest, [field.name for field in fields(PointGoalOptions)])
-    settings.setdefault("form", {"name": "arrays", "actions": "discrete", "kinds": KINDS})
-    return TaskEnv(PointGoal(world_of(world), PointGoalOptions(**of_task), **settings), **of_env)
+    form = {"name": "arrays", "actions": "discrete", "kinds": KINDS}
+    return _env(partial(PointGoal, world_of(world)), PointGoalOptions, options, form=form)
 
 
 def make_robot_point_goal(world: World | Path | str, **options: Any) -> TaskEnv:
@@ -54,10 +55,8 @@ def make_commute(world: World | Path | str, **options: Any) -> TaskEnv:
     """
     from vico.challenges.learning.commute import CommuteOptions, CommuteTaskEnv  # compiled code, slow to import
 
-    of_env, rest = _split(options, _OF_ENV)
-    of_task, settings = _split(rest, [field.name for field in fields(CommuteOptions)])
-    settings.setdefault("form", {"name": "arrays", "actions": "discrete", "kinds": LEGAL})
-    return TaskEnv(CommuteTaskEnv(world_of(world), CommuteOptions(**of_task), **settings), **of_env)
+    form = {"name": "arrays", "actions": "discrete", "kinds": LEGAL}
+    return _env(partial(CommuteTaskEnv, world_of(world)), CommuteOptions, options, form=form)
 
 
 def make_carry(world: World | Path | str, **options: Any) -> TaskEnv:
@@ -85,14 +84,11 @@ def make_assistant(world: World | Path | str, category: Category, **options: Any
     """
     from vico.challenges.learning.assistant import AssistantOptions, AssistantTask
 
-    of_env, rest = _split(options, _OF_ENV)
-    of_task, settings = _split(rest, [field.name for field in fields(AssistantOptions)])
-    settings.setdefault("form", "arrays")
     if isinstance(world, World):
-        found, people = world, _people_of(world, category)
+        found, people = world, build_community(world, residents=RESIDENTS[category], seed=0)
     else:
         found, people = world_and_people(Path(world), category)
-    return TaskEnv(AssistantTask(found, people, category, AssistantOptions(**of_task), **settings), **of_env)
+    return _env(partial(AssistantTask, found, people, category), AssistantOptions, options)
 
 
 def make_robot_carry(world: World | Path | str, **options: Any) -> TaskEnv:
@@ -111,20 +107,48 @@ def make_robot_work(world: World | Path | str, category: RobotCategory, **option
     Parameters
     ----------
     options
-        Those of `vico.challenges.learning.robot.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
+        Those of `vico.challenges.learning.robot_stage.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
     """
-    from vico.challenges.learning.robot import RobotOptions, RobotWork  # physics, slow to import
-    from vico.challenges.robot.episode import world_and_people as world_and_residents
-    from vico.challenges.robot.thresholds import RESIDENTS as ROBOT_RESIDENTS
+    from vico.challenges.learning.robot import RobotWork  # physics, slow to import
+    from vico.challenges.learning.robot_stage import RobotOptions
 
-    of_env, rest = _split(options, _OF_ENV)
-    of_task, settings = _split(rest, [field.name for field in fields(RobotOptions)])
-    settings.setdefault("form", "arrays")
+    return _env(partial(RobotWork, *_robot_stage(world), category), RobotOptions, options)
+
+
+def make_robot_team(world: World | Path | str, category: RobotCategory, **options: Any) -> RobotTeamEnv:
+    """Make a PettingZoo environment of the community robot challenge for both of its robots.
+
+    Parameters
+    ----------
+    options
+        Those of `vico.challenges.learning.robot_stage.RobotOptions`, of `RobotTeamEnv` (`tasks`, `seed`) and of
+        `vico.envs.spec.EnvSpec`; ``form`` is rich unless told.
+    """
+    from vico.challenges.learning.robot_stage import RobotOptions
+    from vico.challenges.learning.robot_team import RobotTeamEnv
+
+    of_task, rest = _split(options, [field.name for field in fields(RobotOptions)])
+    return RobotTeamEnv(*_robot_stage(world), category, RobotOptions(**of_task), **rest)
+
+
+def make_robot_carry_team(world: World | Path | str, **options: Any) -> RobotTeamEnv:
+    """Make ``vico/RobotCarry-v0`` for both robots; see `make_robot_team`."""
+    return make_robot_team(world, "carry", **options)
+
+
+def make_robot_deliver_team(world: World | Path | str, **options: Any) -> RobotTeamEnv:
+    """Make ``vico/RobotDeliver-v0`` for both robots; see `make_robot_team`."""
+    return make_robot_team(world, "deliver", **options)
+
+
+def _robot_stage(world: World | Path | str) -> tuple[World, Community]:
+    """Return a world, and the people of the community robot challenge."""
+    from vico.challenges.robot.thresholds import RESIDENTS as ROBOT_RESIDENTS
+    from vico.challenges.staging import world_and_people as world_and_residents
+
     if isinstance(world, World):
-        found, people = world, build_community(world, residents=ROBOT_RESIDENTS, seed=0)
-    else:
-        found, people = world_and_residents(Path(world))
-    return TaskEnv(RobotWork(found, people, category, RobotOptions(**of_task), **settings), **of_env)
+        return world, build_community(world, residents=ROBOT_RESIDENTS, seed=0)
+    return world_and_residents(Path(world), ROBOT_RESIDENTS)
 
 
 def make_influence(world: World | Path | str, **options: Any) -> InfluenceEnv:
@@ -183,11 +207,25 @@ def _world(folder: Path) -> World:
     return read_world(folder)
 
 
+def _env(make: Callable[..., Any], of_options: Any, options: Mapping[str, Any], *, form: Any = "arrays") -> TaskEnv:
+    """Make an environment of a task.
+
+    Parameters
+    ----------
+    make
+        Given the task's own options, and the simulation's settings by name, makes the task.
+    of_options
+        What the task's own options are.
+    form
+        Of observations and actions, unless the options say otherwise.
+    """
+    of_env, rest = _split(options, _OF_ENV)
+    of_task, settings = _split(rest, [field.name for field in fields(of_options)])
+    settings.setdefault("form", form)
+    return TaskEnv(make(of_options(**of_task), **settings), **of_env)
+
+
 def _split(options: Mapping[str, Any], names: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the options of these names, and the others."""
     mine = {name: value for name, value in options.items() if name in names}
     return mine, {name: value for name, value in options.items() if name not in names}
-
-
-def _people_of(world: World, category: Category) -> Community:
-    return build_community(world, residents=RESIDENTS[category], seed=0)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,24 +16,29 @@ from vico.agents.robot.heuristic import Manipulator
 from vico.agents.robot.learned import LearnedArm
 from vico.agents.robot.thing_watch import ThingPose, Truth
 from vico.agents.schedule import followers_of
-from vico.agents.wrappers import usage_of
 from vico.assets.models.movable import movable_kinds
 from vico.assets.robots import robot_model
-from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
-from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
+from vico.challenges.records import EpisodeRecord, Progress, Setting
 from vico.challenges.robot.bodies import team_of
 from vico.challenges.robot.judge import RobotJudge
 from vico.challenges.robot.model import RobotTask
 from vico.challenges.robot.policy_files import LEARNED, read_arm_policy
-from vico.challenges.robot.thresholds import PACE_HOME, PERIOD, RESIDENTS, WAITS
-from vico.challenges.staging import ReportedSeconds, play_out, put_thing, robots_from_elsewhere
+from vico.challenges.robot.thresholds import PACE_HOME, PERIOD, WAITS
+from vico.challenges.staging import (
+    ReportedSeconds,
+    Verdict,
+    make_stage,
+    place_waiting,
+    play_out,
+    put_thing,
+    record_of,
+    robots_from_elsewhere,
+    verdict_on,
+)
 from vico.challenges.task_files import check_made_for
-from vico.clock import seconds_of_day
-from vico.community import build_community
 from vico.community.model import Community
-from vico.envs import Simulation, make
+from vico.envs import Simulation
 from vico.quaternions import matrix_of
-from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
@@ -47,13 +50,6 @@ UNUSABLE = "unusable action"
 #: The robots, in the order of their names.
 TEAM = ("manipulator", "husky")
 MANIPULATOR, CARRIER = "robot_0", "robot_1"
-
-
-@lru_cache(maxsize=2)
-def world_and_people(folder: Path) -> tuple[World, Community]:
-    """Read a world, and make the people among whom its episodes take place: always the same ones."""
-    world = world_in(folder)
-    return world, build_community(world, residents=RESIDENTS, seed=0)
 
 
 def play_robot_task(
@@ -96,21 +92,15 @@ def play_robot_task(
     check_made_for(task, world, community)
     setting = setting or {}
     period = float(setting.get("period", PERIOD))
-    starts = {MANIPULATOR: task.manipulator, CARRIER: task.carrier}
-    env = make(
+    starts = (task.manipulator, task.carrier)
+    env = make_stage(
         world,
         community,
-        seed=task.seed,
-        start=task.start,
-        robots=TEAM,
-        robot_places={name: (*start.position, start.yaw) for name, start in starts.items()},
-        cars=for_size(CARS, world),
-        pedestrians=for_size(PEDESTRIANS, world),
-        observe=(MANIPULATOR, CARRIER),
-        periods=dict.fromkeys(starts, period),
-        oracle_grasp=bool(setting.get("oracle_grasp", False)),
-        max_steps=round(task.steps / period),
+        task,
+        team=dict(zip((MANIPULATOR, CARRIER), zip(TEAM, starts, strict=True), strict=True)),
+        period=period,
         setup=lambda simulation: set_up(simulation, task),
+        oracle_grasp=bool(setting.get("oracle_grasp", False)),
     )
     sim = env.sim
     terms = terms or Terms()
@@ -136,13 +126,22 @@ def play_robot_task(
     )
     if learned is not None and learned.broken:
         judge.ended_by = UNUSABLE
-    return _record(task, method, setting, judge, sim, runner.faults, robots, time.perf_counter() - began)
+    return record_of(
+        task,
+        runner,
+        robots,
+        _verdict(task, judge),
+        challenge="robot",
+        method=method,
+        setting=setting,
+        wall_seconds=time.perf_counter() - began,
+    )
 
 
 def set_up(simulation: Simulation, task: RobotTask) -> None:
     """Put the thing where it is at the start, and whoever waits with it."""
     if task.waits_at is not None:
-        simulation.scenario.place_agent(task.person.agent, (*task.waits_at.position, 0.0), yaw=task.waits_at.yaw)
+        place_waiting(simulation, task.person.agent, task.waits_at)
     put_thing(simulation, task.thing)
 
 
@@ -200,46 +199,11 @@ def truth_of(sim: Simulation, task: RobotTask) -> Truth:
     return pose
 
 
-def _record(
-    task: RobotTask,
-    method: str,
-    setting: Setting,
-    judge: RobotJudge,
-    sim: Simulation,
-    faults: FaultLog,
-    robots: Mapping[str, Any],
-    seconds: float,
-) -> EpisodeRecord:
-    """Condense an episode."""
-    done = judge.done_at
-    played = round(sim.state.second) - seconds_of_day(task.start)
-    metrics = {
-        "SR": 100.0 if done is not None else 0.0,
-        "Ts": float(task.steps if done is None else min(done, task.steps)),
-        "force": judge.story.force,
-        "drops": float(judge.story.drops),
-    }
+def _verdict(task: RobotTask, judge: RobotJudge) -> Verdict:
+    more = {"force": judge.story.force, "drops": float(judge.story.drops)}
     if task.category == "carry":
-        metrics["together"] = judge.together()
-    parts = [Part(task.thing.name, done is not None, judge.cause(), None if done is None else int(done))]
-    return EpisodeRecord(
-        challenge="robot",
-        category=task.category,
-        method=method,
-        setting=dict(setting) | {"steps": task.steps},
-        world=task.world,
-        seed=task.seed,
-        metrics=metrics,
-        parts=parts,
-        steps=played,
-        limit=task.steps,
-        wall_seconds=seconds,
-        state_hash=sim.state_hash(),
-        tokens=sum(usage_of(robot).tokens for robot in robots.values()),
-        cost=sum(usage_of(robot).cost for robot in robots.values()),
-        fault_counts=faults.by_kind(),
-        faults=faults.first,
-    )
+        more["together"] = judge.together()
+    return verdict_on(task.thing.name, judge.done_at, judge.cause(), task.steps, more)
 
 
-__all__: Sequence[str] = ["CARRIER", "MANIPULATOR", "TEAM", "play_robot_task", "set_up", "world_and_people"]
+__all__: Sequence[str] = ["CARRIER", "MANIPULATOR", "TEAM", "play_robot_task", "set_up"]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from vico.challenges.assistant.model import Person, Region, Start, TaskObject
-from vico.challenges.task_files import check_thing, check_world, read_task_file
-from vico.io.files import write_json
+from vico.challenges.task_files import PlacedTask, check_thing, check_world, read_task_file
 from vico.world.folder import World
-from vico.world.model import Record
 
 SCHEMA, VERSION = "vico.robot_task", 1
 
@@ -19,17 +17,11 @@ Category = Literal["carry", "deliver"]
 CATEGORIES: tuple[Category, ...] = ("carry", "deliver")
 
 
-class RobotTask(Record):
+class RobotTask(PlacedTask):
     """One episode: one thing that two robots bring to its destination.
 
     Attributes
     ----------
-    world_digest, community_digest
-        Identity of the world and of the community the task belongs to.
-    start
-        Time of day at which it begins, ``HH:MM``.
-    steps
-        Seconds at most.
     manipulator, carrier
         Where the robots begin.
     text
@@ -51,12 +43,6 @@ class RobotTask(Record):
     schema_name: str = SCHEMA
     version: int = VERSION
     category: Category
-    world: str
-    world_digest: str
-    community_digest: str
-    seed: int
-    start: Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")]
-    steps: Annotated[int, Field(ge=1)]
     manipulator: Start
     carrier: Start
     text: str
@@ -87,11 +73,6 @@ class RobotTask(Record):
             "destination": self.destination.model_dump(),
             "seconds": self.steps,
         }
-
-
-def write_robot_task(path: Path, task: RobotTask) -> None:
-    """Write a task file."""
-    write_json(path, task.model_dump(mode="json"))
 
 
 def read_robot_task(path: Path, *, world: World | None = None) -> RobotTask:

@@ -37,8 +37,6 @@ LEVEL = 0.1
 
 #: People who live in the world.
 RESIDENTS = 15
-#: Candidates that each thing and place is chosen from.
-CANDIDATES = 9
 
 #: The jaw is so much wider than a thing, metres, on each side; things are so high at least and at most, metres.
 JAW_ROOM, LOWEST, HIGHEST = 0.025, 0.05, 0.6

@@ -20,9 +20,10 @@ import numpy as np
 from vico.agents.teaming.visitor import LETS_GO
 from vico.challenges.assistant.regions import place_region
 from vico.challenges.assistant.rules import entrance_of
-from vico.challenges.teaming.drawing import Draw, person_of
-from vico.challenges.teaming.looking import Look, away
-from vico.challenges.teaming.model import Member, TeamingTask, Walk
+from vico.challenges.drawing import Draw, person_of
+from vico.challenges.teaming.drawing import has_ways, pace, somebody, walk_task
+from vico.challenges.teaming.looking import Company, Look, away
+from vico.challenges.teaming.model import TeamingTask, Walk
 from vico.challenges.teaming.thresholds import (
     DOOR_DISTANCE,
     DOOR_GRACE,
@@ -51,7 +52,7 @@ CAUSES = (
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     """Draw a task; None where this start has no place to go to."""
-    who, hood = draw.asker()
+    who, hood = somebody(draw)
     world = draw.world
     at_home = world.place_by_id[who.home].building
     near = [p for p in hood.places_of(who) if p.entrance and LEAST_WALK <= hood.distance(p.position) <= MOST_WALK]
@@ -61,7 +62,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
         return None
     target = targets[draw.pick("Where to?", [place.name for place in targets], who)]
     door = np.array(target.position[:2])
-    if not draw.has_ways(ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (door, DOOR_DISTANCE / 2)):
+    if not has_ways(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (door, DOOR_DISTANCE / 2)):
         return None
     comes_out = bool(draw.chance.integers(2))
     stay = round(float(draw.chance.uniform(*STAYS)), 1) if comes_out else None
@@ -71,16 +72,15 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
         f"{who.name}, {person.looks}, waits near by: go there and call them, walk with them to the door of "
         f"{region.name}, and stand there {end}."
     )
-    return TeamingTask(
-        **frame,
-        start=draw.hour(),
-        team=[Member(model=ROBOT, start=draw.stands(hood.start))],
+    return walk_task(
+        draw,
+        frame,
+        robot=ROBOT,
+        start=hood.start,
         text=text,
         person=person,
-        walk=Walk(waits_at=draw.stands(waits, towards=np.asarray(hood.start)), pace=draw.pace(), stay=stay),
-        thing=None,
         destination=region,
-        candidates=dict(draw.candidates),
+        walk=lambda: Walk(waits_at=draw.stands(waits, towards=hood.start), pace=pace(draw), stay=stay),
     )
 
 
@@ -91,8 +91,8 @@ class Accompany:
     ----------
     done_at
         Second at which it was done; None before.
-    walked, beside
-        Looks at the person on the way, and those at which the robot was with them.
+    company
+        How much of the way the robot was with the person.
     """
 
     causes = CAUSES
@@ -103,7 +103,7 @@ class Accompany:
         self._door = entrance_of(task.destination, world)
         self.done_at: float | None = None
         self.over = False
-        self.walked = self.beside = 0
+        self.company = Company()
         self._called = self._failed = False
         self._inside_since: float | None = None
         self._stood = 0.0
@@ -132,20 +132,15 @@ class Accompany:
     def _walk(self, look: Look) -> None:
         if look.place == self._place:
             self._inside_since = look.second
-            self._failed = self.share() < 100.0 * WITH_SHARE
+            self._failed = self.company.share() < 100.0 * WITH_SHARE
             self.over = self._failed
             return
-        self.walked += 1
-        self.beside += away(look.robots[0], look.person) <= WITH_DISTANCE
+        self.company.count(away(look.robots[0], look.person) <= WITH_DISTANCE)
 
     def _end(self, look: Look, *, good: bool, last: bool) -> None:
         if good:
             self.done_at = look.second
         self.over = good or last
-
-    def share(self) -> float:
-        """Return on which share of the way the robot was with the person, percent."""
-        return 100.0 * self.beside / self.walked if self.walked else 0.0
 
     def cause(self) -> str:
         """Return why it failed; "" if it did not."""

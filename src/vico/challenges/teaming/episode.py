@@ -3,44 +3,39 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from vico.agents.base import Agent
 from vico.agents.schedule import followers_of
 from vico.agents.teaming import METHODS, make_team
 from vico.agents.teaming.newcomer import Newcomer
 from vico.agents.teaming.visitor import Visitor
-from vico.agents.wrappers import usage_of
-from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
-from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
-from vico.challenges.staging import ReportedSeconds, play_out, put_thing, robots_from_elsewhere
+from vico.challenges.records import EpisodeRecord, Progress, Setting
+from vico.challenges.staging import (
+    ReportedSeconds,
+    Verdict,
+    make_stage,
+    place_waiting,
+    play_out,
+    put_thing,
+    record_of,
+    robots_from_elsewhere,
+    verdict_on,
+)
 from vico.challenges.task_files import check_made_for
 from vico.challenges.teaming.accompany import Accompany
 from vico.challenges.teaming.guide import Guide
 from vico.challenges.teaming.judge import TeamingJudge
 from vico.challenges.teaming.model import TeamingTask
 from vico.challenges.teaming.spot import Spot
-from vico.challenges.teaming.thresholds import FOLLOWS_WITHIN, GIVES_UP, PERIOD, RESIDENTS
-from vico.clock import seconds_of_day
-from vico.community import build_community
+from vico.challenges.teaming.thresholds import FOLLOWS_WITHIN, GIVES_UP, PERIOD
 from vico.community.model import Community
-from vico.envs import Simulation, make
-from vico.runner.faults import FaultLog
+from vico.envs import Simulation
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
 from vico.world.folder import World
 from vico.world.public import PublicMap
-
-
-@lru_cache(maxsize=2)
-def world_and_people(folder: Path) -> tuple[World, Community]:
-    """Read a world, and make the people among whom its episodes take place: always the same ones."""
-    world = world_in(folder)
-    return world, build_community(world, residents=RESIDENTS, seed=0)
 
 
 def play_teaming_task(
@@ -76,20 +71,9 @@ def play_teaming_task(
     check_made_for(task, world, community)
     setting = setting or {}
     period = float(setting.get("period", PERIOD))
-    starts = {f"robot_{k}": member.start for k, member in enumerate(task.team)}
-    env = make(
-        world,
-        community,
-        seed=task.seed,
-        start=task.start,
-        robots=tuple(member.model for member in task.team),
-        robot_places={name: (*start.position, start.yaw) for name, start in starts.items()},
-        cars=for_size(CARS, world),
-        pedestrians=for_size(PEDESTRIANS, world),
-        observe=tuple(starts),
-        periods=dict.fromkeys(starts, period),
-        max_steps=round(task.steps / min(period, 1.0)),
-        setup=lambda simulation: set_up(simulation, task),
+    team = {f"robot_{k}": (member.model, member.start) for k, member in enumerate(task.team)}
+    env = make_stage(
+        world, community, task, team=team, period=period, setup=lambda simulation: set_up(simulation, task)
     )
     sim = env.sim
     terms = terms or Terms()
@@ -112,7 +96,16 @@ def play_teaming_task(
         period=period,
         recording=recording,
     )
-    return _record(task, method, setting, judge, sim, runner.faults, robots, time.perf_counter() - began)
+    return record_of(
+        task,
+        runner,
+        robots,
+        _verdict(task, judge),
+        challenge="teaming",
+        method=method,
+        setting=setting,
+        wall_seconds=time.perf_counter() - began,
+    )
 
 
 def set_up(simulation: Simulation, task: TeamingTask) -> None:
@@ -120,8 +113,7 @@ def set_up(simulation: Simulation, task: TeamingTask) -> None:
     if task.thing is not None:
         put_thing(simulation, task.thing)
     if task.walk is not None:
-        waits = task.walk.waits_at
-        simulation.scenario.place_agent(task.person.agent, (*waits.position, 0.0), yaw=waits.yaw)
+        place_waiting(simulation, task.person.agent, task.walk.waits_at)
 
 
 def _residents(task: TeamingTask, community: Community, public_map: PublicMap) -> dict[str, Agent]:
@@ -150,40 +142,11 @@ def _robots(method: str, task: TeamingTask, world: World, terms: Terms, period: 
     return robots_from_elsewhere(method, names, told, world, terms, seed=task.seed)
 
 
-def _record(
-    task: TeamingTask,
-    method: str,
-    setting: Setting,
-    judge: TeamingJudge,
-    sim: Simulation,
-    faults: FaultLog,
-    robots: Mapping[str, Any],
-    seconds: float,
-) -> EpisodeRecord:
-    """Condense an episode."""
-    done = judge.done_at
-    metrics = {"SR": 100.0 if done is not None else 0.0, "Ts": float(task.steps if done is None else done)}
+def _verdict(task: TeamingTask, judge: TeamingJudge) -> Verdict:
+    more: dict[str, float] = {}
     match judge.rules:
         case Accompany() | Guide():
-            metrics["together"] = judge.rules.share()
+            more["together"] = judge.rules.company.share()
         case Spot(seen_at=float(seen)):
-            metrics["seen"] = seen
-    part = Part(task.category, done is not None, judge.cause(), None if done is None else int(done))
-    return EpisodeRecord(
-        challenge="teaming",
-        category=task.category,
-        method=method,
-        setting=dict(setting) | {"steps": task.steps},
-        world=task.world,
-        seed=task.seed,
-        metrics=metrics,
-        parts=[part],
-        steps=round(sim.state.second) - seconds_of_day(task.start),
-        limit=task.steps,
-        wall_seconds=seconds,
-        state_hash=sim.state_hash(),
-        tokens=sum(usage_of(robot).tokens for robot in robots.values()),
-        cost=sum(usage_of(robot).cost for robot in robots.values()),
-        fault_counts=faults.by_kind(),
-        faults=faults.first,
-    )
+            more["seen"] = seen
+    return verdict_on(task.category, judge.done_at, judge.cause(), task.steps, more)

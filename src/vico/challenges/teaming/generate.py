@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from vico.challenges.assistant.choose import Chooser, seeded_chooser
+from vico.challenges.drawing import Draw
+from vico.challenges.task_files import frame_of
 from vico.challenges.teaming import accompany, guide, spot
-from vico.challenges.teaming.drawing import Draw
 from vico.challenges.teaming.model import Category, TeamingTask
 from vico.challenges.teaming.thresholds import LEAST_WALK, MOST_WALK, STEPS
-from vico.community.folder import digest_of
 from vico.community.model import Community
 from vico.errors import EmptyInputError
 from vico.seeds import rng
@@ -51,14 +51,7 @@ def generate_teaming_task(
     """
     chance = rng(seed, "teaming task", category, world.digest)
     draw = Draw(world, community, category, chance, chooser or seeded_chooser(chance))
-    frame: dict[str, Any] = {
-        "category": category,
-        "world": world.manifest.name,
-        "world_digest": world.digest,
-        "community_digest": digest_of(community),
-        "seed": seed,
-        "steps": steps,
-    }
+    frame = frame_of(world, community, category, seed=seed, steps=steps)
     for _ in range(_TRIES):
         task = DRAWN[category](draw, frame)
         if task is not None:

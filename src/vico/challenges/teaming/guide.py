@@ -18,9 +18,10 @@ import numpy as np
 from vico.agents.teaming.newcomer import GAVE_UP, I_FOLLOW
 from vico.challenges.assistant.model import Region
 from vico.challenges.assistant.regions import place_region
-from vico.challenges.teaming.drawing import Draw, person_of
-from vico.challenges.teaming.looking import Look, away
-from vico.challenges.teaming.model import Member, Pause, TeamingTask, Walk
+from vico.challenges.drawing import Draw, person_of
+from vico.challenges.teaming.drawing import has_ways, pace, somebody, walk_task
+from vico.challenges.teaming.looking import Company, Look, away
+from vico.challenges.teaming.model import Pause, TeamingTask, Walk
 from vico.challenges.teaming.thresholds import (
     ARRIVED,
     FOLLOWS_WITHIN,
@@ -47,7 +48,7 @@ CAUSES = (
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     """Draw a task; None where this start has nowhere to go to."""
-    who, hood = draw.asker()
+    who, hood = somebody(draw)
     targets = [place_region(place) for place in hood.places_of(who)]
     targets += hood.spots_of(who, draw.chance, radius=ARRIVED)
     targets = [region for region in targets if LEAST_WALK <= hood.distance(region.centre) <= MOST_WALK]
@@ -57,27 +58,26 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     order = [targets[int(k)] for k in draw.chance.permutation(len(targets))]
     target = order[draw.pick("Where to?", [region.name for region in order], who)]
     goal = np.array(target.centre[:2])
-    if not draw.has_ways(ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (goal, ARRIVED / 3)):
+    if not has_ways(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (goal, ARRIVED / 3)):
         return None
     person = person_of(who)
     text = (
         f"{who.name}, {person.looks}, waits near by and does not know the way: go there and call them, lead them "
         f"{_to(target)}, and see that they come along."
     )
-    return TeamingTask(
-        **frame,
-        start=draw.hour(),
-        team=[Member(model=ROBOT, start=draw.stands(hood.start))],
+    return walk_task(
+        draw,
+        frame,
+        robot=ROBOT,
+        start=hood.start,
         text=text,
         person=person,
-        walk=Walk(
-            waits_at=draw.stands(waits, towards=np.asarray(hood.start)),
-            pace=draw.pace(),
+        destination=target,
+        walk=lambda: Walk(
+            waits_at=draw.stands(waits, towards=hood.start),
+            pace=pace(draw),
             pauses=_pauses(draw, hood.distance(target.centre)),
         ),
-        thing=None,
-        destination=target,
-        candidates=dict(draw.candidates),
     )
 
 
@@ -98,8 +98,8 @@ class Guide:
     ----------
     done_at
         Second at which it was done; None before.
-    walked, beside
-        Looks at the person on the way, and those at which the robot was near enough to be followed.
+    company
+        How much of the way the robot was near enough to be followed.
     """
 
     causes = CAUSES
@@ -108,7 +108,7 @@ class Guide:
         self._goal = task.destination.centre
         self.done_at: float | None = None
         self.over = False
-        self.walked = self.beside = 0
+        self.company = Company()
         self._called = self._gave_up = self._was_there = False
 
     def look(self, look: Look) -> None:
@@ -117,18 +117,13 @@ class Guide:
         if not self._called or self.over:
             return
         robot, person = look.robots[0], look.person
-        self.walked += 1
-        self.beside += away(robot, person) <= FOLLOWS_WITHIN
+        self.company.count(away(robot, person) <= FOLLOWS_WITHIN)
         there = away(robot, self._goal) <= ARRIVED
         self._was_there = self._was_there or there
         if there and away(person, self._goal) <= ARRIVED and away(robot, person) <= TOGETHER:
             self.done_at, self.over = look.second, True
         elif GAVE_UP in look.said:
             self._gave_up = self.over = True
-
-    def share(self) -> float:
-        """Return on which share of the way the robot was near enough to be followed, percent."""
-        return 100.0 * self.beside / self.walked if self.walked else 0.0
 
     def cause(self) -> str:
         """Return why it failed; "" if it did not."""

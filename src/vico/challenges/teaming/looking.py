@@ -99,3 +99,26 @@ def _stands(felt: dict[str, NDArray[Any]]) -> bool:
 def away(a: Any, b: Any) -> float:
     """Metres between two points over the ground."""
     return float(np.hypot(*(np.asarray(a, np.float64)[:2] - np.asarray(b, np.float64)[:2])))
+
+
+@dataclass
+class Company:
+    """How much of a person's way a robot was with them.
+
+    Attributes
+    ----------
+    walked, beside
+        Looks at the person on the way, and those at which the robot was near enough.
+    """
+
+    walked: int = 0
+    beside: int = 0
+
+    def count(self, near: bool) -> None:
+        """Count a look."""
+        self.walked += 1
+        self.beside += near
+
+    def share(self) -> float:
+        """Return on which share of the way the robot was near enough, percent."""
+        return 100.0 * self.beside / self.walked if self.walked else 0.0

@@ -9,9 +9,8 @@ from pydantic import Field, model_validator
 
 from vico.assets.robots import robot_names
 from vico.challenges.assistant.model import Person, Region, Start, TaskObject
-from vico.challenges.task_files import check_thing, check_world, read_task_file
+from vico.challenges.task_files import PlacedTask, check_thing, check_world, read_task_file
 from vico.errors import SchemaError
-from vico.io.files import write_json
 from vico.world.folder import World
 from vico.world.model import Record
 
@@ -56,17 +55,11 @@ class Walk(Record):
     pauses: tuple[Pause, ...] = ()
 
 
-class TeamingTask(Record):
+class TeamingTask(PlacedTask):
     """One episode.
 
     Attributes
     ----------
-    world_digest, community_digest
-        Identity of the world and of the community the task belongs to.
-    start
-        Time of day at which it begins, ``HH:MM``.
-    steps
-        Seconds at most.
     team
         The robots.
     text
@@ -86,12 +79,6 @@ class TeamingTask(Record):
     schema_name: str = SCHEMA
     version: int = VERSION
     category: Category
-    world: str
-    world_digest: str
-    community_digest: str
-    seed: int
-    start: Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")]
-    steps: Annotated[int, Field(ge=1)]
     team: Annotated[list[Member], Field(min_length=1, max_length=2)]
     text: str
     person: Person
@@ -127,11 +114,6 @@ class TeamingTask(Record):
             "destination": self.destination.model_dump(),
             "seconds": self.steps,
         }
-
-
-def write_teaming_task(path: Path, task: TeamingTask) -> None:
-    """Write a task file."""
-    write_json(path, task.model_dump(mode="json"))
 
 
 def read_teaming_task(path: Path, *, world: World | None = None) -> TeamingTask:

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from vico.challenges.assistant.regions import told
-from vico.challenges.teaming.drawing import Draw, described, person_of
+from vico.challenges.drawing import Draw, described, person_of
+from vico.challenges.teaming.drawing import has_ways, somebody, visible_kinds
 from vico.challenges.teaming.looking import Look, away
 from vico.challenges.teaming.model import Member, TeamingTask
 from vico.challenges.teaming.thresholds import (
@@ -43,7 +44,7 @@ DRONE, GROUND = 0, 1
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     """Draw a task; None where this start has no area near by to look in."""
-    who, hood = draw.asker()
+    who, hood = somebody(draw)
     middle = draw.spot(hood.start, *AREA_WITHIN)
     beside = draw.spot(hood.start, *BESIDE)
     if middle is None or beside is None or hood.distance(middle) > MOST_WALK:
@@ -52,10 +53,10 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     if lies is None:
         return None
     ground = GROUND_ROBOTS[int(draw.chance.integers(len(GROUND_ROBOTS)))]
-    if not draw.has_ways(ground, np.asarray(hood.start), (lies, BESIDE_THING * 0.8)):
+    if not has_ways(draw, ground, np.asarray(hood.start), (lies, BESIDE_THING * 0.8)):
         return None
     region = hood.spot(middle, radius=AREA)
-    thing = draw.thing(who, lies)
+    thing = draw.thing("What is lost?", visible_kinds(), who, lies)
     text = (
         f"{who.name} has lost {described(thing)} {told(region)}: find it, one from above and one on the ground, which "
         "is to stand beside it."

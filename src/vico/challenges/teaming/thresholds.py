@@ -43,5 +43,5 @@ GROUND_ROBOTS = ("go2", "husky")
 #: Things are so large that they are seen from above: their two largest sides, multiplied, square metres.
 LEAST_AREA = 0.06
 
-#: People who live in the world, and candidates that each person, place and thing is chosen from.
-RESIDENTS, CANDIDATES = 15, 9
+#: People who live in the world.
+RESIDENTS = 15

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.assets.robots.ground import narrow_ground
-from vico.challenges.robot.thresholds import LEVEL
 from vico.world.folder import World
 
 # The ground is looked at so far to either side of a point, metres.
@@ -23,17 +22,9 @@ Grid = NDArray[np.bool_]
 
 @dataclass
 class Ways:
-    """Ways of two robots on a world's ground.
-
-    Attributes
-    ----------
-    manipulator, carrier
-        Their models.
-    """
+    """Ways of robots on a world's ground."""
 
     world: World
-    manipulator: RobotModel
-    carrier: RobotModel
     _narrow: dict[str, Grid] = field(default_factory=dict)
 
     def stands(self, model: RobotModel, at: Sequence[float] | Array) -> bool:
@@ -42,13 +33,13 @@ class Ways:
         ix, iy = walkable.cell_of(np.asarray(at, np.float64)[:2])
         return bool(walkable.connected[iy, ix] and not self._kept_off(model)[iy, ix])
 
-    def is_level(self, at: Sequence[float] | Array) -> bool:
-        """Return whether things lie still, and are put down upright, at a point, ENU metres."""
+    def rise(self, at: Sequence[float] | Array) -> float:
+        """Return how much the ground rises a metre at a point, ENU metres."""
         x, y = float(at[0]), float(at[1])
         east, west, north, south = self.world.height.smooth(
             [[x + _ASIDE, y], [x - _ASIDE, y], [x, y + _ASIDE], [x, y - _ASIDE]]
         ).tolist()
-        return math.hypot(east - west, north - south) <= LEVEL * 2.0 * _ASIDE
+        return math.hypot(east - west, north - south) / (2.0 * _ASIDE)
 
     def lead(
         self, model: RobotModel, start: Sequence[float] | Array, points: Sequence[tuple[Array, float]], *, within: float
