@@ -78,7 +78,8 @@ def part_mesh(part: PartPlan, seat: Footing) -> Mesh:
     # Solids are made near the origin and near height 0: the kernel's tolerance grows with coordinates.
     x, y = (round(v) for v in part.polygon.centroid.coords[0])
     local = shapely.transform(part.polygon, lambda xy, x=x, y=y: xy - (x, y))
-    solid = building_solid(local, low - eaves, 0.0, part.roof).simplify(0.002)
+    roof = part.roof.moved(lambda xy, x=x, y=y: xy - (x, y))
+    solid = building_solid(local, low - eaves, 0.0, roof).simplify(0.002)
     body = solid.to_mesh64()
     vertices = np.asarray(body.vert_properties, np.float64)[:, :3]
     triangles = np.asarray(body.tri_verts, np.int64)
