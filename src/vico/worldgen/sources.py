@@ -65,7 +65,7 @@ class Sources:
     def files(self) -> Iterator[Path]:
         """Every local file or folder among them."""
         yield self.osm
-        yield from (split_crs(given)[0] for given in (*self.dem, *self.buildings))
+        yield from (split_crs(given)[0] for given in [*map(str, self.dem), *self.buildings])
         yield from self.gtfs
         for given in (self.tiles, self.photos, *self.places):
             if given is not None and "://" not in given and given not in SERVICES:

@@ -176,9 +176,9 @@ class _Collected:
         for detail, kind, rings in [*self.polygons, *linked]:
             if 0 <= detail <= 3:
                 rows.setdefault(float(detail), []).append((kind, rings))
-        for detail, polygons in rows.items():
+        for level, polygons in rows.items():
             if any(kind == "roof" for kind, _ in polygons):
-                rows[detail] = [row for row in polygons if row[0]]
+                rows[level] = [row for row in polygons if row[0]]
         return rows
 
 

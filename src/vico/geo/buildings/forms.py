@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.geo.buildings.model import RoofFacet
 
@@ -48,11 +49,11 @@ def form_of(facets: Sequence[RoofFacet]) -> RoofForm:
     eaves = min(_weighted_median(lows, areas), top)
     level = float(areas[steep < _LEVEL].sum()) / total
     if level > 0.8 or top - eaves < 0.4:
-        return RoofForm("flat", float(np.average((lows + highs) / 2, weights=areas)), top)
+        return RoofForm("flat", min(_weighted_median((lows + highs) / 2, areas), top), top)
     return RoofForm(_shape(facets, areas, steep), eaves, top)
 
 
-def _shape(facets: Sequence[RoofFacet], areas: np.ndarray, steep: np.ndarray) -> str:  # type: ignore[type-arg]
+def _shape(facets: Sequence[RoofFacet], areas: NDArray[np.float64], steep: NDArray[np.float64]) -> str:
     """Return the shape by the directions in which the slopes fall."""
     falls = [math.atan2(-facet.plane[2], -facet.plane[1]) for facet in facets]
     directions: list[tuple[float, float]] = []  # yaw and area of slopes that fall alike
@@ -75,7 +76,7 @@ def _shape(facets: Sequence[RoofFacet], areas: np.ndarray, steep: np.ndarray) ->
     return "hipped"
 
 
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:  # type: ignore[type-arg]
+def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
     order = np.argsort(values, kind="stable")
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])

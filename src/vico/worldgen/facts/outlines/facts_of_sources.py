@@ -143,5 +143,5 @@ def _with_roof(tags: Tags, claim: Claim | None, of_map: bool) -> Tags:
         return tags if of_map else {key: value for key, value in tags.items() if key not in _ROOFS}
     rest = {key: value for key, value in tags.items() if key not in _ROOFS}
     theirs = claim.main.tags
-    more = {key: theirs[key] for key in ("roof:colour", "roof:material") if key in theirs}
+    more: Tags = {key: theirs[key] for key in ("roof:colour", "roof:material") if key in theirs}
     return {**more, **rest, **{key: theirs[key] for key in _ROOFS if key in theirs}}

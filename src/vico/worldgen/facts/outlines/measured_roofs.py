@@ -143,9 +143,6 @@ def _parts(cells: Sequence[RoofCell], facets: Sequence[RoofFacet], tags: Mapping
         over = tuple(facets[k].moved(up=-eaves) for k in sorted(under))
         solid = measured_solid(_near_origin(piece), -eaves, [_near(facet, piece) for facet in over])
         *_, top = solid.bounding_box()
-        if form.shape == "flat":
-            eaves, over = eaves + top, tuple(facet.moved(up=-top) for facet in over)
-            top = 0.0
         roof = Roof(form.shape, round(max(top, 0.0), 3), None, over)
         made.append(replace(plain, eaves=eaves, roof=roof))
     return made

@@ -7,6 +7,7 @@ all stages read as before, and beside it the surfaces of measured roofs and wher
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -123,8 +124,10 @@ def _matched(
                 reason = f"{name} covers {by:.0f} % of it: too much to be another building, too little to be the same"
                 dropped.append(Dropped(id=found.id, reason=reason))
     claims: dict[str, Claim] = {}
-    for k, rows in pairs.items():
-        same = [row for row in rows if max(row[1], row[2]) >= precedence.same]
+    same_as = {k: [row for row in rows if max(row[1:]) >= precedence.same] for k, rows in pairs.items()}
+    # A model over several of the map's houses tells their roof and height, but not where one ends.
+    times = Counter(row[0].id for rows in same_as.values() for row in rows)
+    for k, same in same_as.items():
         covered = sum(row[2] for row in same)
         if not same:
             continue
@@ -133,7 +136,7 @@ def _matched(
             reason = f"covers only {100 * covered:.0f} % of {area.id}, which stays as the map has it"
             dropped += [Dropped(id=row[0].id, reason=reason) for row in same]
             continue
-        whole = all(row[1] >= precedence.same for row in same)
+        whole = all(row[1] >= precedence.same and times[row[0].id] == 1 for row in same)
         claims[area.id] = Claim(tuple(row[0] for row in same), whole)
     return claims, lonely
 
