@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.buildings.forms import form_of
 from vico.geo.buildings.model import FoundBuilding, RoofFacet
-from vico.geo.outlines import mended
+from vico.geo.outlines import joined, mended
 
 _UPRIGHT = 0.08  # of a unit normal's height: what is steeper is a wall, whatever it is called
 _FLAT_WITHIN = 0.25  # metres that the corners of a plane surface may lie off it
@@ -100,10 +100,7 @@ def _footprint(floors: Sequence[Surface3], facets: Sequence[RoofFacet]) -> Polyg
         shapes = [facet.polygon for facet in facets]
     if not shapes:
         return Polygon()
-    whole = overlay.union_all(shapes)
-    closed = overlay.buffer(overlay.buffer(whole, _CLOSING, join_style="mitre"), -_CLOSING, join_style="mitre")
-    parts = overlay.polygons_of(overlay.on_grid(closed), _LEAST_AREA)
-    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+    return joined(shapes, gap=_CLOSING, least=_LEAST_AREA)
 
 
 def _outline(rings: Sequence[NDArray[np.float64]]) -> Polygon | MultiPolygon | None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from shapely import MultiPolygon, Polygon
 
-from vico.geo import overlay
 from vico.geo.buildings.forms import form_of
 from vico.geo.buildings.model import FoundBuilding, RoofFacet
 from vico.geo.osm import OsmArea, Tags
+from vico.geo.outlines import joined
 from vico.worldgen.facts.outlines.heights import said_height, said_levels
 from vico.worldgen.facts.outlines.plans import BuildingOrigin
 from vico.worldgen.facts.outlines.roof_shapes import shape_named
@@ -19,6 +19,7 @@ from vico.worldgen.facts.precedence import OSM, Precedence, rank_of
 _HEIGHTS = ("height", "building:height", "est_height", "building:levels")
 _ROOFS = ("roof:shape", "roof:height", "roof:levels", "roof:angle", "roof:direction", "roof:orientation")
 _CLOSING = 0.05  # metres between outlines of one building's pieces
+_LEAST_AREA = 2.0  # square metres
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,7 @@ class Claim:
 
     def footprint(self) -> Polygon | MultiPolygon:
         """Return the outline of all together."""
-        whole = overlay.union_all([found.footprint for found in self.buildings])
-        closed = overlay.buffer(overlay.buffer(whole, _CLOSING, join_style="mitre"), -_CLOSING, join_style="mitre")
-        pieces = overlay.polygons_of(overlay.on_grid(closed), 2.0)
-        return pieces[0] if len(pieces) == 1 else MultiPolygon(pieces)
+        return joined([found.footprint for found in self.buildings], gap=_CLOSING, least=_LEAST_AREA)
 
 
 @dataclass(frozen=True)
