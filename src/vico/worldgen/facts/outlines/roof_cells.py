@@ -17,8 +17,6 @@ import shapely
 from manifold3d import Error, Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 from shapely import Polygon
-from shapely.errors import GEOSException
-from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.buildings.model import RoofFacet
@@ -64,7 +62,7 @@ def roof_cells(outline: Polygon, facets: Sequence[RoofFacet]) -> list[RoofCell]:
     if not near:
         raise OverlayError("no surface of its roof lies over its outline")
     shapes = [shapely.snap(facets[k].polygon, outline, _SNAP) for k in near]
-    faces = _faces([outline.boundary, *(shape.boundary for shape in shapes)])
+    faces = overlay.faces_between([outline.boundary, *(shape.boundary for shape in shapes)], grid=_GRID)
     shapely.prepare(outline)
     faces = [face for face in faces if outline.contains(face.representative_point())]
     if len(faces) > _MOST_CELLS:
@@ -74,16 +72,6 @@ def roof_cells(outline: Polygon, facets: Sequence[RoofFacet]) -> list[RoofCell]:
     owners = [_owner(face, [facets[k] for k in near], tree) for face in faces]
     faces, owners = _without_specks(faces, owners)
     return _levelled(faces, [near[k] for k in owners], facets)
-
-
-def _faces(lines: Sequence[BaseGeometry]) -> list[Polygon]:
-    """Return the faces between lines, cut by each other on the grid."""
-    try:
-        cut = shapely.union_all([part for line in lines for part in shapely.get_parts(line)], grid_size=_GRID)
-        faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(cut)))
-    except GEOSException as error:
-        raise OverlayError(f"the outlines of its roof can't be cut by each other ({error})") from None
-    return [face for face in faces if face.is_valid]
 
 
 def _owner(face: Polygon, facets: Sequence[RoofFacet], tree: shapely.STRtree) -> int:
@@ -110,7 +98,7 @@ def _without_specks(faces: list[Polygon], owners: list[int]) -> tuple[list[Polyg
             if not shared:
                 continue
             best = max(shared, key=lambda other: (shared[other], -other))
-            merged = shapely.union(faces[k], faces[best])
+            merged = overlay.union(faces[k], faces[best])
             if isinstance(merged, Polygon):
                 keep = best if faces[best].area >= faces[k].area else k
                 faces[best], owners[best] = merged, owners[keep]
