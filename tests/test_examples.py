@@ -164,3 +164,9 @@ def test_what_was_shown_is_done_again(tmp_path: Path) -> None:
     printed = run("19_imitation.py", "--out", str(tmp_path / "demos"), "--episodes", "1")
     assert "frames: Pick up the blue shoe box and put it down next to the pink thermos flask." in printed
     assert "seed 7 done again: done" in printed
+
+
+def test_a_roof_of_a_city_model_is_built_where_the_map_has_the_house(tmp_path: Path) -> None:
+    printed = run("21_real_roofs.py", "--out", str(tmp_path / "w"))
+    assert "1 from cityjson:w.city.json surfaces" in printed
+    assert "hipped, 26.0 m to the ridge" in printed

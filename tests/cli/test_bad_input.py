@@ -90,6 +90,11 @@ def test_a_map_that_is_no_use_is_refused(
         ((*HERE, "--radius", 90_000), "radius: 90000"),
         ((*HERE, "--seed", -1), "seed: -1"),
         ((*HERE, "--dem", "missing.tif"), "no such elevation file"),
+        ((*HERE, "--dem", "a.tif@EPSG:3067"), "only point clouds"),
+        ((*HERE, "--buildings", "missing.gml"), "missing.gml: no such file"),
+        ((*HERE, "--buildings", "a.json", "--buildings", "b/a.json"), "a.json is given twice"),
+        ((*HERE, "--buildings", "a.shp"), "must end in .json"),
+        ((*HERE, "--precedence", "missing.toml"), "missing.toml: no such file"),
     ],
 )
 def test_a_window_that_cannot_be_is_refused(

@@ -59,6 +59,7 @@ def world_build(options: Annotated[WorldBuildOptions, FLAT]) -> int:
     Example: vico world build --lat 48.8530 --lon 2.3499 --out paris
 
     Example: vico world build --osm monaco.osm.pbf --center 43.7338,7.4181 --dem srtm.tif --out monaco
+    Example: vico world build --osm berlin.osm.pbf --buildings lod2.gml --buildings overture.parquet --out berlin
     """
     from vico.cli import world as verb
 
@@ -95,7 +96,8 @@ def world_build_many(
 ) -> int:
     """Build a table of places side by side.
 
-    The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,layouts,things,seed.
+    The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,layouts,things,
+    buildings,precedence,seed.
     Worlds that are there are kept, those that fail are told at the end (exit 1) and do not stop the others.
 
     Example: vico world build-many places.csv --out worlds --workers 4

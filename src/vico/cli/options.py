@@ -17,6 +17,8 @@ from vico.errors import InputError
 CommaSeparated = Annotated[str, tyro.conf.arg(metavar="A,B,...")]
 #: Of a Ray cluster; a bare ``--ray`` becomes ``--ray auto``.
 RayAddress = Annotated[str | None, tyro.conf.arg(metavar="[ADDRESS]")]
+#: Files after one option, or after the same option several times.
+Files = Annotated[tuple[tuple[Path, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE...")]
 _RAY_ADDRESS = re.compile(r"auto|local|ray://.+|[^/\s]+:\d+")
 
 
@@ -40,7 +42,13 @@ class WorldBuildOptions:
     radius
         Half the window's side, metres.
     dem
-        Elevation: GeoTIFF, .hgt or packed .hgt; one or several that cover the window. Flat ground without.
+        Elevation: GeoTIFF, .hgt, packed .hgt, or a .laz or .las point cloud; one or several. Flat ground without, and
+        where they don't reach.
+    buildings
+        Buildings of other sources: CityJSON (.json, .jsonl), CityGML (.gml), Overture's GeoParquet; one or several. A
+        model that does not say its reference system is followed by it: city.json@EPSG:7415.
+    precedence
+        Which source decides what, a .toml file like the packaged vico/data/sources/precedence.toml.
     tiles
         Photogrammetry: path or address of a tileset.json. Ground, heights and walls are taken from it.
     photos
@@ -98,7 +106,9 @@ class WorldBuildOptions:
     lon: float | None = None
     center: Annotated[str | None, tyro.conf.arg(metavar="LAT,LON")] = None
     radius: float = 400.0
-    dem: tuple[Path, ...] = ()
+    dem: Files = ()
+    buildings: Files = ()
+    precedence: Path | None = None
     tiles: str | None = None
     photos: str | None = None
     places: tuple[str, ...] = ()

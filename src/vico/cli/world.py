@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +61,9 @@ def build_as_asked(options: WorldBuildOptions) -> int:
         osm = locate(lat, lon, options.radius, overpass=options.overpass, refresh=options.refresh)
     sources = Sources(
         osm,
-        dem=options.dem,
+        dem=tuple(chain.from_iterable(options.dem)),
+        buildings=tuple(map(str, chain.from_iterable(options.buildings))),
+        precedence=options.precedence,
         tiles=options.tiles,
         photos=options.photos,
         places=options.places,
@@ -162,10 +166,22 @@ def facts(world: World) -> dict[str, Any]:
         "digest": world.digest,
         **manifest.counts,
         "places_by_type": manifest.places_by_type,
+        **_building_sources(world),
         "dropped": {stage.name: len(stage.dropped) for stage in manifest.stages if stage.dropped},
         "seconds": {**seconds, "total": round(sum(seconds.values()), 3)},
         "megabytes": round(sum(world.file(name).stat().st_size for name in manifest.files) / 1e6, 2),
         "sources": [source.model_dump(mode="json") for source in manifest.sources],
+    }
+
+
+def _building_sources(world: World) -> dict[str, dict[str, int]]:
+    """Count where outlines, heights and roofs are from; nothing for a world of a map alone."""
+    told = [building.sources for building in world.buildings if building.sources is not None]
+    if not told:
+        return {}
+    return {
+        f"{what}_from": dict(Counter(getattr(one, what) for one in told).most_common())
+        for what in ("footprint", "height", "roof")
     }
 
 
@@ -177,6 +193,8 @@ def info(path: Path, *, json: bool = False) -> int:
         return 0
     rows = {name: value for name, value in content.items() if not isinstance(value, dict | list)}
     rows |= {f"places: {kind}": number for kind, number in content["places_by_type"].items()}
+    for what in ("footprint", "height", "roof"):
+        rows |= {f"{what} from {name}": number for name, number in content.get(f"{what}_from", {}).items()}
     rows |= {f"seconds: {stage}": value for stage, value in content["seconds"].items()}
     rows |= {f"source: {source['name']}": source["attribution"] for source in content["sources"]}
     print_table(f"world {path}", rows)

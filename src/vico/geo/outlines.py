@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -12,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from vico.errors import SchemaError
 from vico.geo import overlay
@@ -83,6 +85,26 @@ def _rounded(shape: Polygon | MultiPolygon) -> Polygon | MultiPolygon:
         return overlay.on_grid(shape)
     except OverlayError:
         return Polygon()
+
+
+def joined(shapes: Sequence[BaseGeometry], *, gap: float, least: float) -> Polygon | MultiPolygon:
+    """Return what outlines cover together, gaps between them closed.
+
+    Parameters
+    ----------
+    shapes
+        Areas, metres.
+    gap
+        Half the width of gaps that are closed, metres.
+    least
+        Square metres below which a piece is left out.
+    """
+    whole = overlay.union_all(shapes)
+    closed = overlay.buffer(overlay.buffer(whole, gap, join_style="mitre"), -gap, join_style="mitre")
+    # The engine may lose a turned box when it is shrunk by centimetres (GEOS 3.14).
+    kept = closed if closed.area > 0.98 * whole.area else whole
+    parts = polygons_of(overlay.on_grid(kept), least)
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 
 def simplified(shape: Polygon | MultiPolygon) -> tuple[Polygon | MultiPolygon, str | None]:

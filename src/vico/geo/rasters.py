@@ -86,19 +86,24 @@ def read_raster(path: Path) -> Raster:
     if name.endswith(".zip"):
         return _zipped_hgt(path)
     raise InputError(
-        f"{path}: not an elevation file by its name; it must end in .tif, .tiff, .hgt, .hgt.gz or .zip (of an .hgt)"
+        f"{path}: not an elevation file by its name; it must end in .tif, .tiff, .hgt, .hgt.gz, .zip (of an .hgt), "
+        ".laz or .las"
     )
 
 
 @dataclass(frozen=True)
-class _Array:
-    heights: NDArray[np.int16]
+class GridArray:
+    """Heights in memory, metres, shape ``(rows, columns)``."""
+
+    heights: NDArray[np.generic]
 
     @property
     def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
         return self.heights.shape[0], self.heights.shape[1]
 
     def read(self, r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float64]:
+        """Metres of rows `r0` to `r1` and columns `c0` to `c1`, ends excluded."""
         return self.heights[r0:r1, c0:c1].astype(np.float64)
 
 
@@ -117,7 +122,7 @@ def _hgt(content: bytes, name: str, path: Path, size: int) -> Raster:
     step = 1.0 / (side - 1)
     heights = np.frombuffer(content, ">i2").reshape(side, side)
     affine = np.array([[step, 0.0, west], [0.0, -step, south + 1.0]])
-    return Raster(_Array(heights), affine, CRS.from_epsg(4326))
+    return Raster(GridArray(heights), affine, CRS.from_epsg(4326))
 
 
 def _gzipped_hgt(path: Path) -> Raster:

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 SCHEMA = "vico.world"
 VERSION = 1
@@ -112,6 +112,21 @@ class Manifest(Record):
     files: dict[str, str]
 
 
+class BuildingSources(Record):
+    """Where a building's facts are from.
+
+    Attributes
+    ----------
+    footprint, height, roof
+        ``osm``, with the tag it was read from; kind and file of another source, such as ``citygml:berlin.gml``, for a
+        roof with ``surfaces`` where it is built of the model's own; or ``rule`` and which one decided.
+    """
+
+    footprint: str
+    height: str
+    roof: str
+
+
 class Building(Record):
     """A building, seated on the terrain.
 
@@ -128,6 +143,8 @@ class Building(Record):
         Metres from `base` to the highest point of the roof.
     accessible
         True if people can enter: it has a reachable entrance.
+    sources
+        Where outline, height and roof are from; only in worlds built of more sources than a map.
     """
 
     id: str
@@ -142,6 +159,14 @@ class Building(Record):
     colour: str
     accessible: bool
     tags: dict[str, str] = {}
+    sources: BuildingSources | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_empty_sources(self, rest: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = rest(self)
+        if self.sources is None:
+            del content["sources"]
+        return content
 
 
 class Category(StrEnum):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from vico.errors import InputError
+from vico.geo.buildings.files import read_buildings
+from vico.geo.buildings.model import FoundBuildings
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.gtfs.feed import Feed
@@ -16,6 +18,7 @@ from vico.geo.osm import OsmData, read_osm
 from vico.geo.places.google import GooglePlaces, google_key
 from vico.geo.places.model import FoundPlace
 from vico.geo.places.overture import OverturePlaces
+from vico.geo.reference_systems import split_crs
 from vico.geo.street_images.folder import FolderImages
 from vico.geo.street_images.mapillary import Mapillary
 from vico.geo.street_images.model import StreetImage, StreetImages
@@ -26,6 +29,7 @@ from vico.io.cache import cache_folder
 from vico.io.files import sha256_of
 from vico.io.http import HttpClient
 from vico.world.model import Dropped, Source
+from vico.worldgen.facts.precedence import Precedence, read_precedence
 from vico.worldgen.product import digest_of
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Stages
@@ -55,6 +59,10 @@ class Evidence:
         Timetables.
     credits
         Every source, with what its licence asks for.
+    buildings
+        What files of buildings have.
+    precedence
+        Which source decides what; None where only the map was asked.
     """
 
     data: OsmData
@@ -64,6 +72,8 @@ class Evidence:
     found: Sequence[FoundPlace]
     feeds: Sequence[Feed]
     credits: list[Source]
+    buildings: list[FoundBuildings] = field(default_factory=list)
+    precedence: Precedence | None = None
 
 
 def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> Evidence:
@@ -78,9 +88,11 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
     with stages.timed("map"):
         data = read_osm(sources.osm, frame, half)
         stages.given(data, f"{data.sha256} {where}")
-        samples = read_elevation(sources.dem, frame, half) if sources.dem else None
+        precedence = _precedence(sources)
+        finest = precedence is None or precedence.terrain == "finest"
+        samples = read_elevation(sources.dem, frame, half, finest_first=finest) if sources.dem else None
         if samples is not None:
-            stages.given(samples, f"{samples.sha256} {where}")
+            stages.given(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
     stages.report(
         "map",
         {
@@ -92,6 +104,12 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
         },
         [Dropped(id=key, reason=reason) for key, reason in data.broken],
     )
+    if samples is not None and samples.beyond:
+        stages.report(
+            "map",
+            {"heights_cover_percent": round(100 * samples.covered)},
+            [Dropped(id=samples.name, reason=samples.beyond)],
+        )
     credits = [
         Source(
             kind="map",
@@ -136,7 +154,43 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
             )
         broken = [Dropped(id=key, reason=reason) for feed in feeds for key, reason in feed.broken]
         stages.report("timetables", {"feeds": len(feeds)}, broken)
-    return Evidence(data, samples, tiles, images, found, feeds, credits)
+    buildings: list[FoundBuildings] = []
+    if sources.buildings:
+        with stages.timed("found buildings"):
+            buildings = _buildings(sources, frame, half, stages, credits)
+    return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence)
+
+
+def _precedence(sources: Sources) -> Precedence | None:
+    """Read which source decides what, before anything that takes long; None where only the map is asked."""
+    if not sources.buildings and sources.precedence is None:
+        return None
+    return read_precedence(sources.precedence, [split_crs(given)[0].name for given in sources.buildings])
+
+
+def _buildings(
+    sources: Sources, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]
+) -> list[FoundBuildings]:
+    made = read_buildings(sources.buildings, frame, half)
+    dropped: list[Dropped] = []
+    for found in made:
+        dropped += [Dropped(id=key, reason=reason) for key, reason in found.refused]
+        if not found.buildings:
+            reason = "holds no building in the window; check its place and its reference system"
+            dropped.append(Dropped(id=found.file, reason=reason))
+        credits.append(
+            Source(
+                kind="buildings",
+                name=found.file,
+                licence=found.licence,
+                attribution="; ".join(found.attributions) or found.file,
+                sha256=found.sha256,
+            )
+        )
+    counts = {f"{found.kind} {found.file}": len(found.buildings) for found in made}
+    measured = sum(bool(building.facets) for found in made for building in found.buildings)
+    stages.report("found buildings", {**counts, "with_measured_roofs": measured}, dropped)
+    return made
 
 
 def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:

@@ -38,6 +38,8 @@ class PlaceRow:
     photos: str = ""
     layouts: str = ""
     things: str = ""
+    buildings: str = ""
+    precedence: str = ""
     seed: int = 0
 
 
@@ -115,6 +117,8 @@ def _row(content: dict[str, str], path: Path, line: int) -> PlaceRow:
             photos=_beside(text.get("photos", ""), path),
             layouts=_beside(text.get("layouts", ""), path),
             things=text.get("things", ""),
+            buildings=_beside(text.get("buildings", ""), path),
+            precedence=_beside(text.get("precedence", ""), path),
             seed=int(text.get("seed") or PlaceRow.seed),
         )
     except ValueError as error:
@@ -219,6 +223,8 @@ def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Ou
             gtfs=tuple(Path(p) for p in row.gtfs.split(";") if p),
             layouts=Path(row.layouts) if row.layouts else None,
             installed_things=row.things == "installed",
+            buildings=tuple(p for p in row.buildings.split(";") if p),
+            precedence=Path(row.precedence) if row.precedence else None,
         )
         with store.new_folder(row.name, last="world.json") as folder:
             build_world(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.facades.fronts import street_fronts
 from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.outlines.merging import merged_buildings
 from vico.worldgen.facts.outlines.plans import BuildingPlans
 from vico.worldgen.facts.site import SiteFacts, site_facts
 from vico.worldgen.ground.bridges.stage import bridges_of
@@ -70,8 +72,9 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         read_things()  # refuses before anything is built if they are not installed
     seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)
 
+    evidence, known = _merged(evidence, stages)
     site = _left(_site(evidence.data, stages), stages)
-    plans = run("plans", building_plans, site.osm, seed=seed)
+    plans = run("plans", building_plans, site.osm, seed=seed, **known)
     bare, tiles = _terrain(evidence, plans, request.half, stages)
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
     streets = run("streets", road_polygons, site, plans.standing())
@@ -177,6 +180,16 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         layers = replace(layers, walls=walls, roofs=roofs)
     write.meshes(layers, models)
     return parts.world(manifest, folder, layers)
+
+
+def _merged(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict[str, Any]]:
+    """Merge what other sources know of buildings into the map; also what their plans need to know beside it."""
+    if evidence.precedence is None:
+        return evidence, {}
+    merged = stages.run("sources", merged_buildings, evidence.data, evidence.buildings, evidence.precedence)
+    stages.report("sources", merged.counts, merged.dropped)
+    data = stages.given(merged.osm, f"map of {stages.digest(merged)}")
+    return replace(evidence, data=data), {"measured": merged.facets, "origins": merged.origins}
 
 
 def _site(data: OsmData, stages: Stages) -> SiteFacts:

@@ -115,10 +115,17 @@ def _left_out(stages: Sequence[StageReport]) -> str:
             ids = ", ".join(escape(d.id) for d in them[:_SHOWN_IDS])
             more = f" and {len(them) - _SHOWN_IDS} more" if len(them) > _SHOWN_IDS else ""
             parts.append(
-                f"<details><summary>{_words(stage.name)}: {len(them):,} × {escape(reason)}</summary>"
+                f"<details><summary>{_words(stage.name)}: {len(them):,} × {escape(reason + _mending(reason))}</summary>"
                 f"<p>{ids}{more}</p></details>"
             )
     return "".join(parts) or "<p>Nothing.</p>"
+
+
+def _mending(reason: str) -> str:
+    """Return how to mend what an extract's edge cut; empty for other reasons."""
+    if "not in the file" not in reason and "cut by the extract" not in reason:
+        return ""
+    return "; to have it whole, clip anew with whole relations (osmium extract -s smart), or take a larger extract"
 
 
 def _stage_table(stages: Sequence[StageReport]) -> str:

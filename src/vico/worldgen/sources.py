@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.errors import InputError, MissingFileError
+from vico.geo.reference_systems import split_crs
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,11 @@ class Sources:
         OpenStreetMap extract, ``.osm`` or ``.osm.pbf``.
     dem
         Elevation files; flat ground without (or the ground of `tiles`).
+    buildings
+        Buildings of other sources: CityJSON, CityGML, Overture's GeoParquet; a model that does not say its reference
+        system is followed by it, as in ``city.json@EPSG:7415``.
+    precedence
+        Which source decides what; the package's own order without.
     tiles
         A photogrammetry tileset: path or address of its ``tileset.json``.
     photos
@@ -42,6 +48,8 @@ class Sources:
     gtfs: tuple[Path, ...] = ()
     layouts: Path | None = None
     installed_things: bool = False
+    buildings: tuple[str, ...] = ()
+    precedence: Path | None = None
 
     def __post_init__(self) -> None:
         for what, value, reader in (
@@ -57,13 +65,14 @@ class Sources:
     def files(self) -> Iterator[Path]:
         """Every local file or folder among them."""
         yield self.osm
-        yield from self.dem
+        yield from (split_crs(given)[0] for given in [*map(str, self.dem), *self.buildings])
         yield from self.gtfs
         for given in (self.tiles, self.photos, *self.places):
             if given is not None and "://" not in given and given not in SERVICES:
                 yield Path(given)
-        if self.layouts is not None:
-            yield self.layouts
+        for path in (self.layouts, self.precedence):
+            if path is not None:
+                yield path
 
     def to_json(self) -> dict[str, Any]:
         """As plain values, with absolute paths."""
@@ -97,6 +106,8 @@ class Sources:
                 gtfs=tuple(Path(p) for p in content["gtfs"]),
                 layouts=None if content["layouts"] is None else Path(content["layouts"]),
                 installed_things=bool(content["installed_things"]),
+                buildings=tuple(content.get("buildings", ())),
+                precedence=None if content.get("precedence") is None else Path(content["precedence"]),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"the recorded sources of the world can't be read ({error}); build it anew") from None

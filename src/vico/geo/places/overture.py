@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vico.errors import InputError, MissingFileError, SchemaError
+from vico.errors import InputError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.geo.geoparquet import parquet_files, rows_near
 from vico.geo.places.model import FoundPlace, one_line
 
 LEAST_CONFIDENCE = 0.5
@@ -21,7 +22,7 @@ ATTRIBUTION = "© Overture Maps Foundation (overturemaps.org)"
 
 _COLUMNS = ("id", "geometry", "bbox", "names", "categories", "taxonomy", "basic_category", "confidence", "sources",
             "operating_status")  # fmt: skip
-_BATCH = 4096
+_NEEDED = ("id", "geometry", "names")
 _MOST_PLACES = 200_000
 
 
@@ -56,12 +57,7 @@ class OverturePlaces:
             raise InputError(f"overture places: least confidence {least_confidence}; it must lie within 0..1")
         self.refused: list[tuple[str, str]] = []
         self._least = least_confidence
-        self._files: list[Path] = []
-        for path in paths:
-            inside = sorted(Path(path).rglob("*.parquet")) if Path(path).is_dir() else [Path(path)]
-            if not inside or not inside[0].is_file():
-                raise MissingFileError(f"{path}: no such file, or no .parquet in it; give Overture's places")
-            self._files += inside
+        self._files = parquet_files(paths, what="Overture's places")
 
     def near(self, frame: LocalFrame, half: float) -> list[FoundPlace]:
         """Every place in the square of half side `half` metres around the frame's origin, sorted by id.
@@ -74,7 +70,9 @@ class OverturePlaces:
         self.refused.clear()
         found: dict[str, FoundPlace] = {}
         for path in self._files:
-            for row in _rows(path, frame.boxes(half)):
+            for row in rows_near(
+                path, frame.boxes(half), columns=_COLUMNS, needed=_NEEDED, give="Overture's theme=places"
+            ):
                 place = self._place(row, frame, half)
                 if place is not None:
                     found[place.id] = place
@@ -148,54 +146,3 @@ def _point(value: Any) -> tuple[float, float] | None:
     if not (math.isfinite(lon) and math.isfinite(lat) and abs(lon) <= 180.0 and abs(lat) <= 90.0):
         return None
     return lon, lat
-
-
-def _rows(path: Path, boxes: Sequence[tuple[float, float, float, float]]) -> Iterator[dict[str, Any]]:
-    """Rows of a file whose box touches one of these (west, south, east, north); row groups elsewhere are skipped."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        with pq.ParquetFile(path) as file:
-            columns = [name for name in _COLUMNS if name in file.schema_arrow.names]
-            missing = [name for name in ("id", "geometry", "names") if name not in columns]
-            if missing:
-                raise SchemaError(f"{path}: has no column {missing[0]}; give Overture's theme=places")
-            groups = [k for k in range(file.num_row_groups) if _touches(file.metadata.row_group(k), boxes)]
-            for batch in file.iter_batches(batch_size=_BATCH, row_groups=groups, columns=columns):
-                for row in batch.to_pylist():
-                    if _near(row.get("bbox"), boxes):
-                        yield row
-    except (pa.ArrowException, OSError, UnicodeDecodeError, OverflowError) as error:
-        reason = str(error).splitlines()[0][:160] if str(error) else type(error).__name__
-        raise SchemaError(f"{path}: not readable GeoParquet ({reason}); download it again") from None
-
-
-def _touches(group: Any, boxes: Sequence[tuple[float, float, float, float]]) -> bool:
-    """Whether a row group's statistics allow rows in the boxes; true where there are none."""
-    bounds: dict[str, tuple[float, float]] = {}
-    for k in range(group.num_columns):
-        column = group.column(k)
-        if column.path_in_schema.startswith("bbox.") and column.is_stats_set and column.statistics.has_min_max:
-            bounds[column.path_in_schema[5:]] = (column.statistics.min, column.statistics.max)
-    if not {"xmin", "xmax", "ymin", "ymax"} <= bounds.keys():
-        return True
-    return any(
-        bounds["xmin"][0] <= east + 1e-5 and bounds["xmax"][1] >= west - 1e-5
-        and bounds["ymin"][0] <= north + 1e-5 and bounds["ymax"][1] >= south - 1e-5
-        for west, south, east, north in boxes
-    )  # fmt: skip
-
-
-def _near(box: Any, boxes: Sequence[tuple[float, float, float, float]]) -> bool:
-    """Whether a row's box touches one of the boxes; true where it has none. Stored as 32 bits, so with some slack."""
-    if not isinstance(box, dict):
-        return True
-    try:
-        x0, x1, y0, y1 = (float(box[k]) for k in ("xmin", "xmax", "ymin", "ymax"))
-    except (KeyError, TypeError, ValueError):
-        return True
-    return any(
-        x0 <= east + 1e-4 and x1 >= west - 1e-4 and y0 <= north + 1e-4 and y1 >= south - 1e-4
-        for west, south, east, north in boxes
-    )

@@ -12,12 +12,12 @@ from vico.geo.osm import polygons_of
 from vico.geo.overlay import OverlayError
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import Building, Dropped
+from vico.world.model import Building, BuildingSources, Dropped
 from vico.worldgen.buildings.solids import Footing, Mesh, collision_bodies, part_mesh, seat_of
 from vico.worldgen.facades.looks import FacadeStyle
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
-from vico.worldgen.facts.outlines.roof_shapes import rings_of
+from vico.worldgen.facts.outlines.roof_shapes import rings_of, shape_named
 
 _STANDING = 2.5  # metres above the ground floor from which on a part is no footprint
 _KEPT_TAGS = (
@@ -124,6 +124,23 @@ def record_of(draft: Draft, entity: int) -> Building:
         colour="#{:02x}{:02x}{:02x}".format(*draft.look.tint),
         accessible=False,
         tags={key: plan.tags[key] for key in _KEPT_TAGS if key in plan.tags},
+        sources=_sources_of(plan, highest),
+    )
+
+
+_RULES = {"height tag": "osm height tag", "levels tag": "osm levels tag", "parts": "osm parts"}
+
+
+def _sources_of(plan: BuildingPlan, highest: PartPlan) -> BuildingSources | None:
+    """Return where a building's facts are from; None where only the map was asked."""
+    origin = plan.origin
+    if origin is None:
+        return None
+    tagged = shape_named(highest.tags.get("roof:shape")) is not None
+    return BuildingSources(
+        footprint=origin.footprint,
+        height=origin.height or _RULES.get(plan.rule, f"rule: {plan.rule}"),
+        roof=origin.roof or ("osm roof:shape tag" if tagged else "rule: use, size and region"),
     )
 
 

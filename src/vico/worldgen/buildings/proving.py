@@ -234,4 +234,5 @@ def _block(plan: BuildingPlan) -> BuildingPlan:
     levels = max(round((eaves - 0.6) / STOREY), 1) if main.levels else 0
     made = [PartPlan(piece, low, eaves, levels, Roof("flat", 0.0), main.tags) for piece in pieces]
     outline = max(pieces, key=lambda piece: piece.area)
-    return replace(plan, outline=outline, parts=made, rooftop=[])
+    origin = plan.origin and replace(plan.origin, roof="rule: plain block")
+    return replace(plan, outline=outline, parts=made, rooftop=[], origin=origin)

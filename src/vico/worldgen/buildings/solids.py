@@ -77,8 +77,12 @@ def part_mesh(part: PartPlan, seat: Footing) -> Mesh:
     low, eaves = heights_of(part, seat)
     # Solids are made near the origin and near height 0: the kernel's tolerance grows with coordinates.
     x, y = (round(v) for v in part.polygon.centroid.coords[0])
-    local = shapely.transform(part.polygon, lambda xy, x=x, y=y: xy - (x, y))
-    solid = building_solid(local, low - eaves, 0.0, part.roof).simplify(0.002)
+
+    def near_origin(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        return xy - np.array([x, y])
+
+    local, roof = shapely.transform(part.polygon, near_origin), part.roof.moved(near_origin)
+    solid = building_solid(local, low - eaves, 0.0, roof).simplify(0.002)
     body = solid.to_mesh64()
     vertices = np.asarray(body.vert_properties, np.float64)[:, :3]
     triangles = np.asarray(body.tri_verts, np.int64)

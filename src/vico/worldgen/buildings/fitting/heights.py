@@ -56,7 +56,7 @@ def _raised_part(part: PartPlan, model: NDArray[np.float64], seen: NDArray[np.fl
     levels = part.levels
     if levels and number(part.tags.get("building:levels")) is None:
         levels = max(round((eaves - part.low - 0.6) / STOREY), 1)
-    return replace(part, eaves=eaves, levels=levels, roof=replace(part.roof, height=round(new_rise, 3)))
+    return replace(part, eaves=eaves, levels=levels, roof=part.roof.risen(round(new_rise, 3)))
 
 
 def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:

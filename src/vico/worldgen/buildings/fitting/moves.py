@@ -140,12 +140,15 @@ def _best_move(
 def _displaced(
     plan: BuildingPlan, shift: NDArray[np.float64], scale: float, pivot: NDArray[np.float64]
 ) -> BuildingPlan:
+    def move(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(pivot + scale * (xy - pivot) + shift, np.float64)
+
     def moved(polygon: Polygon) -> Polygon:
-        return shapely.transform(polygon, lambda xy: pivot + scale * (xy - pivot) + shift)
+        return shapely.transform(polygon, move)
 
     return replace(
         plan,
         outline=moved(plan.outline),
-        parts=[replace(part, polygon=moved(part.polygon)) for part in plan.parts],
+        parts=[replace(part, polygon=moved(part.polygon), roof=part.roof.moved(move)) for part in plan.parts],
         rooftop=[replace(part, polygon=moved(part.polygon)) for part in plan.rooftop],
     )

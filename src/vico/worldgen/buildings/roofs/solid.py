@@ -23,6 +23,7 @@ from vico.geo import overlay
 from vico.worldgen.buildings.roofs.pointed import drawn_together
 from vico.worldgen.buildings.roofs.ridged import BoxFrame, box_frame, profiled_solid
 from vico.worldgen.buildings.roofs.sloped import sloped_solid
+from vico.worldgen.facts.outlines.roof_cells import measured_solid
 from vico.worldgen.facts.outlines.roof_shapes import Roof, prism, rings_of
 
 _SPECK = 0.002  # metres: detail that the kernel makes and nobody sees
@@ -38,7 +39,7 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
     low, eaves
         Heights of its underside and of where the roof begins, metres.
     roof
-        What covers it.
+        What covers it; a measured one's facets near the origin, too.
 
     Returns
     -------
@@ -49,6 +50,8 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
     -----
     OSM wiki, Simple 3D Buildings and Key:roof:shape.
     """
+    if roof.facets:
+        return measured_solid(polygon, low - eaves, roof.facets).translate((0.0, 0.0, eaves))
     rings = rings_of(polygon)
     if roof.shape == "flat":
         body = prism(rings, low, eaves)

@@ -15,15 +15,18 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from vico.geo import overlay
+from vico.geo.buildings.model import RoofFacet
 from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
+from vico.geo.overlay import OverlayError
 from vico.seeds import rng
 from vico.world.model import OPEN_KINDS, Dropped
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.apart import apart, supported, without_slivers
 from vico.worldgen.facts.outlines.heights import STOREY, level_estimates, said_height, said_levels, weighted_median
+from vico.worldgen.facts.outlines.measured_roofs import parts_of_roof
 from vico.worldgen.facts.outlines.needles import without_needles
 from vico.worldgen.facts.outlines.parts import SMALL_KINDS, part_of
-from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
+from vico.worldgen.facts.outlines.plans import BuildingOrigin, BuildingPlan, BuildingPlans, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, shape_named
 from vico.worldgen.facts.tags import number
 
@@ -143,7 +146,13 @@ def _shop_points(osm: OsmData) -> NDArray[np.float64]:
     return np.array(points).reshape(-1, 2)
 
 
-def building_plans(osm: OsmData, *, seed: int) -> BuildingPlans:
+def building_plans(
+    osm: OsmData,
+    *,
+    seed: int,
+    measured: Mapping[str, tuple[RoofFacet, ...]] | None = None,
+    origins: Mapping[str, BuildingOrigin] | None = None,
+) -> BuildingPlans:
     """Decide every building of an extract that touches the world's square.
 
     Parameters
@@ -152,6 +161,10 @@ def building_plans(osm: OsmData, *, seed: int) -> BuildingPlans:
         The extract.
     seed
         Decides, building by building, what neither tags nor neighbours do.
+    measured
+        Surfaces of roofs by the building's id, heights above its ground.
+    origins
+        Where facts are from, by the building's id, where other sources than the map were asked.
 
     Returns
     -------
@@ -188,27 +201,48 @@ def building_plans(osm: OsmData, *, seed: int) -> BuildingPlans:
                 if all(said_levels(part_tags) for _, _, part_tags in own) and rule != "height tag":
                     rule = "parts"
                 solids = _rest_of_outline(main, solids) + solids
-            plans.append(
-                BuildingPlan(
-                    name,
-                    tags.get("name"),
-                    uses[k],
-                    tags,
-                    outline,
-                    max(s.levels for s in solids),
-                    int(shops[k]),
-                    solids,
-                    rule=rule,
-                )
+            plan = BuildingPlan(
+                name,
+                tags.get("name"),
+                uses[k],
+                tags,
+                outline,
+                max(s.levels for s in solids),
+                int(shops[k]),
+                solids,
+                rule=rule,
             )
+            plans.append(_with_sources(plan, measured or {}, origins, dropped))
     for name, outline, tags in own_parts.get(-1, []):
         with expendable(name, dropped):
             random = rng(seed, "building", name)
             use = use_of(tags, 0, outline.area)
             part = part_of(outline, tags, {}, use, 3, flat, random)
             rule = "height tag" if said_height(tags) else "levels tag" if said_levels(tags) else "town"
-            plans.append(BuildingPlan(name, tags.get("name"), use, tags, outline, part.levels, 0, [part], rule=rule))
+            lone = BuildingPlan(name, tags.get("name"), use, tags, outline, part.levels, 0, [part], rule=rule)
+            plans.append(_with_sources(lone, {}, origins, dropped))
     return BuildingPlans(apart(supported(plans, osm, dropped), dropped), dropped)
+
+
+def _with_sources(
+    plan: BuildingPlan,
+    measured: Mapping[str, tuple[RoofFacet, ...]],
+    origins: Mapping[str, BuildingOrigin] | None,
+    dropped: list[Dropped],
+) -> BuildingPlan:
+    """Return a building under its measured roof, if it has one, with where its facts are from."""
+    if origins is None:
+        return plan
+    name = plan.id.partition(".")[0]
+    origin = origins.get(name, BuildingOrigin("osm"))
+    if facets := measured.get(name):
+        try:
+            parts = parts_of_roof(plan.outline, facets, plan.parts[0].tags)
+            plan = replace(plan, parts=parts, levels=max(part.levels for part in parts))
+        except OverlayError as error:
+            dropped.append(Dropped(id=f"{plan.id} roof", reason=f"fitted instead of built: {error}"))
+            origin = replace(origin, roof=origin.roof.replace(" surfaces", " fitted"))
+    return replace(plan, origin=origin)
 
 
 def _part_levels(count: int, parts: list[_Row], owner: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

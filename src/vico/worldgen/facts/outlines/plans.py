@@ -55,6 +55,21 @@ class PartPlan:
 
 
 @dataclass(frozen=True)
+class BuildingOrigin:
+    """Where a building's facts are from: ``osm``, kind and file of another source, a rule; empty: by `rule` and tags.
+
+    Attributes
+    ----------
+    footprint, height, roof
+        Of its outline, its height and its roof; a roof built of a model's surfaces is ``KIND:FILE surfaces``.
+    """
+
+    footprint: str
+    height: str = ""
+    roof: str = ""
+
+
+@dataclass(frozen=True)
 class BuildingPlan:
     """A building decided but not yet built.
 
@@ -66,6 +81,8 @@ class BuildingPlan:
         What sits on `parts` or holds them up.
     rule
         How its height was decided, one of `RULES`.
+    origin
+        Where its facts are from; None where only the map was asked.
     """
 
     id: str
@@ -78,6 +95,7 @@ class BuildingPlan:
     parts: list[PartPlan]
     rooftop: list[PartPlan] = field(default_factory=list)
     rule: str = "town"
+    origin: BuildingOrigin | None = None
 
     @property
     def solids(self) -> list[PartPlan]:

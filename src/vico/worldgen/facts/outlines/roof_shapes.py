@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import manifold3d
 import numpy as np
@@ -10,6 +11,8 @@ import shapely
 from manifold3d import CrossSection, Manifold
 from numpy.typing import NDArray
 from shapely import Polygon
+
+from vico.geo.buildings.model import RoofFacet
 
 SHAPES = (
     "flat",
@@ -103,11 +106,42 @@ class Roof:
     direction
         Skillion: yaw towards which it falls, radians. Ridged roofs: yaw of the ridge; None: along the longer side.
         One-sided hips and saltboxes: the ridge's yaw points to the hip; the long slope lies left of it.
+    facets
+        The surfaces of a measured roof, heights above the eaves; `shape` is then the nearest that has a name.
     """
 
     shape: str
     height: float
     direction: float | None = None
+    facets: tuple[RoofFacet, ...] = ()
+
+    def moved(self, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Roof:
+        """Return the roof over an outline that was moved, and perhaps scaled, by `move` (points, shape ``(n, 2)``)."""
+        if not self.facets:
+            return self
+        return replace(self, facets=tuple(_moved(facet, move) for facet in self.facets))
+
+    def risen(self, height: float) -> Roof:
+        """Return the roof with another height, metres; a measured one is stretched."""
+        if not self.facets or self.height <= 0.0:
+            return replace(self, height=height)
+        share = height / self.height
+        stretched = tuple(
+            RoofFacet(facet.polygon, (c * share, gx * share, gy * share))
+            for facet in self.facets
+            for c, gx, gy in (facet.plane,)
+        )
+        return replace(self, height=height, facets=stretched)
+
+
+def _moved(facet: RoofFacet, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> RoofFacet:
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]) + np.asarray(facet.polygon.centroid.coords[0])
+    level = facet.height(corners)
+    east, north = move(corners)[1:] - move(corners)[:1]
+    turn = np.array([east, north])
+    gx, gy = np.linalg.solve(turn, level[1:] - level[:1])
+    x, y = move(corners)[0]
+    return RoofFacet(shapely.transform(facet.polygon, move), (float(level[0] - gx * x - gy * y), float(gx), float(gy)))
 
 
 def rings_of(polygon: Polygon) -> list[NDArray[np.float64]]:

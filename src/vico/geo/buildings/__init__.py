@@ -1,0 +1,1 @@
+"""Buildings that others than OpenStreetMap know: city models (CityJSON, CityGML) and Overture's footprints."""
