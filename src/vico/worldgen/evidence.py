@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vico.errors import InputError
+from vico.geo.detections.model import Detections
+from vico.geo.detections.reader import read_detections
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.gtfs.feed import Feed
@@ -27,7 +29,7 @@ from vico.io.files import sha256_of
 from vico.io.http import HttpClient
 from vico.world.model import Dropped, Source
 from vico.worldgen.product import digest_of
-from vico.worldgen.sources import Sources
+from vico.worldgen.sources import SERVICES, Sources
 from vico.worldgen.stages import Stages
 
 _TILE_MARGIN = 80.0  # metres: as far as the terrain goes beyond the window, and what hides its border
@@ -53,6 +55,8 @@ class Evidence:
         Places that other sources know.
     feeds
         Timetables.
+    detections
+        What photos show, if there is a file of it.
     credits
         Every source, with what its licence asks for.
     """
@@ -64,6 +68,7 @@ class Evidence:
     found: Sequence[FoundPlace]
     feeds: Sequence[Feed]
     credits: list[Source]
+    detections: Detections | None = None
 
 
 def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> Evidence:
@@ -136,7 +141,29 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
             )
         broken = [Dropped(id=key, reason=reason) for feed in feeds for key, reason in feed.broken]
         stages.report("timetables", {"feeds": len(feeds)}, broken)
-    return Evidence(data, samples, tiles, images, found, feeds, credits)
+    detections = None
+    if sources.detections is not None:
+        with stages.timed("detections file"):
+            detections = _detections(sources.detections, sources, frame, half, stages, credits)
+    return Evidence(data, samples, tiles, images, found, feeds, credits, detections)
+
+
+def _detections(
+    path: Path, sources: Sources, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]
+) -> Detections:
+    photos = None if sources.photos in (None, *SERVICES) else Path(str(sources.photos))
+    found = read_detections(path, frame, half, photos=photos)
+    stages.given(found, f"{found.sha256} {frame} {half}")
+    credits.append(
+        Source(
+            kind="detections",
+            name=path.name,
+            licence="as its provider states",
+            attribution=found.attribution or path.name,
+            sha256=found.sha256,
+        )
+    )
+    return found
 
 
 def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:

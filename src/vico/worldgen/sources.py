@@ -30,6 +30,8 @@ class Sources:
         Timetables: zipped GTFS feeds.
     layouts
         A folder of room layouts to choose from.
+    detections
+        What a detector found in street photos, or somebody located: COCO's JSON, or GeoJSON.
     installed_things
         Show the models of `vico assets install things` instead of ours, where there are.
     """
@@ -42,6 +44,7 @@ class Sources:
     gtfs: tuple[Path, ...] = ()
     layouts: Path | None = None
     installed_things: bool = False
+    detections: Path | None = None
 
     def __post_init__(self) -> None:
         for what, value, reader in (
@@ -64,6 +67,8 @@ class Sources:
                 yield Path(given)
         if self.layouts is not None:
             yield self.layouts
+        if self.detections is not None:
+            yield self.detections
 
     def to_json(self) -> dict[str, Any]:
         """As plain values, with absolute paths."""
@@ -97,6 +102,7 @@ class Sources:
                 gtfs=tuple(Path(p) for p in content["gtfs"]),
                 layouts=None if content["layouts"] is None else Path(content["layouts"]),
                 installed_things=bool(content["installed_things"]),
+                detections=None if content.get("detections") is None else Path(content["detections"]),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"the recorded sources of the world can't be read ({error}); build it anew") from None
