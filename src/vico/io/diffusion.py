@@ -196,7 +196,10 @@ def _variant(folder: Path) -> str | None:
             "weights are .safetensors"
         )
     if _has_weights(folder) and not safe:
-        raise MissingFileError(f"{folder}: its weights are not there; fetch the model again")
+        raise MissingFileError(
+            f"{folder}: no safetensors there; fetch the model again, or convert its weights once "
+            "(docs/generating_objects.md)"
+        )
     return _HALF if safe and all(f".{_HALF}." in path.name for path in safe) else None
 
 

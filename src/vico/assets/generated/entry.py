@@ -14,7 +14,7 @@ from vico.assets.models.schema import ModelFile
 from vico.errors import InputError, OutputExistsError
 from vico.io.data_files import parse_record
 from vico.io.files import write_bytes, write_json
-from vico.world.mesh import glb_bytes
+from vico.world.glb import glb_bytes
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 _TAG = re.compile(r"([A-Za-z0-9_:]{1,60})=(.{1,100})")

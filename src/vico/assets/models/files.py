@@ -11,7 +11,8 @@ from vico.assets.models.schema import Assembly, MeshEntry, ModelEntry, ModelFile
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.data_files import read_record
 from vico.io.files import sha256_of
-from vico.world.mesh import Surface, joined, read_glb
+from vico.world.glb import read_glb
+from vico.world.mesh import Surface, joined
 
 GUIDE = "docs/adding_a_model.md"
 

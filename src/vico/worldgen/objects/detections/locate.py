@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,14 @@ from numpy.typing import NDArray
 from vico.geo.detections.model import Detections, Sighting
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
+from vico.worldgen.objects.detections.agreement import NEAREST, ROUGH, Rays, agreeing, beside
 from vico.worldgen.objects.detections.classes import Classes, DetectedClass, Rules
 
 Floats = NDArray[np.float64]
 
 _STEP = 0.25  # metres along a ray from look to look at the ground
 _TILT = math.radians(1.0)  # error of a camera's pitch
-_ROUGH = 0.3  # metres: the foot of a box is not drawn better
-_CROSSING = math.radians(6.0)  # rays that cross at less say little
-_NEAREST = 1.0  # metres
-_SIGMAS = 3.0
-_MOST_CANDIDATES, _MOST_RAYS = 20_000, 1_500  # of a class
-_ROUNDS = 4
+_MOST_RAYS = 1_500  # of a class
 
 
 @dataclass(frozen=True)
@@ -60,22 +56,6 @@ class Spot:
     score: float
     spread: float | None
     how: str
-
-
-@dataclass(frozen=True)
-class _Rays:
-    """Detections of one class: rays on the map, and distances to the ground and their errors (nan: none)."""
-
-    origin: Floats
-    bearing: Floats
-    distance: Floats
-    error: Floats
-    score: Floats
-    photo: NDArray[np.int64]
-
-    def taken(self, which: NDArray[np.bool_]) -> _Rays:
-        """Return some of them."""
-        return _Rays(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
 def located(found: Detections, height: HeightField, classes: Classes) -> tuple[list[Spot], list[Dropped]]:
@@ -138,12 +118,12 @@ def _of_class(
         sightings = [sightings[k] for k in np.flatnonzero(~floating).tolist()]
         rays = rays.taken(~floating)
     alone: list[int] = []
-    for xy, members in _agreeing(rays, rules):
+    for xy, members in agreeing(rays, rules):
         few = len(members) < (rules.raised_photos if raised else 2)
         if few:
             alone += members
             continue
-        side = _beside(rays, members, xy)
+        side = beside(rays, members, xy)
         spread = round(float(np.sqrt((side**2).mean())), 3)
         spots.append(_spot(sightings, members, name, xy, spread, "triangulated"))
     for k in alone:
@@ -165,7 +145,7 @@ def _spot(
     return Spot(taken[0].id, name, np.round(xy, 3), tuple(one.photo for one in taken), score, spread, how)
 
 
-def _alone(one: Sighting, rays: _Rays, k: int, raised: bool, name: str, rules: Rules) -> tuple[Spot | None, str]:
+def _alone(one: Sighting, rays: Rays, k: int, raised: bool, name: str, rules: Rules) -> tuple[Spot | None, str]:
     """Return the thing that a single photo shows, or None and why it is not placed."""
     if raised:
         return None, f"seen in fewer than {rules.raised_photos} photos that agree, and not on the ground"
@@ -178,7 +158,7 @@ def _alone(one: Sighting, rays: _Rays, k: int, raised: bool, name: str, rules: R
     ), ""  # fmt: skip
 
 
-def _rays(sightings: Sequence[Sighting], raised: bool, height: HeightField, rules: Rules) -> _Rays:
+def _rays(sightings: Sequence[Sighting], raised: bool, height: HeightField, rules: Rules) -> Rays:
     origin = np.array([one.position[:2] for one in sightings])
     middle = np.array([one.middle[:2] for one in sightings])
     bearing = middle / np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-9)
@@ -187,7 +167,7 @@ def _rays(sightings: Sequence[Sighting], raised: bool, height: HeightField, rule
     if not raised:
         for k, one in enumerate(sightings):
             distance[k], error[k] = _to_the_ground(one, height, rules.reach)
-    return _Rays(
+    return Rays(
         origin, bearing, distance, error, np.array([one.score for one in sightings]),
         np.array([photos[one.photo] for one in sightings]),
     )  # fmt: skip
@@ -198,7 +178,7 @@ def _to_the_ground(one: Sighting, height: HeightField, reach: float) -> tuple[fl
     level = float(np.hypot(*one.foot[:2]))
     if level < 1e-3:
         return math.nan, math.nan
-    along = np.arange(_NEAREST, reach + _STEP, _STEP)
+    along = np.arange(NEAREST, reach + _STEP, _STEP)
     points = one.position[:2] + one.foot[:2] / level * along[:, None]
     eye = one.position[2] if one.eye is None else float(height(one.position[:2])) + one.eye
     above = eye + one.foot[2] / level * along - height(points)
@@ -209,111 +189,7 @@ def _to_the_ground(one: Sighting, height: HeightField, reach: float) -> tuple[fl
     share = above[k - 1] / max(above[k - 1] - above[k], 1e-9)
     distance = float(along[k - 1] + share * _STEP)
     drop = max(eye - float(height(one.position[:2] + one.foot[:2] / level * distance)), 0.3)
-    return distance, _ROUGH + (distance**2 + drop**2) / drop * _TILT
-
-
-def _agreeing(rays: _Rays, rules: Rules) -> list[tuple[Floats, list[int]]]:
-    """Return places and the rays that agree on each, most agreed first; every ray is in one of them."""
-    candidates = _candidates(rays, rules)
-    agrees = _agreement(candidates, rays, rules)
-    free = np.ones(len(rays.score), bool)
-    order = np.argsort(rays.photo, kind="stable")
-    starts = np.flatnonzero(np.r_[True, np.diff(rays.photo[order]) > 0])
-    worth = np.where(agrees, rays.score, 0.0)[:, order]
-    # One photo shows a thing once: of its rays the surest counts.
-    weight = np.maximum.reduceat(worth, starts, axis=1).sum(axis=1) if len(candidates) else np.zeros(0)
-    found: list[tuple[Floats, list[int]]] = []
-    while len(weight) and weight.max() > 0.0:
-        best = int(weight.argmax())
-        xy, members = _refined(candidates[best], rays, free, rules)
-        if not members:
-            weight[best] = 0.0
-            continue
-        found.append((xy, members))
-        free[members] = False
-        touched = np.flatnonzero(agrees[:, members].any(axis=1))
-        rest = np.where(agrees[touched] & free, rays.score, 0.0)[:, order]
-        weight[touched] = np.maximum.reduceat(rest, starts, axis=1).sum(axis=1)
-    return found + [(rays.origin[k], [k]) for k in np.flatnonzero(free).tolist()]
-
-
-def _candidates(rays: _Rays, rules: Rules) -> Floats:
-    """Return where rays meet the ground, and where two of different photos cross."""
-    known = np.flatnonzero(~np.isnan(rays.distance))
-    hits = rays.origin[known] + rays.bearing[known] * rays.distance[known, None]
-    a, b = np.triu_indices(len(rays.score), 1)
-    other = rays.photo[a] != rays.photo[b]
-    a, b = a[other], b[other]
-    cross = rays.bearing[a, 0] * rays.bearing[b, 1] - rays.bearing[a, 1] * rays.bearing[b, 0]
-    steep = np.abs(cross) > math.sin(_CROSSING)
-    a, b, cross = a[steep], b[steep], cross[steep]
-    apart = rays.origin[b] - rays.origin[a]
-    along_a = (apart[:, 0] * rays.bearing[b, 1] - apart[:, 1] * rays.bearing[b, 0]) / cross
-    along_b = (apart[:, 0] * rays.bearing[a, 1] - apart[:, 1] * rays.bearing[a, 0]) / cross
-    good = np.ones(len(a), bool)
-    for which, along in ((a, along_a), (b, along_b)):
-        good &= (along > _NEAREST) & (along < rules.reach)
-        good &= ~(np.abs(along - rays.distance[which]) > _SIGMAS * rays.error[which])
-    crossings = rays.origin[a[good]] + rays.bearing[a[good]] * along_a[good, None]
-    return np.concatenate([crossings, hits])[:_MOST_CANDIDATES]
-
-
-def _agreement(places: Floats, rays: _Rays, rules: Rules) -> NDArray[np.bool_]:
-    """Which rays pass which places near enough, shape ``(places, rays)``."""
-    delta = places[:, None, :] - rays.origin[None, :, :]
-    along = (delta * rays.bearing).sum(axis=2)
-    beside = np.abs(delta[..., 0] * rays.bearing[:, 1] - delta[..., 1] * rays.bearing[:, 0])
-    near = (along > 0.0) & (along < rules.reach) & (beside <= _ROUGH + along * math.tan(math.radians(rules.bearing)))
-    return near & ~(np.abs(along - rays.distance) > _SIGMAS * rays.error)
-
-
-def _refined(place: Floats, rays: _Rays, free: NDArray[np.bool_], rules: Rules) -> tuple[Floats, list[int]]:
-    """Move a place to where it fits its rays best (weighted least squares), and return them, one a photo."""
-    members: list[int] = []
-    for _ in range(_ROUNDS):
-        agreeing = np.flatnonzero(_agreement(place[None], rays, rules)[0] & free)
-        best: dict[int, int] = {}
-        for k in agreeing.tolist():
-            held = best.get(int(rays.photo[k]))
-            if held is None or _off(rays, k, place) < _off(rays, held, place):
-                best[int(rays.photo[k])] = k
-        if sorted(best.values()) == members:
-            break
-        members = sorted(best.values())
-        if not members:
-            break
-        place = _fitted(place, rays, members, rules)
-    return place, members
-
-
-def _off(rays: _Rays, k: int, place: Floats) -> float:
-    return abs(float(_beside(rays, [k], place)[0]))
-
-
-def _beside(rays: _Rays, members: Sequence[int], place: Floats) -> Floats:
-    """How far rays pass a place, metres, to the left positive."""
-    delta = place - rays.origin[list(members)]
-    bearing = rays.bearing[list(members)]
-    return np.asarray(bearing[:, 0] * delta[:, 1] - bearing[:, 1] * delta[:, 0], np.float64)
-
-
-def _fitted(place: Floats, rays: _Rays, members: list[int], rules: Rules) -> Floats:
-    """Return the place nearest to rays, and to the distances where they meet the ground, each by its error."""
-    bearing = rays.bearing[members]
-    normal = np.column_stack([-bearing[:, 1], bearing[:, 0]])
-    along = ((place - rays.origin[members]) * bearing).sum(axis=1)
-    sigma = _ROUGH + np.maximum(along, _NEAREST) * math.radians(rules.bearing) / 2
-    rows, aims, weights = [normal], [(normal * rays.origin[members]).sum(axis=1)], [1 / sigma]
-    known = ~np.isnan(rays.distance[members])
-    if known.any():
-        rows.append(bearing[known])
-        aims.append((bearing[known] * rays.origin[members][known]).sum(axis=1) + rays.distance[members][known])
-        weights.append(1 / rays.error[members][known])
-    matrix, aim, weight = np.concatenate(rows), np.concatenate(aims), np.concatenate(weights)
-    if len(matrix) < 2:
-        return place
-    solved, _, rank, _ = np.linalg.lstsq(matrix * weight[:, None], aim * weight, rcond=1e-6)
-    return np.asarray(solved, np.float64) if rank == 2 else place
+    return distance, ROUGH + (distance**2 + drop**2) / drop * _TILT
 
 
 def merged(spots: Sequence[Spot], apart: float) -> tuple[list[Spot], list[Dropped]]:
