@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.geo.detections.model import Detections, Sighting
+from vico.geo.detections.model import Detections, Located, Sighting
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
 from vico.worldgen.objects.detections.agreement import NEAREST, ROUGH, Rays, agreeing, beside
@@ -74,7 +74,8 @@ def located(found: Detections, height: HeightField, classes: Classes) -> tuple[l
     lots: dict[str, list[Sighting]] = {}
     keys: dict[str, DetectedClass] = {}
     spots: list[Spot] = []
-    for one in (*found.sightings, *found.located):
+    everything: list[Sighting | Located] = [*found.sightings, *found.located]
+    for one in everything:
         entry = classes.by_name.get(one.name.lower())
         if entry is None:
             dropped.append(Dropped(id=one.id, reason=f"class {one.name!r} stands for nothing; see docs/detections.md"))
