@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.errors import MissingFileError
+from vico.errors import MissingFileError, SchemaError
 from vico.seeds import rng
 from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, PhotoView
 from vico.worldgen.photos.streetview.matching import LoftrMatcher, XfeatMatcher
@@ -25,8 +25,16 @@ def test_loftr_reads_a_checkpoint_and_keeps_to_the_reach(tmp_path: Path) -> None
     with pytest.raises(MissingFileError, match="no such LoFTR checkpoint"):
         LoftrMatcher(tmp_path / "weights.ckpt").match(PICTURE, PICTURE, REACH)
     torch.manual_seed(0)
-    torch.save({"state_dict": kornia.feature.LoFTR(pretrained=None).state_dict()}, tmp_path / "weights.ckpt")
+    state = kornia.feature.LoFTR(pretrained=None).state_dict()
+    torch.save({"state_dict": state}, tmp_path / "weights.ckpt")
     matches = LoftrMatcher(tmp_path / "weights.ckpt", confidence=0.0).match(PICTURE, PICTURE, REACH)
+    safe = pytest.importorskip("safetensors.torch", reason="safetensors is not installed")
+    safe.save_file({key: value.contiguous() for key, value in state.items()}, tmp_path / "weights.safetensors")
+    again = LoftrMatcher(tmp_path / "weights.safetensors", confidence=0.0).match(PICTURE, PICTURE, REACH)
+    assert (again.photo == matches.photo).all()
+    (tmp_path / "no.ckpt").write_bytes(b"something else")
+    with pytest.raises(SchemaError, match="no weights of LoFTR"):
+        LoftrMatcher(tmp_path / "no.ckpt").match(PICTURE, PICTURE, REACH)
     assert matches.render.shape == matches.photo.shape == (len(matches), 2)
     assert (np.linalg.norm(matches.render - matches.photo, axis=1) <= 12.0).all()
 

@@ -22,6 +22,7 @@ from tyro.extras import SubcommandApp
 
 from vico.cli import viewer_verbs
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
+from vico.cli.asset_verbs import assets
 from vico.cli.dataset_verbs import dataset
 from vico.cli.motion_verbs import motion
 from vico.cli.options import (
@@ -46,7 +47,6 @@ app = SubcommandApp()
 world = SubcommandApp()
 community = SubcommandApp()
 check = SubcommandApp()
-assets = SubcommandApp()
 language_model = SubcommandApp()
 
 
@@ -89,6 +89,8 @@ def world_rebuild(path: Positional[Path], stage: CommaSeparated, layout_llm: boo
 def world_build_many(
     table: Positional[Path],
     out: str,
+    extracts: Path | None = None,
+    only: str = "",
     workers: int = 0,
     ray: RayAddress = None,
     force: bool = False,
@@ -102,10 +104,14 @@ def world_build_many(
 
     Example: vico world build-many places.csv --out worlds --workers 4
 
+    Example: vico world build-many paper35 --out worlds
+
     Example: vico world build-many places.csv --out s3://bucket/worlds --ray
 
     Args:
-        table: The places; file names in it are relative to it.
+        table: The places; file names in it are relative to it. Or the name of a list, such as paper35.
+        extracts: For a list: folder with maps of its places; the others are fetched.
+        only: Names of the places to build, separated by commas; all without.
         out: Parent folder of the worlds, or a URL like s3://BUCKET/worlds (the extra "s3").
         workers: Processes side by side; 0 is one a processor.
         ray: Hand the places to a Ray cluster instead (the extra "ray"): its address; without one, that which runs here.
@@ -114,7 +120,8 @@ def world_build_many(
     """
     from vico.cli import world as verb
 
-    return verb.build_table(table, out=out, workers=workers or os.cpu_count() or 1, ray=ray, force=force, json=json)
+    rows = verb.rows_of_table(table, extracts=extracts, only=only)
+    return verb.build_table(rows, out=out, workers=workers or os.cpu_count() or 1, ray=ray, force=force, json=json)
 
 
 @world.command(name="info")
@@ -307,27 +314,6 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
     return verb.demo(out, seed=seed, force=force)
 
 
-@assets.command(name="install")
-def assets_install(
-    what: Positional[Literal["people", "robots", "viewer", "things", "llm", "all"]] = "all",
-    pack: Path | None = None,
-    force: bool = False,
-) -> int:
-    """Fetch richer bodies, robots and furniture from the packages that ship them, and print their licences.
-
-    Example: vico assets install people
-
-    Args:
-        what: Which pack. "llm" is a small language model (98 MB), which "all" leaves out.
-        pack: For "things": a .deb of sweethome3d-furniture or a folder with its archives. Without it the one the
-            system has, else what apt-get downloads.
-        force: Fetch and prepare again.
-    """
-    from vico.cli import assets as verb
-
-    return verb.install(what, pack=pack, force=force)
-
-
 @language_model.command(name="serve")
 def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, port: int = 0) -> int:
     """Serve a language model on this machine, and print the variables that name it. Needs the extra "llm".
@@ -345,14 +331,6 @@ def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, 
     from vico.cli import llm as verb
 
     return verb.serve(model, context=context, threads=threads, port=port)
-
-
-@assets.command(name="status")
-def assets_status() -> int:
-    """Say which packs are installed, with their licences."""
-    from vico.cli import assets as verb
-
-    return verb.status()
 
 
 @app.command(name="doctor")
@@ -398,7 +376,7 @@ def warm_up() -> int:
 app.command(world, name="world", help="Make worlds and look into them.")
 app.command(community, name="community", help="People a world.")
 app.command(check, name="check", help="Check a world or a community.")
-app.command(assets, name="assets", help="Richer bodies and robots.")
+app.command(assets, name="assets", help="Richer bodies, robots and things; things out of words.")
 app.command(motion, name="motion", help="Motions of other programs, and of recorded people.")
 app.command(language_model, name="llm", help="A language model on this machine.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")

@@ -59,6 +59,8 @@ class WorldBuildOptions:
         Timetables: zipped GTFS feeds.
     layouts
         Folder of room layouts to choose from.
+    detections
+        Things that a detector found in posed street photos, or that somebody located: COCO's JSON, or GeoJSON.
     things
         Whose models street furniture and furniture wear: our own, or those of `vico assets install things`.
     overpass
@@ -114,6 +116,7 @@ class WorldBuildOptions:
     places: tuple[str, ...] = ()
     gtfs: tuple[Path, ...] = ()
     layouts: Path | None = None
+    detections: Path | None = None
     things: Literal["procedural", "installed"] = "procedural"
     overpass: str | None = None
     refresh: bool = False

@@ -13,8 +13,10 @@ from typing import Any
 
 from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_json, print_table, progress_bars
+from vico.errors import InputError, MissingFileError
 from vico.world.folder import World, read_world, stage_seconds
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
+from vico.worldgen.many import PlaceRow
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
 from vico.worldgen.request import BuildOptions
@@ -69,6 +71,7 @@ def build_as_asked(options: WorldBuildOptions) -> int:
         places=options.places,
         gtfs=options.gtfs,
         layouts=options.layouts,
+        detections=options.detections,
         installed_things=options.things == "installed",
     )
     how = Texturing(
@@ -125,14 +128,39 @@ def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None
     return info(path, json=json)
 
 
-def build_table(
-    table: Path, *, out: str, workers: int, ray: str | None = None, force: bool = False, json: bool = False
-) -> int:
-    """Build a table of places; 1 if any failed."""
-    from vico.io.stores import store_at
-    from vico.worldgen.many import build_many, read_place_table
+def rows_of_table(table: Path, *, extracts: Path | None, only: str) -> list[PlaceRow]:
+    """Return the places of a table, which is a file, or of a list that is known by name."""
+    from vico.worldgen.many import read_place_table
+    from vico.worldgen.place_lists import place_lists, rows_of
 
+    names = {name.strip() for name in only.split(",") if name.strip()}
+    lists = place_lists()
+    if not table.exists() and str(table) in lists:
+        return rows_of(lists[str(table)], extracts=extracts, only=names)
+    if not table.exists() and table.suffix == "":
+        raise MissingFileError(f"{table}: no such file, and no list of that name; there are {', '.join(lists)}")
+    if extracts is not None:
+        raise InputError("build-many: --extracts is for lists known by name; a table names its files itself")
     rows = read_place_table(table)
+    unknown = sorted(names - {row.name for row in rows})
+    if unknown:
+        raise InputError(f"build-many: {table} has no place {unknown[0]!r}")
+    return [row for row in rows if not names or row.name in names]
+
+
+def build_table(
+    rows: Sequence[PlaceRow],
+    *,
+    out: str,
+    workers: int,
+    ray: str | None = None,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Build places; 1 if any failed."""
+    from vico.io.stores import store_at
+    from vico.worldgen.many import build_many
+
     with progress_bars() as report:
         report("places", 0, len(rows))
         outcomes = build_many(

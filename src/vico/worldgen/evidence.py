@@ -10,6 +10,8 @@ from pathlib import Path
 from vico.errors import InputError
 from vico.geo.buildings.files import read_buildings
 from vico.geo.buildings.model import FoundBuildings
+from vico.geo.detections.model import Detections
+from vico.geo.detections.reader import read_detections
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.gtfs.feed import Feed
@@ -31,7 +33,7 @@ from vico.io.http import HttpClient
 from vico.world.model import Dropped, Source
 from vico.worldgen.facts.precedence import Precedence, read_precedence
 from vico.worldgen.product import digest_of
-from vico.worldgen.sources import Sources
+from vico.worldgen.sources import SERVICES, Sources
 from vico.worldgen.stages import Stages
 
 _TILE_MARGIN = 80.0  # metres: as far as the terrain goes beyond the window, and what hides its border
@@ -57,6 +59,8 @@ class Evidence:
         Places that other sources know.
     feeds
         Timetables.
+    detections
+        What photos show, if there is a file of it.
     credits
         Every source, with what its licence asks for.
     buildings
@@ -74,6 +78,7 @@ class Evidence:
     credits: list[Source]
     buildings: list[FoundBuildings] = field(default_factory=list)
     precedence: Precedence | None = None
+    detections: Detections | None = None
 
 
 def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> Evidence:
@@ -158,7 +163,11 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
     if sources.buildings:
         with stages.timed("found buildings"):
             buildings = _buildings(sources, frame, half, stages, credits)
-    return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence)
+    detections = None
+    if sources.detections is not None:
+        with stages.timed("detections file"):
+            detections = _detections(sources.detections, sources, frame, half, stages, credits)
+    return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
 
 
 def _precedence(sources: Sources) -> Precedence | None:
@@ -191,6 +200,24 @@ def _buildings(
     measured = sum(bool(building.facets) for found in made for building in found.buildings)
     stages.report("found buildings", {**counts, "with_measured_roofs": measured}, dropped)
     return made
+
+
+def _detections(
+    path: Path, sources: Sources, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]
+) -> Detections:
+    photos = None if sources.photos in (None, *SERVICES) else Path(str(sources.photos))
+    found = read_detections(path, frame, half, photos=photos)
+    stages.given(found, f"{found.sha256} {frame} {half}")
+    credits.append(
+        Source(
+            kind="detections",
+            name=path.name,
+            licence="as its provider states",
+            attribution=found.attribution or path.name,
+            sha256=found.sha256,
+        )
+    )
+    return found
 
 
 def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:

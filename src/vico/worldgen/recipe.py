@@ -16,7 +16,8 @@ from vico.geo.osm import OsmData
 from vico.geo.street_images.model import StreetImage
 from vico.geo.tiles3d.mesh import TileMesh
 from vico.io.files import sha256_of
-from vico.world.folder import World
+from vico.world.detected import FILE
+from vico.world.folder import World, write_records
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building, Dropped, Entrance, Place
@@ -37,6 +38,7 @@ from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain
 from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
+from vico.worldgen.objects.detections.matching import things_from_detections
 from vico.worldgen.objects.models import models_of
 from vico.worldgen.objects.parking import parking_from_osm
 from vico.worldgen.objects.stage import objects_from_osm
@@ -107,7 +109,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     outdoors, dropped = run(
         "objects",
         objects_from_osm,
-        site.osm,
+        _with_detections(site.osm, evidence, height, seed, folder, stages),
         solids=[*solids, *bridges.cuts],
         carriageway=streets.carriageway,
         openings=streets.footways(),
@@ -190,6 +192,18 @@ def _merged(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict[str, Any
     stages.report("sources", merged.counts, merged.dropped)
     data = stages.given(merged.osm, f"map of {stages.digest(merged)}")
     return replace(evidence, data=data), {"measured": merged.facets, "origins": merged.origins}
+
+
+def _with_detections(
+    osm: OsmData, evidence: Evidence, height: HeightField, seed: int, folder: Path, stages: Stages
+) -> OsmData:
+    """Return the map with what detections show beside it, and write what became of each; the map itself without."""
+    if evidence.detections is None:
+        return osm
+    things = stages.run("detections", things_from_detections, osm, evidence.detections, height, seed=seed)
+    write_records(folder / FILE, things.records)
+    stages.report("detections", things.counts(), things.dropped)
+    return stages.given(things.on(osm), f"{stages.digest(osm)} {stages.digest(things)}")
 
 
 def _site(data: OsmData, stages: Stages) -> SiteFacts:

@@ -36,6 +36,8 @@ class Sources:
         Timetables: zipped GTFS feeds.
     layouts
         A folder of room layouts to choose from.
+    detections
+        What a detector found in street photos, or somebody located: COCO's JSON, or GeoJSON.
     installed_things
         Show the models of `vico assets install things` instead of ours, where there are.
     """
@@ -50,6 +52,7 @@ class Sources:
     installed_things: bool = False
     buildings: tuple[str, ...] = ()
     precedence: Path | None = None
+    detections: Path | None = None
 
     def __post_init__(self) -> None:
         for what, value, reader in (
@@ -70,7 +73,7 @@ class Sources:
         for given in (self.tiles, self.photos, *self.places):
             if given is not None and "://" not in given and given not in SERVICES:
                 yield Path(given)
-        for path in (self.layouts, self.precedence):
+        for path in (self.layouts, self.precedence, self.detections):
             if path is not None:
                 yield path
 
@@ -108,6 +111,7 @@ class Sources:
                 installed_things=bool(content["installed_things"]),
                 buildings=tuple(content.get("buildings", ())),
                 precedence=None if content.get("precedence") is None else Path(content["precedence"]),
+                detections=None if content.get("detections") is None else Path(content["detections"]),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"the recorded sources of the world can't be read ({error}); build it anew") from None

@@ -10,6 +10,7 @@ from vico.worldgen.facades import catalogue as facades
 from vico.worldgen.facts import place_words
 from vico.worldgen.indoor import catalogue as rooms
 from vico.worldgen.objects import catalogue as objects
+from vico.worldgen.objects.detections.classes import detected_classes
 
 
 def read_tables() -> None:
@@ -35,6 +36,7 @@ def read_tables() -> None:
         objects.standing,
         objects.trees,
         objects.barriers,
+        detected_classes,
         rooms.room_kinds,
         rooms.uses,
     ):

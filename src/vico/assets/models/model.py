@@ -72,6 +72,23 @@ _SITTING_WIDTH = 0.48
 
 
 @dataclass(frozen=True)
+class ModelCredit:
+    """Whom a world that shows a model has to thank, and under which licence it may.
+
+    Attributes
+    ----------
+    licence, words
+        As its entry says.
+    sha256
+        Of the file that its mesh is in.
+    """
+
+    licence: str
+    words: str
+    sha256: str
+
+
+@dataclass(frozen=True)
 class Model:
     """A prototype: origin at the middle of its foot, z up, +x forward (the side people use it from), metres.
 
@@ -93,6 +110,8 @@ class Model:
         Where people sit or lie where that is not its `top`.
     build
         Makes its surfaces; called once, when they are first asked for.
+    credit
+        Whom to thank for it, where it is not ours.
     """
 
     name: str
@@ -103,6 +122,7 @@ class Model:
     foot: tuple[float, float] | None = None
     top: Top | None = None
     own_seat: Seat | None = None
+    credit: ModelCredit | None = None
 
     @property
     def seat(self) -> Seat | None:

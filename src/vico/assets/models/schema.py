@@ -239,11 +239,32 @@ class Assembly(DataRecord):
     parts: Parts
 
 
+class MeshEntry(DataRecord):
+    """A mesh in a file beside this one; `vico assets generate` writes both.
+
+    Attributes
+    ----------
+    file
+        GLB, a name without folders; the mesh is metres, z up, its origin the middle of its foot.
+    sha256
+        Of the file: another mesh is another world.
+    licence, credit
+        Of the mesh, and whom to thank; worlds that show it say so.
+    """
+
+    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,100}\.glb$")]
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    licence: Annotated[str, Field(min_length=1, max_length=200)]
+    credit: Annotated[str, Field(min_length=1, max_length=1000)]
+
+
 class ModelEntry(DataRecord):
     """A model, or a variant of one: `like` another, with other colours (and kind, foot and top, if given).
 
     Attributes
     ----------
+    mesh
+        Instead of parts: a mesh in a file.
     kind, group, solid, foot, top, seat
         See `Model`; the kind is the model's name if not given, group and solid are the file's.
     colours
@@ -259,11 +280,14 @@ class ModelEntry(DataRecord):
     seat: SeatEntry | None = None
     colours: dict[ColourName, ColourSpec] = Field(default_factory=dict)
     parts: Parts | None = None
+    mesh: MeshEntry | None = None
 
     @model_validator(mode="after")
     def _has_a_shape(self) -> ModelEntry:
-        if (self.like is None) == (self.parts is None):
-            raise ValueError("give either its parts or the model it is like")
+        if sum(given is not None for given in (self.like, self.parts, self.mesh)) != 1:
+            raise ValueError("give either its parts, its mesh, or the model it is like")
+        if self.mesh is not None and self.colours:
+            raise ValueError("a mesh brings its own colours")
         return self
 
 

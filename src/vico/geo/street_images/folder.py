@@ -184,16 +184,10 @@ class FolderImages:
         EmptyInputError
             If none of its photos was taken in the square.
         """
-        cameras: list[_Camera] = []
+        cameras: list[PhotoPose] = []
         # A folder may have several: the first that names pictures that are there.
         for path in self._found:
-            self._poses, self.refused = path, []
-            if path.name == "photos.json":
-                cameras = self._own(frame)
-            elif path.name == "images.json":
-                cameras = self._graph(frame)
-            else:
-                cameras = self._reconstructed(frame)
+            cameras = self._read(path, frame)
             if any((self._folder / camera.file).is_file() for camera in cameras):
                 break
         inside = [c for c in cameras if within(c.position, half)]
@@ -216,6 +210,22 @@ class FolderImages:
                 taken += 1
                 yield photo
 
+    def poses(self, frame: LocalFrame) -> list[PhotoPose]:
+        """Return where all photos of the folder's first pose file were taken; no picture is read or needed.
+
+        Raises
+        ------
+        SchemaError
+            If the pose file is damaged.
+        """
+        return self._read(self._found[0], frame)
+
+    def _read(self, path: Path, frame: LocalFrame) -> list[PhotoPose]:
+        self._poses, self.refused = path, []
+        if path.name == "photos.json":
+            return self._own(frame)
+        return self._graph(frame) if path.name == "images.json" else self._reconstructed(frame)
+
     def _bytes(self, name: str) -> bytes:
         """Return a file of the folder; names that lead out of it are refused."""
         path = (self._folder / name).resolve()
@@ -232,7 +242,7 @@ class FolderImages:
             raise SchemaError(f"{self._poses}: {self._poses.stat().st_size:,} bytes are too many for a pose file")
         return self._poses.read_bytes()
 
-    def _own(self, frame: LocalFrame) -> list[_Camera]:
+    def _own(self, frame: LocalFrame) -> list[PhotoPose]:
         try:
             record = Photos.model_validate_json(self._text())
         except ValidationError as error:
@@ -242,7 +252,7 @@ class FolderImages:
             x, y = frame.to_enu(photo.lat, photo.lon)
             z = photo.eye if photo.altitude is None else photo.altitude
             cameras.append(
-                _Camera(
+                PhotoPose(
                     id=photo.file,
                     file=photo.file,
                     position=np.array([x, y, z]),
@@ -258,7 +268,7 @@ class FolderImages:
             )
         return cameras
 
-    def _graph(self, frame: LocalFrame) -> list[_Camera]:
+    def _graph(self, frame: LocalFrame) -> list[PhotoPose]:
         images, broken, _ = images_in(self._text(), str(self._poses))
         self.refused += broken
         cameras = []
@@ -270,7 +280,7 @@ class FolderImages:
             taken = None if image.captured_at is None else image.captured_at / 1000
             bend = (0.0, 0.0) if image.whole else (*image.camera_parameters[1:3], 0.0, 0.0)[:2]
             cameras.append(
-                _Camera(
+                PhotoPose(
                     id=image.id,
                     file=image.url() or "",
                     position=np.array([*image.place(frame), EYE]),
@@ -286,7 +296,7 @@ class FolderImages:
             )
         return cameras
 
-    def _reconstructed(self, frame: LocalFrame) -> list[_Camera]:
+    def _reconstructed(self, frame: LocalFrame) -> list[PhotoPose]:
         try:
             document = json.loads(self._text())
             parts = [Reconstruction.model_validate(part) for part in document]
@@ -310,7 +320,7 @@ class FolderImages:
                 lat, lon = here.to_geodetic(centre[:2])
                 x, y = frame.to_enu(lat, lon)
                 cameras.append(
-                    _Camera(
+                    PhotoPose(
                         id=name,
                         file=name,
                         position=np.array([x, y, EYE]),
@@ -333,8 +343,24 @@ class FolderImages:
 
 
 @dataclass(frozen=True)
-class _Camera:
-    """A photo before its picture is read."""
+class PhotoPose:
+    """Where a photo was taken and how, before its picture is read.
+
+    Attributes
+    ----------
+    id, file
+        Of the photo.
+    position, rotation, captured, attribution, eye
+        See `StreetImage`.
+    focal
+        Over the longer side; None where `fov` says it.
+    fov
+        Vertical field of view, degrees.
+    bend
+        Distortion k1 and k2; see `undistorted`.
+    whole
+        An equirectangular panorama.
+    """
 
     id: str
     file: str

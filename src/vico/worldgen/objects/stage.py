@@ -18,21 +18,22 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.assets.models.model import Model
 from vico.assets.models.street import street_models
-from vico.geo.osm import OsmData, OsmNode
+from vico.geo.osm import OsmData
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FIRST_OBJECT, Dropped, Transit
 from vico.world.objects import FEET, Objects
 from vico.worldgen.facts.expendable import NamedShape, expendable, widened
-from vico.worldgen.objects.barriers import barrier_wishes, gate_yaws
+from vico.worldgen.objects.barriers import barrier_wishes
 from vico.worldgen.objects.catalogue import standing
 from vico.worldgen.objects.groups import group_wishes
-from vico.worldgen.objects.kinds import region, thing_of
+from vico.worldgen.objects.kinds import region
 from vico.worldgen.objects.lamps import lamp_wishes
+from vico.worldgen.objects.points import mapped_wishes
 from vico.worldgen.objects.site import Site
-from vico.worldgen.objects.trees import climate, planted_wishes, row_wishes, tree_wish
-from vico.worldgen.objects.wishes import Wish, direction
+from vico.worldgen.objects.trees import climate, planted_wishes
+from vico.worldgen.objects.wishes import Wish
 
 _LAMPS = ("street_lamp", "lamp")  # kinds
 _TWIN_GAP = 0.3  # metres between two that are one, mapped twice
@@ -82,7 +83,7 @@ def objects_from_osm(
     models = street_models()
     site = Site(solids=solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
     zone, where = climate(osm.frame, height), region(osm.frame)
-    mapped = [*_point_wishes(osm, seed, zone, where), *row_wishes(osm, seed, zone)]
+    mapped = mapped_wishes(osm, height, seed)
     lamps = np.array([wish.xy for wish in mapped if models[wish.prototype].kind in _LAMPS]).reshape(-1, 2)
     lots: list[tuple[list[Wish], bool]] = [
         (_transit_wishes(transit, carriageway), True),
@@ -277,39 +278,6 @@ def _fitting_scale(wish: Wish, model: Model, site: Site) -> float:
         return wish.scale
     room = shapely.distance(site.shapes[int(near[0])], shapely.Point(wish.xy)) + 0.7
     return float(np.clip(2 * room / max(model.size[0], model.size[1]), min(0.42, wish.scale), wish.scale))
-
-
-def _point_wishes(osm: OsmData, seed: int, zone: str, where: str) -> list[Wish]:
-    """Wish for what is mapped as points."""
-    found: list[Wish] = []
-    gates = gate_yaws(osm)
-    for node in osm.nodes:
-        with expendable(f"n{node.id}"):
-            wish = _point_wish(node, seed, zone, where, gates.get(node.id))
-            if wish is not None:
-                found.append(wish)
-    return found
-
-
-def _point_wish(node: OsmNode, seed: int, zone: str, where: str, gate: float | None) -> Wish | None:
-    """Wish for what a point maps; None for nothing. `gate` is the yaw of a gate there."""
-    key = f"n{node.id}"
-    if node.tags.get("natural") == "tree":
-        return tree_wish(key, node.tags, node.xy, seed, zone)
-    if node.tags.get("shelter") == "yes" and (
-        node.tags.get("highway") == "bus_stop" or node.tags.get("public_transport") == "platform"
-    ):
-        return Wish(f"{key}.shelter", "shelter", node.xy, reach=4.5)
-    random = rng(seed, "thing", key)
-    name = thing_of(node.tags, where=where, random=random)
-    if name is None:
-        return None
-    wish = Wish(key, name, node.xy, direction(node.tags))
-    if name.startswith(standing().of_any_size):
-        wish.scale = float(random.uniform(0.8, 1.25))
-    if gate is not None and wish.yaw is None:
-        wish.yaw, wish.reach = gate, 0.0 if name == "gate" else 3.0
-    return wish
 
 
 def _transit_wishes(transit: Transit | None, carriageway: BaseGeometry) -> list[Wish]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError, MissingExtraError, SchemaError
+from vico.io.diffusion import load_pipeline
 from vico.worldgen.photos.enhance.exemplar import pull_push
 
 FACADE_PROMPT = "photograph of a building facade seen straight from the front, windows in rows, sharp, evenly lit"
@@ -194,7 +195,9 @@ class DiffusionInpainter:
         if self.side < _STEP or self.side % _STEP:
             raise InputError(f"in-painting: a side of {self.side} pixels; it must be a multiple of {_STEP}")
         object.__setattr__(
-            self, "_pipeline", _diffusion("AutoPipelineForInpainting", self.model, self.device, self.without)
+            self,
+            "_pipeline",
+            load_pipeline("AutoPipelineForInpainting", self.model, device=self.device, without=self.without),
         )
 
     def __call__(
@@ -276,7 +279,9 @@ class DiffusionUpscaler:
             raise InputError(f"super-resolution: a factor of {self.factor}; the diffusion upscaler enlarges by 2 or 4")
         if self.side < _STEP or self.side % _STEP:
             raise InputError(f"super-resolution: a side of {self.side} pixels; it must be a multiple of {_STEP}")
-        object.__setattr__(self, "_pipeline", _diffusion("StableDiffusionUpscalePipeline", self.model, self.device))
+        object.__setattr__(
+            self, "_pipeline", load_pipeline("StableDiffusionUpscalePipeline", self.model, device=self.device)
+        )
 
     def __call__(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Enlarge one picture."""
@@ -299,32 +304,6 @@ class DiffusionUpscaler:
         ).images[0]
         large = np.asarray(made.convert("RGB").resize((wide * 4, tall * 4)), np.uint8)
         return large[: height * 4, : width * 4]
-
-
-def _diffusion(pipeline: str, model: str | Path, device: str, without: tuple[str, ...] = ()) -> Any:
-    """Load a pipeline of `diffusers`: safetensors only, so that no weights can run code."""
-    try:
-        import diffusers
-        import torch
-    except ImportError:
-        raise MissingExtraError(
-            "diffusion: torch or diffusers are not installed; type: pip install 'virtual-community[diffusion]'"
-        ) from None
-    local = Path(model).is_dir()
-    try:
-        loaded = getattr(diffusers, pipeline).from_pretrained(
-            str(model), use_safetensors=True, local_files_only=local, **dict.fromkeys(without)
-        )
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise SchemaError(
-            f"diffusion: {model}: can't be loaded as {pipeline} ({reason}); give a folder or a model's name"
-        ) from None
-    loaded = loaded.to(device, torch.float32 if device == "cpu" else torch.float16)
-    loaded.set_progress_bar_config(disable=True)
-    if getattr(loaded, "safety_checker", None) is not None:
-        loaded.safety_checker = None  # it blacks out whole pictures; these are of walls
-    return loaded
 
 
 def _starts(length: int, window: int) -> Iterator[int]:

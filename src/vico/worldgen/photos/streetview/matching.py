@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import MissingExtraError, MissingFileError
+from vico.errors import MissingExtraError, MissingFileError, SchemaError, sentence_of
 
 _ROWS = 256  # keypoints compared at a time
 _CELL = 96.0  # pixels: those of one such square are compared together
@@ -228,7 +228,7 @@ class LoftrMatcher:
     Attributes
     ----------
     weights
-        A checkpoint the user has (kornia's ``loftr_outdoor.ckpt``), read as plain tensors only.
+        A checkpoint the user has (kornia's ``loftr_outdoor.ckpt``, Apache-2.0), as safetensors or as plain tensors.
     confidence
         Pairs less sure than this are left out.
     device
@@ -238,23 +238,21 @@ class LoftrMatcher:
     weights: Path
     confidence: float = 0.4
     device: str = "cpu"
+    _loaded: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def match(self, render: NDArray[np.uint8], photo: NDArray[np.uint8], reach: NDArray[np.float32]) -> Matches:
         """See `Matcher`.
 
         Raises
         ------
-        MissingExtraError, MissingFileError
-            If kornia and torch are not installed, or the weights are not there.
+        MissingExtraError, MissingFileError, SchemaError
+            If kornia and torch are not installed, or the weights are not there or no LoFTR's.
         """
         cv2 = opencv()
         torch, kornia = _kornia("LoFTR")
-        if not self.weights.is_file():
-            raise MissingFileError(f"{self.weights}: no such LoFTR checkpoint; leave it out to match with SIFT")
-        model = kornia.feature.LoFTR(pretrained=None)
-        state = torch.load(self.weights, map_location="cpu", weights_only=True)
-        model.load_state_dict(state.get("state_dict", state))
-        model = model.to(self.device).eval()
+        if not self._loaded:
+            self._loaded.append(self._model(torch, kornia))
+        model = self._loaded[0]
         height, width = (side // 8 * 8 for side in render.shape[:2])  # its features are eighths
         pair = []
         for picture in (render, photo):
@@ -266,6 +264,26 @@ class LoftrMatcher:
         points = [found[f"keypoints{k}"].cpu().numpy().astype(np.float64) + 0.5 for k in range(2)]
         sure = score >= self.confidence
         return Matches(points[0], points[1], score).taken(sure).within(reach)
+
+    def _model(self, torch: Any, kornia: Any) -> Any:
+        if not self.weights.is_file():
+            raise MissingFileError(f"{self.weights}: no such LoFTR checkpoint; leave it out to match with SIFT")
+        model = kornia.feature.LoFTR(pretrained=None)
+        try:
+            if self.weights.suffix == ".safetensors":
+                state = importlib.import_module("safetensors.torch").load_file(self.weights)
+            else:
+                state = torch.load(self.weights, map_location="cpu", weights_only=True)
+            model.load_state_dict(state.get("state_dict", state))
+        except ImportError:
+            raise MissingExtraError(
+                f"{self.weights}: safetensors is not installed; type: pip install 'virtual-community[matching]'"
+            ) from None
+        except Exception as error:  # of pickles, archives and tensors that are something else
+            raise SchemaError(
+                f"{self.weights}: no weights of LoFTR ({sentence_of(error)}); give kornia's loftr_outdoor.ckpt"
+            ) from None
+        return model.to(self.device).eval()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Things that photos show: where they stand, and which of them the map knows already."""
