@@ -12,7 +12,7 @@ export class Instances {
    * @param {{near: number, far: number}} [reach] metres
    * @param {any[]} [materials] by texture array
    */
-  constructor(parent, city, reach = { near: 45, far: 420 }, materials = city.materials) {
+  constructor(parent, city, reach = { near: 45, far: 420 }, materials = city.instancedMaterials) {
     this.parent = parent;
     this.materials = materials;
     this._hidden = false;

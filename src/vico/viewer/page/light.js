@@ -19,6 +19,10 @@ import { THREE } from "./three.js";
  * @property {Uniform} zenith
  * @property {Uniform} horizon
  * @property {Uniform} clouds
+ * @property {Uniform} shade heights to which buildings' shadows reach, seen from above
+ * @property {Uniform} shadeFrame how a place is found in it: scale, shift east and north, its lowest height
+ * @property {Set<any>} receivers materials that shadows fall on
+ * @property {boolean} shaded whether they do
  */
 
 /** @returns {Light} */
@@ -38,6 +42,10 @@ export function makeLight() {
     zenith: colour([0.3, 0.5, 0.78]),
     horizon: colour([0.74, 0.81, 0.88]),
     clouds: { value: 0.3 },
+    shade: { value: null },
+    shadeFrame: { value: new THREE.Vector4() },
+    receivers: new Set(),
+    shaded: false,
   };
 }
 
