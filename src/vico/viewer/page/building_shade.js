@@ -8,7 +8,7 @@ const STEP = Math.PI / 180;
 /** Lower suns cast shadows as long as this one. */
 const LOWEST_SLOPE = 0.06;
 /** Suns that give less light than this cast none. */
-const FAINTEST = 0.06;
+const FAINTEST = 0.12;
 /** Heights are told from so far below the ground, metres: what nothing shades is above 0. */
 const BELOW = 3;
 /** What lies below crowns of trees is in the shade up to so high, metres. */

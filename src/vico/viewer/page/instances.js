@@ -45,6 +45,7 @@ export class Instances {
   _mesh(part, count) {
     const mesh = new THREE.InstancedMesh(part.geometry, this.materials[part.array], count);
     mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = false;
     mesh.count = 0;
     this.parent.add(mesh);
     return mesh;

@@ -16,8 +16,6 @@ void shine(vec3 n, vec3 at) {
   vLight = mix(ground, sky, n.z * 0.5 + 0.5);
   vec3 direct = sunColour * max(dot(n, sun), 0.0);
   #ifdef SHADED
-  // What lies in the shade is lit by the sky and by the houses across the street.
-  vLight *= 1.15;
   vDirect = direct;
   vAt = at;
   #else
@@ -31,6 +29,8 @@ export const SHADE = /* glsl */ `
 uniform sampler2D shade;
 uniform vec4 shadeFrame;
 float sunReaches(vec3 at) {
+  // Rooms lie below the lowest ground: no house shades them.
+  if (at.z < shadeFrame.w) return 1.0;
   float height = texture2D(shade, (at.xy + shadeFrame.yz) * shadeFrame.x + 0.5).r + shadeFrame.w;
   return 1.0 - clamp((height - at.z - 0.25) * 1.4, 0.0, 1.0);
 }

@@ -65,6 +65,8 @@ export class People {
     this.drawn = 0;
     this.hands.clear();
     this.inHands.begin();
+    // Of everybody's bones those are handed on that are drawn now.
+    this.texture.clearUpdateRanges();
     /** @type {[number, number, number][]} */
     const wanted = [];
     const entities = before.people.entity;
@@ -97,6 +99,7 @@ export class People {
     const held = this._held(person, between, row);
     holdUp(person.file, this.pose, held);
     writeBones(person.file, this.pose, this.bones, 4 * WIDTH * person.row);
+    this.texture.addUpdateRange(4 * WIDTH * person.row, 4 * WIDTH);
     const { group } = person;
     group.visible = true;
     group.children[0].material.uniforms.lamp.value = this.city.inside < 0 ? 0.75 * lampLight(this.city, body) : 0;

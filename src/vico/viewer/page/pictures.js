@@ -24,7 +24,7 @@ export function pictureArray(size, layers, data, fine = true) {
 }
 
 /** Windows of far walls: so many across and up in the picture, metres of each, pixels of each. */
-const [CELLS, CELL_WIDE, CELL_HIGH, CELL_PIXELS] = [8, 2.7, 3.5, 16];
+const [CELLS, CELL_WIDE, CELL_HIGH, CELL_PIXELS] = [8, 2.7, 3.5, 32];
 /** Metres across and up of the picture of windows, as shaders want it. */
 export const PANES = `vec2(${(CELLS * CELL_WIDE).toFixed(1)}, ${(CELLS * CELL_HIGH).toFixed(1)})`;
 

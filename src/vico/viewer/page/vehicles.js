@@ -30,6 +30,7 @@ class Batch {
   _mesh(size) {
     const mesh = new THREE.InstancedMesh(this.part.geometry, this.city.instancedMaterials[this.part.array], size);
     mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = false;
     this.scene.add(mesh);
     return mesh;
   }
