@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import toy_city
+from vico.sim.animation import Hold
 from vico.sim.avatars import CLIP
 from vico.sim.config import SimConfig
 from vico.sim.moves import place_in_room
 from vico.sim.overlaps import overlaps_of
+from vico.sim.recorder import Recorder
+from vico.sim.recording import read_run
 from vico.sim.simulation import Simulation
 
 _ENTER = {"type": "enter", "place": toy_city.CAFE}
@@ -143,3 +148,26 @@ def test_who_waits_long_for_others_in_a_door_is_told_so(sim: Simulation, monkeyp
     ]
     assert "enter: somebody is in the door" in reasons
     assert sim.state.people.room[0] < 0
+
+
+def test_a_recording_tells_how_far_doors_are_open_and_what_is_held_up(sim: Simulation, tmp_path: Path) -> None:
+    people = sim.state.people
+    with Recorder(tmp_path / "run", sim, sources={}, wanted=4) as recorder:
+        people.hold[1], people.hold_share[1] = int(Hold.PLACARD_RIGHT), 0.5
+        recorder.begin({})
+        expected = []
+        for _ in range(4):
+            actions = {"assistant_0": _ENTER}
+            recorder.write(sim.step(actions), actions)
+            leaves = sim.state.leaves
+            expected.append(dict(zip(leaves.entrance.tolist(), leaves.share.tolist(), strict=True)))
+    run = read_run(tmp_path / "run")
+    doors, first = run.columns("doors"), run.columns("people", 0, 0)
+    for step, open_then in enumerate(expected, 1):
+        now = doors["step"] == step
+        assert dict(zip(doors["entrance"][now].tolist(), doors["share"][now].tolist(), strict=True)) == pytest.approx(
+            open_then, abs=0.006
+        )
+    assert any(expected)
+    row = first["entity"].tolist().index(int(people.entity[1]))
+    assert (int(first["hold"][row]), float(first["hold_share"][row])) == (int(Hold.PLACARD_RIGHT), 0.5)

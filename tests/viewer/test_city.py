@@ -17,7 +17,7 @@ from vico.viewer.city.export import MANIFEST
 from vico.viewer.city.pack import Blob, packed
 from vico.viewer.city.robots import write_robots
 from vico.viewer.city.textures import PLAIN, SHAPES, TextureLayers
-from vico.viewer.city.tiles import Grid, far_tiles
+from vico.viewer.city.tiles import PICTURE, Grid, far_tiles, ground_picture
 from vico.world.folder import World
 from vico.world.mesh import Material, Surface
 
@@ -111,3 +111,29 @@ def test_the_page_is_sound_to_a_type_checker() -> None:
     done = subprocess.run([checker, "-p", str(_PAGE / "tsconfig.json")], capture_output=True, text=True, check=False)
     assert done.stdout == ""
     assert json.loads((_PAGE / "tsconfig.json").read_text())["compilerOptions"]["strict"] is True
+
+
+def test_the_ground_from_above_shows_streets_over_the_bed_below_them(helsinki: World) -> None:
+    textures = TextureLayers()
+    picture = np.asarray(ground_picture(helsinki, textures), np.float64)
+    asphalt = next(s for s in helsinki.surfaces("ground") if s.material.name == "ground_asphalt")
+    middle = asphalt.positions[asphalt.triangles].mean(axis=1)
+    corners = asphalt.positions[asphalt.triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    inside = (np.abs(middle[:, :2]).max(axis=1) < helsinki.half - 1) & (area > 4.0)
+    column, row = ((middle[inside, :2] * [1, -1] + helsinki.half) * PICTURE / (2 * helsinki.half)).astype(int).T
+    wanted = textures.layer_of(asphalt.material).colour
+    away = np.abs(picture[row, column] - wanted).max(axis=1)
+    assert (away < 30).mean() > 0.8
+
+
+def test_every_door_of_a_facade_can_be_drawn_open(helsinki: World, city: Path) -> None:
+    manifest = read_json(city / MANIFEST)
+    doors = manifest["doors"]
+    assert len(doors) > 0.5 * len(helsinki.entrances)
+    for door in doors:
+        assert np.hypot(*door["inward"]) == pytest.approx(1.0, abs=1e-3)
+        away = np.subtract(door["at"][:2], helsinki.entrances[door["entrance"]].position[:2])
+        assert np.hypot(*away) < 3.5
+        assert all(manifest["models"][name]["near"] for name in (*door["leaves"], door["hall"]))
+    assert all(name in manifest["models"] for name in (*manifest["umbrellas"], *manifest["placards"]))

@@ -199,6 +199,11 @@ def leaf_names(door: NDArray[np.void]) -> list[str]:
     return [f"door {_NAMES[int(door['kind'])]} {colour} {size} {side}" for side in sides]
 
 
+def is_gate(door: NDArray[np.void]) -> bool:
+    """Whether a door is a gate, which goes up and does not swing."""
+    return int(door["kind"]) == _GATE
+
+
 def leaf_surfaces(door: NDArray[np.void], material: Material) -> list[list[Surface]]:
     """Return the shapes of a door's leaves, in the order of `leaf_names`.
 
@@ -252,7 +257,7 @@ def leaf_poses(door: NDArray[np.void], share: float) -> NDArray[np.float64]:
     for side in (-1.0, 1.0)[: len(leaf_names(door))]:
         local = np.eye(4)
         local[0, 3] = side * half
-        if int(door["kind"]) == _GATE:
+        if is_gate(door):
             local[1:3, 3] = BEHIND * min(8.0 * share, 1.0), share * float(door["height"])
         else:
             # Doors start and stop softly.

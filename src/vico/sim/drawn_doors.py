@@ -97,14 +97,17 @@ class DrawnDoors:
         return OpenDoors(shapes, np.array(openings, OPENING))
 
     def _size(self, number: int) -> int:
-        """Return how large a hall fits behind a door: a row of `HALLS`."""
         if number not in self._sizes:
-            door, entrance = self._doors[number], self._world.entrances[number]
-            building = next(one for one in self._world.buildings if one.id == entrance.building)
-            house = shapely.Polygon(building.footprint[0], building.footprint[1:]).buffer(-_CORNER)
-            fitting = (k for k in range(len(HALLS)) if house.contains(_floor(door, k)))
-            self._sizes[number] = next(fitting, len(HALLS) - 1)
+            building = next(b for b in self._world.buildings if b.id == self._world.entrances[number].building)
+            self._sizes[number] = hall_size(self._doors[number], building.footprint)
         return self._sizes[number]
+
+
+def hall_size(door: NDArray[np.void], footprint: Sequence[Sequence[tuple[float, float]]]) -> int:
+    """Return how large a hall fits behind a door of a house with some outline and courtyards: a row of `HALLS`."""
+    house = shapely.Polygon(footprint[0], footprint[1:]).buffer(-_CORNER)
+    fitting = (k for k in range(len(HALLS)) if house.contains(_floor(door, k)))
+    return next(fitting, len(HALLS) - 1)
 
 
 def _floor(door: NDArray[np.void], size: int) -> shapely.Polygon:

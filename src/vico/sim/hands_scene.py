@@ -89,7 +89,9 @@ def hands_of_agents(state: SimulationState) -> Hands:
     return Hands(p.gesture_hand.astype(np.int64), p.hold.astype(np.int64), p.hold_share.copy(), width)
 
 
-def hands_of_pedestrians(habit: NDArray[np.float64], rain: float, placard: NDArray[np.float64]) -> Hands:
+def hands_of_pedestrians(
+    habit: NDArray[np.float64], rain: float, placard: NDArray[np.float64], afoot: NDArray[np.bool_]
+) -> Hands:
     """Return what pedestrians do with their hands.
 
     Parameters
@@ -100,10 +102,12 @@ def hands_of_pedestrians(habit: NDArray[np.float64], rain: float, placard: NDArr
         mm/h.
     placard
         How far each has a placard up, 0..1, shape ``(n,)``; who has one leaves the umbrella closed.
+    afoot
+        Who is on foot, shape ``(n,)``; all others hold nothing.
     """
     share = np.clip((rain - bearable_rain(habit)) / _RAIN_MORE, 0.0, 1.0) * carries_umbrella(habit)
     hold = np.where(placard > 0.0, int(Hold.PLACARD_RIGHT), int(Hold.UMBRELLA_RIGHT))
-    share = np.where(placard > 0.0, placard, share)
+    share = np.where(placard > 0.0, placard, share) * afoot
     # The hand that holds nothing makes gestures.
     return Hands((share <= 0.0).astype(np.int64), hold, share, np.zeros(len(habit)))
 

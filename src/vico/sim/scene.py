@@ -328,8 +328,7 @@ class SceneRenderer:
         over_ground = pace if gait.treads is None else np.where(gait.treads.depth > 0.0, STAIRS_SPEED, pace)
         after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=over_ground)
         placard = state.traffic.gatherings.placards(walkers.position)
-        hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain, placard)
-        hands.share[~on_ground] = 0.0
+        hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain, placard, on_ground)
         return _Motion(
             clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands
         )

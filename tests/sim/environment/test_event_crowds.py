@@ -97,7 +97,7 @@ def test_one_of_three_who_march_brings_a_placard() -> None:
     near, far = (np.tile(one.entry, (30, 1)) + np.array([away, 0.0]) for away in (10.0, 40.0))
     assert np.flatnonzero(traffic.gatherings.placards(near)).tolist() == [0, 3, 6]
     assert traffic.gatherings.placards(far).tolist() == [1.0] + [0.0] * 29
-    hands = hands_of_pedestrians(np.zeros(30), 20.0, traffic.gatherings.placards(near))
+    hands = hands_of_pedestrians(np.zeros(30), 20.0, traffic.gatherings.placards(near), np.ones(30, bool))
     assert (hands.hold[[0, 3, 6]] == Hold.PLACARD_RIGHT).all()
     assert hands.hold[1] == Hold.UMBRELLA_RIGHT
 

@@ -10,7 +10,7 @@ import pytest
 from vico.assets.motions.rotations import matrices_of
 from vico.assets.people import body_of
 from vico.seeds import rng
-from vico.sim.animation import LONGEST_BLEND, STYLE, Transition, clip_index, joint_places, pose, style_of
+from vico.sim.animation import LONGEST_BLEND, STYLE, Transition, clip_index, free_hands, joint_places, pose, style_of
 from vico.sim.recording import PosedPeople, read_run
 from vico.sim.recording.joint_poses import looks_and_manners
 from vico.viewer.browser import BrowserPage
@@ -123,3 +123,37 @@ def test_restlessness_is_the_same(page: BrowserPage, second: float) -> None:
 
     script = f'import("/page/motion.js").then((m) => m.restlessness({second}, 0.3, 0.62))'
     assert page.evaluate(script) == pytest.approx(restlessness(second, 0.3, 0.62), abs=1e-6)
+
+
+_HOLDS = """(async () => {
+  const { poseOf } = await import("/page/motion.js");
+  const { holdUp } = await import("/page/holds.js");
+  const { PersonFile, Pose, forwardKinematics } = await import("/page/skeleton.js");
+  const file = new PersonFile(await (await fetch("/api/person/ENTITY.bin")).arrayBuffer());
+  return CASES.map(([hold, share, width]) => {
+    const pose = new Pose();
+    poseOf(file, { clip: CLIP, phase: 0.3, pace: 1.2, clipBefore: CLIP, phaseBefore: 0, paceBefore: 1.2,
+      since: 10 }, 50, pose);
+    holdUp(file, pose, { hold, share, width });
+    return [...forwardKinematics(file, pose).placed];
+  });
+})()"""
+
+
+def test_arms_hold_umbrellas_placards_and_boxes_alike(page: BrowserPage, page_run: Path) -> None:
+    run = read_run(page_run)
+    cases = [(hold, share, 0.4) for hold in (1, 2, 3, 4) for share in (0.3, 1.0)]
+    entity = next(agent["entity"] for agent in run.agents if agent["kind"] == "resident")
+    walk, script = clip_index("walk"), _HOLDS.replace("ENTITY", str(entity))
+    told = page.evaluate(script.replace("CLIP", str(walk)).replace("CASES", repr([list(c) for c in cases])))
+    looks, manners = looks_and_manners(run.manifest["seed"], run.agents, run.cast)
+    stream = rng(run.manifest["seed"], "manner", manners[entity])
+    n = len(cases)
+    style = np.repeat(np.array([style_of(body_of(looks[entity]), stream, age=looks[entity].age)], STYLE), n)
+    hold, share, width = (np.array(column) for column in zip(*cases, strict=True))
+    hands = free_hands(n)._replace(hold=hold, share=share, width=width)
+    same = np.full(n, walk), np.full(n, 0.3), np.full(n, 1.2)
+    after = Transition(np.full(n, walk), np.zeros(n), np.full(n, 1.2), np.full(n, 10.0))
+    rotations, offsets = pose(*same, style, second=50.0, after=after, hands=hands)
+    away = np.linalg.norm(np.reshape(told, (-1, 55, 3)) - joint_places(style["joints"], rotations, offsets), axis=2)
+    assert away.max() < _FARTHEST, cases[int(away.max(axis=1).argmax())]

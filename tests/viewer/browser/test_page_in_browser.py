@@ -172,3 +172,54 @@ def test_no_file_of_the_page_names_another_host() -> None:
         if path.suffix in (".js", ".css", ".html") and word in path.read_text()
     ]
     assert found == []
+
+
+def test_two_fingers_bring_the_picture_nearer(page: BrowserPage) -> None:
+    page.evaluate("vico.cameras.setMode('orbit'), vico.cameras.distance = 80, window.yaw = vico.cameras.yaw")
+    page.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+
+    def touch(kind: str, *at: tuple[float, float]) -> None:
+        fingers = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(at)]
+        page.call("Input.dispatchTouchEvent", type=kind, touchPoints=fingers)
+
+    touch("touchStart", (300, 300))
+    touch("touchMove", (340, 300))
+    assert page.evaluate("vico.cameras.yaw - yaw") == pytest.approx(-0.24, abs=0.1)
+    touch("touchEnd")
+    touch("touchStart", (300, 300), (360, 300))
+    touch("touchMove", (270, 300), (390, 300))
+    touch("touchEnd")
+    page.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    assert page.evaluate("vico.cameras.distance") == pytest.approx(40, rel=0.1)
+
+
+def test_walls_cast_shadows_where_the_sun_does_not_come(page: BrowserPage) -> None:
+    found = page.evaluate("""(() => {
+      const { view } = vico;
+      view.setCare(4);
+      view.draw(vico.state, 0.03, null, 1000, true);
+      const { shade, light } = view, { side, half } = shade;
+      if (!shade.can) return null;
+      const heights = new Uint16Array(side * side);
+      view.renderer.readRenderTargetPixels(shade.target, 0, 0, side, side, heights);
+      const pixel = (v) => Math.floor((v / half + 1) / 2 * side);
+      const at = (x, y) => heights[pixel(y) * side + pixel(x)];
+      // Just outside of each building, away from the sun and towards it.
+      const { x, y } = light.sun.value, [sx, sy] = [x, y].map((v) => v / Math.hypot(x, y));
+      let behind = 0, before = 0, count = 0;
+      for (const { ring } of view.city.manifest.buildings) {
+        const far = (a, b) => (a[0] * sx + a[1] * sy < b[0] * sx + b[1] * sy ? a : b);
+        const near = (a, b) => (far(a, b) === a ? b : a);
+        const [f, n] = [ring.reduce(far), ring.reduce(near)];
+        behind += at(f[0] - 3 * sx, f[1] - 3 * sy) > 0;
+        before += at(n[0] + 3 * sx, n[1] + 3 * sy) > 0;
+        count++;
+      }
+      view.setCare(1);
+      return { up: light.sun.value.z, behind: behind / count, before: before / count };
+    })()""")
+    if found is None:
+        pytest.skip("this browser paints no halves of floats: there are no shadows")
+    assert found["up"] > 0.1
+    assert found["behind"] > 0.6
+    assert found["before"] < found["behind"] - 0.1

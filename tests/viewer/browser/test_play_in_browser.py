@@ -61,6 +61,64 @@ def test_keys_are_let_go_when_the_window_loses_the_focus(played: tuple[BrowserPa
     _hold(page, "ArrowLeft", "ArrowLeft", down=False)
 
 
+def _touch(page: BrowserPage, kind: str, *points: tuple[float, float]) -> None:
+    fingers = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+    page.call("Input.dispatchTouchEvent", type=kind, touchPoints=fingers)
+
+
+def test_a_finger_on_the_left_walks_and_one_on_the_right_looks(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    page.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+    # Touches are answered between two pictures: without a graphics card there are none meanwhile.
+    page.evaluate("vico.page.frozen = true")
+    page.evaluate(f"window.start = {_PLACE}.slice(), window.yaw = vico.play.input.yaw")
+    _touch(page, "touchStart", (120, 300))
+    _touch(page, "touchMove", (120, 250))
+    assert page.evaluate("vico.play.input._stick.y") == pytest.approx(50 / 60, abs=0.02)
+    _touch(page, "touchStart", (120, 250), (450, 200))
+    _touch(page, "touchMove", (120, 250), (350, 200))
+    assert page.evaluate("vico.play.input.yaw - yaw") == pytest.approx(0.32, abs=0.05)
+    page.wait_for(f"Math.hypot({_PLACE}[0] - start[0], {_PLACE}[1] - start[1]) > 0.3", seconds=60)
+    _touch(page, "touchMove", (120, 190), (350, 200))
+    assert page.evaluate("vico.play.input.message().down") == ["run"]
+    _touch(page, "touchEnd")
+    page.wait_for("vico.play.you.speed === 0 && !vico.play.input.message().down.length", seconds=60)
+    page.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    page.evaluate("vico.page.frozen = false, requestAnimationFrame((now) => vico.page._tick(now))")
+    assert page.faults == []
+
+
+_PAD = """(() => {
+  const button = (pressed) => ({ pressed, value: Number(pressed) });
+  const buttons = Array.from({ length: 17 }, (_, k) => button(PRESSED.includes(k)));
+  navigator.getGamepads = () => [null, { axes: AXES, buttons, mapping: "standard" }];
+})()"""
+
+
+def _pad(page: BrowserPage, axes: list[float], *pressed: int) -> None:
+    page.evaluate(_PAD.replace("PRESSED", repr(list(pressed))).replace("AXES", repr(axes)))
+
+
+def test_a_gamepad_walks_looks_runs_and_does_what_is_at_hand(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    page.evaluate(f"window.start = {_PLACE}.slice()")
+    _pad(page, [0.0, -1.0, 0.0, 0.0], 1)
+    page.wait_for(f"Math.hypot({_PLACE}[0] - start[0], {_PLACE}[1] - start[1]) > 0.4", seconds=60)
+    assert page.evaluate("vico.play.input.message()")["down"] == ["run"]
+    _pad(page, [0.0, 0.0, 1.0, 0.0])
+    page.evaluate("window.yaw = vico.play.input.yaw")
+    page.wait_for("vico.play.input.yaw < yaw - 0.2", seconds=30)
+    page.evaluate("window.asked = [], vico.play.input.onButton = (key) => asked.push(key)")
+    _pad(page, [0.0, 0.05, 0.0, 0.0], 0, 3)
+    page.wait_for("asked.length === 2")
+    page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+    assert page.evaluate("asked") == ["first", ">"]
+    assert page.evaluate("vico.play.input.axes") == {}
+    page.evaluate("vico.play.input.onButton = (key) => vico.play._button(key), delete navigator.getGamepads")
+    page.wait_for("vico.play.you.speed === 0", seconds=60)
+    assert page.faults == []
+
+
 def test_what_is_refused_is_said(played: tuple[BrowserPage, Path]) -> None:
     page, _ = played
     page.press("m", "KeyM")

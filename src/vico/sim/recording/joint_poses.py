@@ -14,7 +14,7 @@ from vico.assets.motions.rotations import matrices_of, vectors_of
 from vico.assets.people import Appearance, body_of
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.animation import STYLE, Transition, pose, style_of
+from vico.sim.animation import STYLE, Hands, Hold, Transition, free_hands, pose, style_of
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian
 from vico.sim.recording.cast import CastMember
 from vico.sim.recording.run import Run
@@ -78,8 +78,21 @@ class PosedPeople:
         style = np.array([self._style(entity) for entity in wanted], STYLE)
         mine = {name: values[rows] for name, values in people.items()}
         after = Transition(*(mine[name] for name in ("clip_before", "phase_before", "pace_before", "clip_time")))
-        rotations, offsets = pose(mine["clip"], mine["phase"], mine["pace"], style, second=second, after=after)
+        hands = self._hands(step, mine)
+        moves = mine["clip"], mine["phase"], mine["pace"], style
+        rotations, offsets = pose(*moves, second=second, after=after, hands=hands)
         return JointPoses(np.array(wanted, np.int32), rotations, offsets, style["joints"])
+
+    def _hands(self, step: int, people: Mapping[str, NDArray[Any]]) -> Hands:
+        """Return what some people, rows of the table, hold up or before them."""
+        width = np.zeros(len(people["entity"]))
+        if (people["hold"] == int(Hold.BEFORE_CHEST)).any():
+            agents, cast = self._run.columns("agents", step, step), self._run.cast
+            for entity, *held in zip(*(agents[key] for key in ("entity", "held_left", "held_right")), strict=True):
+                sizes = [cast[int(thing)].size[1] for thing in held if int(thing) in cast]
+                width[people["entity"] == entity] = max(sizes, default=0.0)
+        hold, share = people["hold"].astype(np.int64), people["hold_share"].astype(np.float64)
+        return free_hands(len(hold))._replace(hold=hold, share=share, width=width)
 
     def _style(self, entity: int) -> Any:
         if entity not in self._styles:

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.environment.weather import NAMES as WEATHER
 from vico.sim.events import Event
-from vico.sim.passers_by import looks_of_strangers, pedestrian_motion
+from vico.sim.hands_scene import hands_of_pedestrians
+from vico.sim.holding import habit_of
+from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
 from vico.sim.recording.action_text import action_text
 from vico.sim.recording.schema import TABLES, stored, table_of
 from vico.sim.state import MovableObjects
@@ -49,6 +51,8 @@ class StepSamples:
         pedestrians = len(state.traffic.walkers) if state.traffic is not None else 0
         looks = looks_of_strangers(sim.config.seed, strangers + pedestrians)[strangers:]
         self._stature = np.array([look.height for look in looks], np.float64)
+        manners = [manner_of_pedestrian(k) for k in range(pedestrians)]
+        self._habit = np.array([habit_of(sim.config.seed, manner) for manner in manners], np.float64)
         self.latest: dict[str, Rows] = {}
         self._begin()
 
@@ -80,6 +84,8 @@ class StepSamples:
         self._add("weather", _weather(step, sim))
         self._add("bodies", _bodies(step, bodies, sim.state.traffic))
         self._add("people", self._people(step))
+        leaves = sim.state.leaves
+        self._add("doors", {"entrance": leaves.entrance, "step": np.full(len(leaves), step), "share": leaves.share})
         self._add("agents", _agents(step, sim, actions))
         if sim.state.robots is not None:
             robots, joints = _robots(step, sim)
@@ -98,11 +104,18 @@ class StepSamples:
         """Return the motion of everybody who has legs."""
         state, p = self._sim.state, self._sim.state.people
         before = p.clip_before, p.phase_before, p.pace_before, p.clip_time
-        parts: list[tuple[NDArray[Any], ...]] = [(p.entity, p.clip, p.phase, p.pace, *before)]
+        parts: list[tuple[NDArray[Any], ...]] = [(p.entity, p.clip, p.phase, p.pace, *before, p.hold, p.hold_share)]
         if state.traffic is not None:
-            motion = pedestrian_motion(state.traffic.gait, self._stature, state.second)
-            parts.append((state.traffic.walkers.entity, *motion[:-1], *motion.after[:4]))
-        names = "entity", "clip", "phase", "pace", "clip_before", "phase_before", "pace_before", "clip_time"
+            gait, walkers = state.traffic.gait, state.traffic.walkers
+            motion = pedestrian_motion(gait, self._stature, state.second)
+            placard = state.traffic.gatherings.placards(walkers.position)
+            hands = hands_of_pedestrians(self._habit, state.environment.weather.rain, placard, gait.afoot)
+            hold = np.where(hands.share > 0.0, hands.hold, 0)
+            parts.append((walkers.entity, *motion[:-1], *motion.after[:4], hold, hands.share))
+        names = (
+            "entity", "clip", "phase", "pace", "clip_before", "phase_before", "pace_before", "clip_time", "hold",
+            "hold_share",
+        )  # fmt: skip
         rows = {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True), strict=True)}
         return rows | {"step": np.full(len(rows["entity"]), step)}
 

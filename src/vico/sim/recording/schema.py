@@ -95,7 +95,10 @@ TABLES: dict[str, dict[str, Column]] = {
         "phase_before": _PHASE._replace(absent=0.0),
         "pace_before": _PACE,
         "clip_time": Column(pa.int32(), 1e-2, 10.0),
+        "hold": _SMALL._replace(absent=0.0),
+        "hold_share": Column(pa.int8(), 1e-2, 0.0),
     },
+    "doors": {"entrance": _WHOLE, "step": _WHOLE, "share": Column(pa.int8(), 1e-2)},
     "agents": {
         "entity": _WHOLE,
         "step": _WHOLE,

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from vico.assets.models.in_hand import placards, umbrellas
 from vico.io.cache import cache_folder
 from vico.io.files import write_bytes, write_json
 from vico.io.folders import new_folder
 from vico.render.lamps.found import LAMP_KINDS, with_lit_heads
 from vico.version import __version__
+from vico.viewer.city.doors import door_entries
 from vico.viewer.city.models import moving_models, write_instances, write_models
 from vico.viewer.city.pack import Blob, PackedMesh, array_entries
 from vico.viewer.city.robots import write_robots
@@ -23,7 +25,7 @@ from vico.viewer.city.tiles import TILE, Grid, far_tiles, ground_grid, ground_pi
 from vico.world.folder import World
 
 #: Of the files' layout; another number, and they are written anew.
-CITY_FORMAT = 5
+CITY_FORMAT = 6
 MANIFEST = "manifest.json"
 
 
@@ -57,6 +59,8 @@ def write_city(world: World, folder: Path) -> None:
     models = {
         name: with_lit_heads(standing[name]) if name in lamps else standing[name] for name in used
     } | moving_models()
+    doors, leaves = door_entries(world)
+    models |= leaves
     written = write_models(models, textures, shapes)
     robots = write_robots(textures, shapes)
     write_json(folder / "rooms.json", write_rooms(world, textures, folder))
@@ -80,6 +84,9 @@ def write_city(world: World, folder: Path) -> None:
             "instances": instances,
             "lamps": sorted(lamps),
             "models": written,
+            "doors": doors,
+            "umbrellas": umbrellas(),
+            "placards": placards(),
             "robots": robots,
             "buildings": [
                 {"entity": b.entity, "name": b.name, "use": b.use, "ring": np.round(b.footprint[0], 1).tolist()}

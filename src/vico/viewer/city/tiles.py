@@ -143,16 +143,27 @@ def _large(surface: Surface, textures: TextureLayers) -> Surface:
 
 
 def ground_picture(world: World, textures: TextureLayers) -> Image.Image:
-    """Paint the ground from above, north up, in the mean colours of what it is made of."""
+    """Paint the ground from above, north up, in the mean colours of what it is made of.
+
+    What lies higher over the terrain covers the rest: below streets and squares lies a bed that is everywhere.
+    """
     image = Image.new("RGB", (PICTURE, PICTURE), (122, 122, 118))
     draw = ImageDraw.Draw(image)
     scale = PICTURE / (2 * world.half)
+    outlines, colours, heights = [], [], []
     for surface in world.surfaces("ground"):
         tint = textures.layer_of(surface.material).colour / 255.0
-        xy = (surface.positions[:, :2] * [1, -1] + world.half) * scale
-        colours = (surface.colour[surface.triangles[:, 0], :3] * tint).astype(np.uint8)
-        for corners, colour in zip(xy[surface.triangles].reshape(-1, 6).tolist(), colours.tolist(), strict=True):
-            draw.polygon(corners, fill=tuple(colour))
+        corners = surface.positions[surface.triangles].astype(np.float64)
+        outlines.append(((corners[:, :, :2] * [1, -1] + world.half) * scale).reshape(-1, 6))
+        colours.append((surface.colour[surface.triangles[:, 0], :3] * tint).astype(np.uint8))
+        middle = corners.mean(axis=1)
+        heights.append(middle[:, 2] - world.height(np.clip(middle[:, :2], -world.half, world.half)))
+    if outlines:
+        # To the centimetre: among equals the order of the surfaces decides, as everywhere.
+        order = np.argsort(np.round(np.concatenate(heights), 2), kind="stable")
+        outline, colour = np.concatenate(outlines)[order], np.concatenate(colours)[order]
+        for corners_of, colour_of in zip(outline.tolist(), colour.tolist(), strict=True):
+            draw.polygon(corners_of, fill=tuple(colour_of))
     return image
 
 

@@ -102,13 +102,15 @@ function hipOf(person, out, side) {
   return pelvisOf(person, out).map((x, k) => x + away[k]);
 }
 
-/** @param {PersonFile} person @param {Pose} out @param {number} side @param {Foot} foot */
-function bendLeg(person, out, side, { place, foot }) {
-  const [ahead, beside] = rotate(foot, [1, 0, 0]);
-  const pole = [ahead, beside, 0];
-  const start = hipOf(person, out, side);
-  const [first, second] = legOf(person, side);
-  const way = minus(place, start);
+/**
+ * Bend a limb of two bones to reach a point; one out of reach is approached in its direction.
+ * @param {Vector} start @param {Vector} goal metres
+ * @param {Vector} pole where the middle joint points to
+ * @param {number} first @param {number} second lengths of the bones, metres
+ * @returns {{upper: Vector, lower: Vector, hinge: Vector}} directions, and the axis that turns the first into the second
+ */
+export function twoBones(start, goal, pole, first, second) {
+  const way = minus(goal, start);
   const length = Math.hypot(...way);
   const along = way.map((x) => x / Math.max(length, 1e-9));
   const distance = Math.min(Math.max(length, Math.abs(first - second) + 1e-4), (first + second) * 0.9998);
@@ -117,8 +119,13 @@ function bendLeg(person, out, side, { place, foot }) {
   const cosine = clamp((first ** 2 + distance ** 2 - second ** 2) / (2 * first * distance));
   const sine = Math.sqrt(1 - cosine ** 2);
   const upper = along.map((x, k) => x * cosine + bent[k] * sine);
-  const lower = unit(along.map((x, k) => x * distance - upper[k] * first));
-  const hinge = unit(cross(bent, along));
+  return { upper, lower: unit(along.map((x, k) => x * distance - upper[k] * first)), hinge: unit(cross(bent, along)) };
+}
+
+/** @param {PersonFile} person @param {Pose} out @param {number} side @param {Foot} foot */
+function bendLeg(person, out, side, { place, foot }) {
+  const [ahead, beside] = rotate(foot, [1, 0, 0]);
+  const { upper, lower, hinge } = twoBones(hipOf(person, out, side), place, [ahead, beside, 0], ...legOf(person, side));
   const [thigh, shin] = [upper, lower].map((way) => {
     const up = way.map((x) => -x);
     return ofAxes(cross(hinge, up), hinge, up);

@@ -2,9 +2,11 @@
 
 import { THREE } from "./three.js";
 import { getJson } from "./source.js";
-import { cityMaterial, meshGeometry, pictureArray, plainMaterial } from "./materials.js";
-import { groundGeometry, lampPlaces, lampPools } from "./ground_meshes.js";
+import { cityMaterial, meshGeometry } from "./materials.js";
+import { lampPlaces, lampPools } from "./ground_meshes.js";
 import { Instances } from "./instances.js";
+import { Outlook } from "./outlook.js";
+import { pictureArray } from "./pictures.js";
 
 /** Tiles of which the whole geometry is kept in memory. */
 const KEPT = 40;
@@ -23,6 +25,8 @@ export class City {
     this.tiles = [];
     /** @type {any[]} */
     this.materials = [];
+    /** @type {any[]} of what stands in numbers: a graphics library makes them anew where both kinds share one */
+    this.instancedMaterials = [];
     /** @type {any[]} */
     this.insideMaterials = [];
     /** @type {{value: any}[]} */
@@ -42,6 +46,12 @@ export class City {
     this.arrived = 0;
     /** @type {Instances | null} */
     this.instances = null;
+    /** @type {Outlook | null} the city from afar */
+    this.outlook = null;
+    /** Height of the lowest ground, metres. */
+    this.lowest = 0;
+    /** @type {{at: Float32Array, middle: number, radius: number}[]} trees, as `BuildingShade.addTrees` has them */
+    this.trees = [];
     this.reach = { near: 45, far: 420 };
     /** @type {number[][]} spots that lamps light: x, y, z and radius */
     this.lamps = [];
@@ -63,8 +73,9 @@ export class City {
     const outlook = await bytes("/city/outlook.bin");
     const pictures = this.manifest.arrays.map(() => ({ value: pictureArray({ width: 1, height: 1 }, 1) }));
     this.pictures = pictures;
-    this.materials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array));
-    this.materials.push(...pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, false, true)));
+    const all = () => [false, true].flatMap((both) => pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, false, both)));
+    this.materials = all();
+    this.instancedMaterials = all();
     this.insideMaterials = [false, true].flatMap((both) => pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, true, both)));
     this._outlook(outlook, new THREE.CanvasTexture(picture));
     this._shapes(outlook);
@@ -72,31 +83,19 @@ export class City {
     return outlook;
   }
 
-  /** @param {ArrayBuffer} outlook @param {any} texture */
-  _outlook(outlook, texture) {
-    const { half, ground } = this.manifest;
-    texture.anisotropy = 4;
-    const groundMaterial = plainMaterial(this.light, texture);
-    const wallMaterial = plainMaterial(this.light);
-    for (const entry of this.manifest.tiles) {
-      const tile = { entry, near: /** @type {any} */ (null), far: new THREE.Group(), wanted: 0, loading: false };
-      const floor = new THREE.Mesh(groundGeometry(outlook, ground, entry, half), groundMaterial);
-      tile.far.add(floor);
-      if (entry.far) {
-        const walls = new THREE.Mesh(meshGeometry(outlook, entry.far), wallMaterial);
-        walls.name = "walls";
-        tile.far.add(walls);
-      }
-      this.scene.add(tile.far);
-      this.tiles.push(tile);
-    }
-    this._surroundings(outlook, ground);
+  /** @param {ArrayBuffer} buffer @param {any} picture */
+  _outlook(buffer, picture) {
+    picture.anisotropy = 4;
+    this.outlook = new Outlook(this.scene, this.light, this.manifest, buffer, { picture, fine: !this.software });
+    this.tiles = this.manifest.tiles.map((/** @type {any} */ entry) => ({ entry, near: null, wanted: 0, loading: false }));
+    this._surroundings(buffer, this.manifest.ground);
   }
 
   /** @param {ArrayBuffer} outlook @param {any} ground */
   _surroundings(outlook, ground) {
     const heights = new Float32Array(outlook, ground.offset, ground.points * ground.points * this.manifest.count ** 2);
     const low = heights.reduce((a, b) => Math.min(a, b), Infinity);
+    this.lowest = low;
     const material = new THREE.ShaderMaterial({
       uniforms: { colour: this.light.ground, fog: this.light.fog, reach: this.light.reach },
       vertexShader: `uniform float reach; varying float f; void main() { vec4 v = modelViewMatrix * vec4(position, 1.0);
@@ -125,6 +124,7 @@ export class City {
     this.robotShapes = shapes;
     this.instances = new Instances(this.scene, this, this.reach);
     for (const entry of this.manifest.instances) this.instances.add(entry, outlook);
+    this.trees = treesOf(this.manifest.instances, this.models, outlook);
     this.lamps = lampPlaces(this, outlook);
     this.pools = lampPools(this.lamps, this.light);
     if (this.pools) this.scene.add(this.pools);
@@ -178,34 +178,24 @@ export class City {
   update(camera) {
     const { tile: side } = this.manifest;
     const { x, y, z } = camera.position;
+    const hidden = this.inside >= 0;
     this._round++;
-    for (const tile of this.tiles) {
-      const dx = Math.max(tile.entry.x - x, 0, x - tile.entry.x - side);
-      const dy = Math.max(tile.entry.y - y, 0, y - tile.entry.y - side);
-      const away = Math.hypot(dx, dy, Math.max(0, z - 40));
-      if (this.inside >= 0) {
-        tile.far.visible = false;
-        if (tile.near) tile.near.visible = false;
-        continue;
-      }
-      const isNear = away < this.nearReach * (tile.near?.visible ? 1.1 : 1) && this.textured;
+    const away = this.tiles.map(({ entry }) => {
+      const dx = Math.max(entry.x - x, 0, x - entry.x - side);
+      const dy = Math.max(entry.y - y, 0, y - entry.y - side);
+      return Math.hypot(dx, dy, Math.max(0, z - 40));
+    });
+    const whole = this.tiles.map((tile, k) => {
+      const isNear = !hidden && this.textured && away[k] < this.nearReach * (tile.near?.visible ? 1.1 : 1);
       if (isNear && !tile.near && !tile.loading) this._load(tile);
       if (isNear) tile.wanted = this._round;
+      if (!tile.near) return false;
+      tile.near.visible = isNear;
       // What is near is drawn first: what it hides costs nothing then.
-      const order = -100 + Math.min(away, 900) / 10;
-      for (const mesh of tile.far.children) mesh.renderOrder = order + (mesh.name === "walls" ? 0 : 1);
-      if (tile.near) {
-        tile.near.visible = isNear;
-        for (const mesh of tile.near.children) mesh.renderOrder = order;
-      }
-      // Ground from afar lies below what is near, where tiles do not quite meet.
-      const whole = Boolean(isNear && tile.near);
-      tile.far.visible = true;
-      for (const mesh of tile.far.children) {
-        if (mesh.name === "walls") mesh.visible = !whole;
-        else mesh.position.z = whole ? -0.6 : 0;
-      }
-    }
+      for (const mesh of tile.near.children) mesh.renderOrder = -100 + Math.min(away[k], 900) / 10;
+      return isNear;
+    });
+    this.outlook?.update(camera, whole, away, hidden);
     if (this.instances) this.instances.update(camera, this.inside >= 0);
     if (this.pools) this.pools.visible = this.light.night.value > 0.2 && this.inside < 0;
     if (this._plane) this._plane.visible = this.inside < 0;
@@ -273,13 +263,26 @@ export class City {
 
   /** Meshes to aim at: far walls, with the building of each vertex. */
   get walls() {
-    return this.tiles.flatMap((tile) => tile.far.children.filter((/** @type {any} */ m) => m.name === "walls"));
+    return this.outlook?.aims ?? [];
   }
 }
 
 /** @param {any} mesh @param {number} arrays @returns {number} which material draws it: those seen from both sides come last */
 export function materialOf(mesh, arrays) {
   return mesh.array + (mesh.both ? arrays : 0);
+}
+
+/**
+ * Where trees stand, and how large their crowns are: the upper two thirds of them.
+ * @param {any[]} instances @param {Map<string, any>} models @param {ArrayBuffer} outlook
+ */
+function treesOf(instances, models, outlook) {
+  return instances
+    .filter(({ prototype }) => prototype.startsWith("tree") && models.has(prototype))
+    .map(({ prototype, offset, count }) => {
+      const { low, high } = models.get(prototype);
+      return { at: new Float32Array(outlook, offset, 5 * count), middle: low[2] + 0.62 * (high[2] - low[2]), radius: (high[0] - low[0] + high[1] - low[1]) / 4 };
+    });
 }
 
 /** @param {string} path @returns {Promise<ArrayBuffer>} */

@@ -14,7 +14,7 @@ export function groundGeometry(outlook, ground, entry, half) {
   const heights = new Float32Array(outlook, ground.offset + 4 * entry.index * n * n, n * n);
   const position = new Float32Array(3 * n * n);
   const uv = new Float32Array(2 * n * n);
-  const facing = new Float32Array(4 * n * n);
+  const facing = new Int8Array(4 * n * n);
   for (let iy = 0; iy < n; iy++) {
     for (let ix = 0; ix < n; ix++) {
       const k = iy * n + ix;
@@ -22,7 +22,7 @@ export function groundGeometry(outlook, ground, entry, half) {
       const y = Math.min(entry.y + iy * ground.step, half);
       position.set([x, y, heights[k] - 0.12], 3 * k);
       uv.set([(x + half) / (2 * half), (y + half) / (2 * half)], 2 * k);
-      facing[4 * k + 2] = 1;
+      facing[4 * k + 2] = 127;
     }
   }
   const index = [];
@@ -35,7 +35,7 @@ export function groundGeometry(outlook, ground, entry, half) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
   geometry.setAttribute("uv", new THREE.BufferAttribute(uv, 2));
-  geometry.setAttribute("facing", new THREE.BufferAttribute(facing, 4));
+  geometry.setAttribute("facing", new THREE.BufferAttribute(facing, 4, true));
   geometry.setAttribute("tint", new THREE.BufferAttribute(new Uint8Array(4 * n * n).fill(255), 4, true));
   geometry.setIndex(index);
   return geometry;

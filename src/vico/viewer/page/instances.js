@@ -12,7 +12,7 @@ export class Instances {
    * @param {{near: number, far: number}} [reach] metres
    * @param {any[]} [materials] by texture array
    */
-  constructor(parent, city, reach = { near: 45, far: 420 }, materials = city.materials) {
+  constructor(parent, city, reach = { near: 45, far: 420 }, materials = city.instancedMaterials) {
     this.parent = parent;
     this.materials = materials;
     this._hidden = false;
@@ -45,6 +45,7 @@ export class Instances {
   _mesh(part, count) {
     const mesh = new THREE.InstancedMesh(part.geometry, this.materials[part.array], count);
     mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = false;
     mesh.count = 0;
     this.parent.add(mesh);
     return mesh;

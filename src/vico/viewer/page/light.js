@@ -19,6 +19,10 @@ import { THREE } from "./three.js";
  * @property {Uniform} zenith
  * @property {Uniform} horizon
  * @property {Uniform} clouds
+ * @property {Uniform} shade heights to which buildings' shadows reach, seen from above
+ * @property {Uniform} shadeFrame how a place is found in it: scale, shift east and north, its lowest height
+ * @property {Set<any>} receivers materials that shadows fall on
+ * @property {boolean} shaded whether they do
  */
 
 /** @returns {Light} */
@@ -38,6 +42,10 @@ export function makeLight() {
     zenith: colour([0.3, 0.5, 0.78]),
     horizon: colour([0.74, 0.81, 0.88]),
     clouds: { value: 0.3 },
+    shade: { value: null },
+    shadeFrame: { value: new THREE.Vector4() },
+    receivers: new Set(),
+    shaded: false,
   };
 }
 
@@ -68,9 +76,10 @@ export function setLight(light, sky) {
   light.sun.value.set(known ? sky[0] : 0.4, known ? sky[1] : -0.5, up);
   if (up < -0.05) light.sun.value.set(0.3, 0.4, 0.87);
   const strength = ramp(up, -0.03, 0.25) * (1 - 0.85 * grey);
-  set(light.sunColour, mix([0.03, 0.035, 0.05], mix([0.66, 0.62, 0.54], [0.75, 0.45, 0.2], gold), strength));
-  set(light.sky, mix([0.15, 0.155, 0.2], mix([0.52, 0.57, 0.64], [0.62, 0.62, 0.62], grey), day));
-  set(light.ground, mix([0.13, 0.115, 0.1], [0.36, 0.35, 0.33], day));
+  set(light.sunColour, mix([0.03, 0.035, 0.05], mix([0.63, 0.59, 0.51], [0.75, 0.45, 0.2], gold), strength));
+  // What lies in the shade of a house is lit by the sky and by the houses across the street.
+  set(light.sky, mix([0.15, 0.155, 0.2], mix([0.57, 0.62, 0.69], [0.67, 0.67, 0.67], grey), day));
+  set(light.ground, mix([0.13, 0.115, 0.1], [0.41, 0.4, 0.38], day));
   const zenith = mix([0.015, 0.02, 0.05], mix([0.25, 0.47, 0.78], [0.58, 0.61, 0.65], grey), day);
   let horizon = mix([0.05, 0.055, 0.09], mix([0.72, 0.8, 0.88], [0.7, 0.72, 0.74], grey), day);
   horizon = mix(horizon, [0.95, 0.62, 0.38], 0.7 * gold);

@@ -1,22 +1,52 @@
-// How surfaces look: light by vertex, textures from arrays, windows and lamps that shine at night, fog.
+// How surfaces look: light by vertex, shadows of buildings, textures from arrays, windows and lamps that shine at night, fog.
 
+import { PANES, paneTexture } from "./pictures.js";
 import { THREE } from "./three.js";
 
-const LIGHT_VERTEX = /* glsl */ `
+/** Light by vertex; with `SHADED` that of the sun is kept apart, for buildings may stand in its way. */
+export const LIGHT_VERTEX = /* glsl */ `
 uniform vec3 sun, sunColour, sky, ground;
 uniform float reach;
 varying vec3 vLight;
 varying float vFog;
-vec3 lit(vec3 n) {
-  return mix(ground, sky, n.z * 0.5 + 0.5) + sunColour * max(dot(n, sun), 0.0);
+#ifdef SHADED
+varying vec3 vDirect, vAt;
+#endif
+void shine(vec3 n, vec3 at) {
+  vLight = mix(ground, sky, n.z * 0.5 + 0.5);
+  vec3 direct = sunColour * max(dot(n, sun), 0.0);
+  #ifdef SHADED
+  vDirect = direct;
+  vAt = at;
+  #else
+  vLight += direct;
+  #endif
 }
 float fogAt(vec3 view) { float d = length(view) / reach; return 1.0 - exp(-d * d * 0.6); }
 `;
-const FOG_FRAGMENT = /* glsl */ `
+/** How much of the sun's light comes to a point: none below the height up to which a building's shadow reaches there. */
+export const SHADE = /* glsl */ `
+uniform sampler2D shade;
+uniform vec4 shadeFrame;
+float sunReaches(vec3 at) {
+  // Rooms lie below the lowest ground: no house shades them.
+  if (at.z < shadeFrame.w) return 1.0;
+  float height = texture2D(shade, (at.xy + shadeFrame.yz) * shadeFrame.x + 0.5).r + shadeFrame.w;
+  return 1.0 - clamp((height - at.z - 0.25) * 1.4, 0.0, 1.0);
+}
+`;
+const LIGHT_FRAGMENT = /* glsl */ `
 #define SNOW vec3(0.97, 0.99, 1.03)
 uniform vec3 fog;
 varying vec3 vLight;
 varying float vFog;
+#ifdef SHADED
+varying vec3 vDirect, vAt;
+${SHADE}
+vec3 light() { return vLight + vDirect * sunReaches(vAt); }
+#else
+vec3 light() { return vLight; }
+#endif
 `;
 
 const CITY_VERTEX = /* glsl */ `
@@ -24,50 +54,62 @@ attribute vec4 facing;
 attribute vec4 tint;
 uniform float snow, wet;
 varying vec2 vUv;
-varying vec4 vTint;
-varying float vFlag, vSnow;
+varying vec3 vTint;
+flat varying float vLayer, vGlow;
+varying float vSnow;
+#ifdef CUTOUT
+flat varying float vHoles;
+#endif
 ${LIGHT_VERTEX}
 void main() {
   vec4 at = vec4(position, 1.0);
   vec3 n = facing.xyz;
   #ifdef USE_INSTANCING
   at = instanceMatrix * at;
-  n = normalize(mat3(instanceMatrix) * n);
+  n = mat3(instanceMatrix) * n;
   #endif
   at = modelMatrix * at;
   n = normalize(mat3(modelMatrix) * n);
-  vLight = lit(n);
+  shine(n, at.xyz);
   vUv = uv;
-  vTint = vec4(tint.rgb, tint.a * 255.0);
+  vLayer = floor(tint.a * 255.0 + 0.5);
+  vTint = tint.rgb;
   #ifdef USE_INSTANCING_COLOR
-  vTint.rgb *= instanceColor;
+  vTint *= instanceColor;
   #endif
-  vFlag = facing.w;
+  #ifdef CUTOUT
+  vHoles = facing.w > 0.9 ? 1.0 : 0.0;
+  #endif
+  vGlow = facing.w > 0.9 ? 0.0 : min(facing.w * 1.27, 1.0);
   float level = smoothstep(0.6, 0.9, n.z);
-  vTint.rgb *= 1.0 - 0.3 * wet * level;
+  vTint *= 1.0 - 0.3 * wet * level;
   vSnow = snow * level * 0.85;
   vec4 view = viewMatrix * at;
   vFog = fogAt(view.xyz);
   gl_Position = projectionMatrix * view;
 }`;
 
+// Only what has holes may throw fragments away: of everything else those that are hidden cost nothing.
 const CITY_FRAGMENT = /* glsl */ `
 precision highp sampler2DArray;
 uniform sampler2DArray pictures;
 uniform float night;
 varying vec2 vUv;
-varying vec4 vTint;
-varying float vFlag, vSnow;
-${FOG_FRAGMENT}
+varying vec3 vTint;
+flat varying float vLayer, vGlow;
+varying float vSnow;
+#ifdef CUTOUT
+flat varying float vHoles;
+#endif
+${LIGHT_FRAGMENT}
 void main() {
-  vec4 texel = texture(pictures, vec3(vUv, floor(vTint.a + 0.5)));
-  vec3 base = mix(texel.rgb * vTint.rgb, SNOW, vSnow);
-  vec3 colour = base * vLight;
-  if (vFlag > 0.9) { if (texel.a < 0.5) discard; }
-  else {
-    float shine = min(vFlag * 1.27, 1.0) * texel.a;
-    colour = mix(colour, base * vec3(1.25, 1.05, 0.75) + vec3(0.16, 0.11, 0.04), shine * night);
-  }
+  vec4 texel = texture(pictures, vec3(vUv, vLayer));
+  #ifdef CUTOUT
+  if (vHoles > 0.5 && texel.a < 0.5) discard;
+  #endif
+  vec3 base = mix(texel.rgb * vTint, SNOW, vSnow);
+  vec3 colour = base * light();
+  if (night > 0.0) colour = mix(colour, base * vec3(1.25, 1.05, 0.75) + vec3(0.16, 0.11, 0.04), vGlow * texel.a * night);
   gl_FragColor = vec4(mix(colour, fog, vFog), 1.0);
 }`;
 
@@ -77,50 +119,42 @@ attribute vec4 tint;
 uniform float snow;
 varying vec3 vColour;
 varying vec2 vUv;
-varying vec3 vWall;
-varying float vSnow;
+varying float vSnow, vUpright;
 ${LIGHT_VERTEX}
 void main() {
-  vec4 at = modelMatrix * vec4(position, 1.0);
   vec3 n = facing.xyz;
-  vLight = lit(n);
-  vWall = vec3(dot(position.xy, vec2(-n.y, n.x)), position.z, 1.0 - smoothstep(0.1, 0.3, abs(n.z)));
+  shine(n, position);
+  #ifdef PICTURED
   vUv = uv;
+  #else
+  vUv = vec2(dot(position.xy, vec2(-n.y, n.x)), position.z) / PANES;
+  vUpright = 1.0 - smoothstep(0.1, 0.3, abs(n.z));
+  #endif
   vColour = tint.rgb;
   vSnow = snow * smoothstep(0.6, 0.9, n.z) * 0.85;
-  vec4 view = viewMatrix * at;
+  vec4 view = viewMatrix * vec4(position, 1.0);
   vFog = fogAt(view.xyz);
   gl_Position = projectionMatrix * view;
 }`;
 
-// Far walls have no textures: storeys are drawn on them by height, and lit here and there at night.
+// Far walls have no textures of their own: storeys of windows are drawn on them by height, lit here and there at night.
 const PLAIN_FRAGMENT = /* glsl */ `
 uniform float night;
-uniform float pictured;
 uniform sampler2D picture;
 varying vec3 vColour;
 varying vec2 vUv;
-varying vec3 vWall;
-varying float vSnow;
-${FOG_FRAGMENT}
+varying float vSnow, vUpright;
+${LIGHT_FRAGMENT}
 void main() {
-  vec3 base = vColour;
-  if (pictured > 0.5) base *= texture2D(picture, vUv).rgb;
-  else if (vWall.z > 0.5) {
-    vec2 cell = vWall.xy / vec2(2.7, 3.5);
-    // As large a share of a pixel as panes have of it; where pixels are storeys, their mean.
-    vec2 wide = max(fwidth(cell), vec2(1e-3));
-    vec2 within = fract(cell);
-    vec2 cover = clamp((within - vec2(0.28, 0.3)) / wide + 0.5, 0.0, 1.0) - clamp((within - vec2(0.74, 0.8)) / wide + 0.5, 0.0, 1.0);
-    float blurred = smoothstep(0.25, 0.7, max(wide.x, wide.y));
-    float pane = mix(cover.x * cover.y, 0.23, blurred);
-    float chance = night > 0.1 ? fract(sin(dot(floor(cell), vec2(12.9898, 78.233))) * 43758.5453) : 0.0;
-    float lamp = mix(step(0.62, chance), 0.38, blurred);
-    vec3 glass = mix(vec3(0.22, 0.25, 0.3), vec3(1.5, 1.2, 0.75) / max(vLight, vec3(0.2)), night * lamp);
-    base = mix(base, glass, pane * 0.7);
-  }
-  base = mix(base, SNOW, vSnow);
-  gl_FragColor = vec4(mix(base * vLight, fog, vFog), 1.0);
+  vec3 shining = light();
+  #ifdef PICTURED
+  vec3 colour = mix(vColour * texture2D(picture, vUv).rgb, SNOW, vSnow) * shining;
+  #else
+  vec3 colour = mix(vColour, SNOW, vSnow) * shining;
+  vec2 pane = texture2D(picture, vUv).rg * (0.7 * vUpright);
+  colour += vec3(0.22, 0.25, 0.3) * shining * (pane.r - pane.g * night) + vec3(1.5, 1.2, 0.75) * (pane.g * night) - colour * pane.r;
+  #endif
+  gl_FragColor = vec4(mix(colour, fog, vFog), 1.0);
 }`;
 
 /**
@@ -129,8 +163,34 @@ void main() {
  * @returns {Record<string, any>}
  */
 export function lightUniforms(light) {
-  const { sun, sunColour, sky, ground, fog, reach, night, snow, wet } = light;
-  return { sun, sunColour, sky, ground, fog, reach, night, snow, wet };
+  const { sun, sunColour, sky, ground, fog, reach, night, snow, wet, shade, shadeFrame } = light;
+  return { sun, sunColour, sky, ground, fog, reach, night, snow, wet, shade, shadeFrame };
+}
+
+/**
+ * Make a material that buildings cast their shadows on.
+ * @param {import("./light.js").Light} light
+ * @param {Record<string, any>} options of `THREE.ShaderMaterial`
+ */
+export function shadedMaterial(light, options) {
+  const material = new THREE.ShaderMaterial({ ...options, defines: { ...options.defines, ...(light.shaded ? { SHADED: 1 } : {}) } });
+  light.receivers.add(material);
+  return material;
+}
+
+/**
+ * Have all materials show the shadows of buildings, or none: a share of the work where no graphics card does it.
+ * @param {import("./light.js").Light} light
+ * @param {boolean} on
+ */
+export function setShaded(light, on) {
+  if (on === light.shaded) return;
+  light.shaded = on;
+  for (const material of light.receivers) {
+    if (on) material.defines.SHADED = 1;
+    else delete material.defines.SHADED;
+    material.needsUpdate = true;
+  }
 }
 
 /**
@@ -141,13 +201,15 @@ export function lightUniforms(light) {
  * @param {boolean} [both] whether it is seen from behind too
  */
 export function cityMaterial(light, pictures, inside = false, both = false) {
-  return new THREE.ShaderMaterial({
+  const options = {
     uniforms: { ...lightUniforms(light), ...(inside ? insideLight() : {}), pictures },
+    defines: both ? { CUTOUT: 1 } : {},
     vertexShader: CITY_VERTEX,
     fragmentShader: CITY_FRAGMENT,
     // Walls of rooms are seen from inside alone, so that one can look in from anywhere.
     side: both ? THREE.DoubleSide : THREE.FrontSide,
-  });
+  };
+  return inside ? new THREE.ShaderMaterial(options) : shadedMaterial(light, options);
 }
 
 /** Lamps of rooms, whatever the time. */
@@ -166,35 +228,16 @@ export function insideLight() {
 /**
  * Return the material of far buildings, or with a picture that of the far ground.
  * @param {import("./light.js").Light} light
+ * @param {boolean} fine whether a graphics card paints
  * @param {any} [picture]
  */
-export function plainMaterial(light, picture = null) {
-  return new THREE.ShaderMaterial({
-    uniforms: { ...lightUniforms(light), picture: { value: picture }, pictured: { value: picture ? 1 : 0 } },
+export function plainMaterial(light, fine, picture = null) {
+  return shadedMaterial(light, {
+    uniforms: { ...lightUniforms(light), picture: { value: picture ?? paneTexture(fine) } },
+    defines: picture ? { PICTURED: 1 } : { PANES },
     vertexShader: PLAIN_VERTEX,
     fragmentShader: PLAIN_FRAGMENT,
   });
-}
-
-/**
- * Make a texture array whose layers come later: white until then.
- * @param {{width: number, height: number}} size
- * @param {number} layers
- * @param {Uint8Array} [data]
- * @param {boolean} [fine] whether colours pass from level to level: twice the work where no graphics card does it
- */
-export function pictureArray(size, layers, data, fine = true) {
-  const white = data ?? new Uint8Array(4).fill(255);
-  const texture = data
-    ? new THREE.DataArrayTexture(data, size.width, size.height, layers)
-    : new THREE.DataArrayTexture(white, 1, 1, 1);
-  texture.format = THREE.RGBAFormat;
-  texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
-  texture.magFilter = THREE.LinearFilter;
-  texture.minFilter = !data ? THREE.LinearFilter : fine ? THREE.LinearMipmapLinearFilter : THREE.LinearMipmapNearestFilter;
-  texture.generateMipmaps = Boolean(data);
-  texture.needsUpdate = true;
-  return texture;
 }
 
 /**

@@ -3,8 +3,10 @@
 import { THREE } from "./three.js";
 import { bytes } from "./city.js";
 import { lampLight } from "./ground_meshes.js";
-import { lightUniforms } from "./materials.js";
+import { HOLD, heldAt, holdUp } from "./holds.js";
+import { InHands } from "./in_hands.js";
 import { isGait, poseOf, strideOf } from "./motion.js";
+import { personMaterial } from "./person_material.js";
 import { shadowAt, shadowMesh } from "./shadows.js";
 import { JOINTS, PersonFile, Pose, forwardKinematics, writeBones } from "./skeleton.js";
 
@@ -14,41 +16,6 @@ const WIDTH = 3 * JOINTS;
 const AT_ONCE = 3;
 const FARTHEST = 260;
 const TO_RADIANS = 1 / 10000;
-
-const VERTEX = /* glsl */ `
-attribute vec4 colour, joints, weights;
-uniform sampler2D bones;
-uniform float row;
-uniform vec3 sun, sunColour, sky, ground;
-uniform float reach, snow, lamp;
-varying vec3 vColour;
-varying float vFog;
-mat4 bone(float joint) {
-  int x = 3 * int(joint + 0.5), y = int(row + 0.5);
-  vec4 a = texelFetch(bones, ivec2(x, y), 0), b = texelFetch(bones, ivec2(x + 1, y), 0), c = texelFetch(bones, ivec2(x + 2, y), 0);
-  return transpose(mat4(a, b, c, vec4(0.0, 0.0, 0.0, 1.0)));
-}
-void main() {
-  mat4 m = weights.x * bone(joints.x);
-  if (weights.y > 0.0) m += weights.y * bone(joints.y);
-  if (weights.z > 0.0) m += weights.z * bone(joints.z);
-  if (weights.w > 0.0) m += weights.w * bone(joints.w);
-  vec4 at = modelMatrix * (m * vec4(position, 1.0));
-  vec3 n = normalize(mat3(modelMatrix) * (mat3(m) * normal));
-  vec3 light = mix(ground, sky, n.z * 0.5 + 0.5) + sunColour * max(dot(n, sun), 0.0);
-  // Street lamps shine from above.
-  light += vec3(1.0, 0.8, 0.52) * lamp * (n.z * 0.35 + 0.65);
-  vColour = colour.rgb * light;
-  vec4 view = viewMatrix * at;
-  float d = length(view.xyz) / reach;
-  vFog = 1.0 - exp(-d * d * 0.6);
-  gl_Position = projectionMatrix * view;
-}`;
-const FRAGMENT = /* glsl */ `
-uniform vec3 fog;
-varying vec3 vColour;
-varying float vFog;
-void main() { gl_FragColor = vec4(mix(vColour, fog, vFog), 1.0); }`;
 
 export class People {
   /**
@@ -77,6 +44,8 @@ export class People {
     this.pose = new Pose();
     /** @type {Map<number, {left: any, right: any}>} places of hands, for what is held */
     this.hands = new Map();
+    /** Umbrellas and placards. */
+    this.inHands = new InHands(city);
     this.drawn = 0;
     this._frustum = new THREE.Frustum();
     this._matrix = new THREE.Matrix4();
@@ -95,6 +64,9 @@ export class People {
     for (const person of this.known.values()) if (person.group) person.group.visible = false;
     this.drawn = 0;
     this.hands.clear();
+    this.inHands.begin();
+    // Of everybody's bones those are handed on that are drawn now.
+    this.texture.clearUpdateRanges();
     /** @type {[number, number, number][]} */
     const wanted = [];
     const entities = before.people.entity;
@@ -124,7 +96,10 @@ export class People {
   _draw(person, between, row, body, away) {
     const motion = motionAt(person.file, between, row);
     poseOf(person.file, motion, between.time, this.pose);
+    const held = this._held(person, between, row);
+    holdUp(person.file, this.pose, held);
     writeBones(person.file, this.pose, this.bones, 4 * WIDTH * person.row);
+    this.texture.addUpdateRange(4 * WIDTH * person.row, 4 * WIDTH);
     const { group } = person;
     group.visible = true;
     group.children[0].material.uniforms.lamp.value = this.city.inside < 0 ? 0.75 * lampLight(this.city, body) : 0;
@@ -134,7 +109,22 @@ export class People {
     group.position.set(body.x, body.y, body.z);
     group.rotation.z = body.yaw;
     if (isNear) this._hands(person, body);
+    if (held.hold !== HOLD.nothing && held.share > 0.25) this.inHands.draw(person, this.pose, body, held, row);
     shadowAt(this.shadows.instanceMatrix.array, this.drawn++, body.x, body.y, body.z + 0.03, 0.42, 0.36, body.yaw);
+  }
+
+  /** What somebody holds up or before them now. @param {any} person @param {any} between @param {number} row */
+  _held(person, between, row) {
+    const { before, after, share } = between;
+    const held = heldAt(before.people, row, after.people, after.rows.people.get(person.entity), share);
+    return { ...held, width: held.hold === HOLD.beforeChest ? this._widthHeld(before, person.entity) : 0 };
+  }
+
+  /** @param {any} frame @param {number} entity @returns {number} metres */
+  _widthHeld(frame, entity) {
+    const row = frame.rows.agents.get(entity);
+    if (row === undefined) return 0;
+    return Math.max(...["held_left", "held_right"].map((key) => this.source.cast.get(frame.agents[key][row])?.size[1] ?? 0));
   }
 
   /** @param {any} person @param {any} body */
@@ -174,12 +164,7 @@ export class People {
   /** @param {number} entity @param {PersonFile} file */
   _person(entity, file) {
     const row = /** @type {number} */ (this.free.pop());
-    const material = new THREE.ShaderMaterial({
-      uniforms: { ...lightUniforms(this.light), bones: { value: this.texture }, row: { value: row }, lamp: { value: 0 } },
-      vertexShader: VERTEX,
-      fragmentShader: FRAGMENT,
-      side: THREE.DoubleSide,
-    });
+    const material = personMaterial(this.light, this.texture, row);
     const group = new THREE.Group();
     for (const level of [0, 1]) {
       const columns = file.mesh(level);
@@ -203,6 +188,7 @@ export class People {
     for (const [entity, person] of this.known) {
       if (!person.group || person.group.visible) continue;
       this.scene.remove(person.group);
+      this.light.receivers.delete(person.group.children[0].material);
       for (const mesh of person.group.children) mesh.geometry.dispose();
       this.free.push(person.row);
       this.known.delete(entity);
@@ -215,6 +201,7 @@ export class People {
     const person = this.known.get(entity);
     if (!person?.group) return;
     this.scene.remove(person.group);
+    this.light.receivers.delete(person.group.children[0].material);
     this.free.push(person.row);
     this.known.delete(entity);
   }

@@ -2,32 +2,12 @@
 // about to be, and slides to what the server says.
 
 import { el } from "./dom.js";
+import { HELP } from "./play_help.js";
 import { Input } from "./play_input.js";
 import { Predicted } from "./play_predicted.js";
 
 /** Keys that do something once, and what they do without a hint: `true` asks the server, so that it says why not. */
 const ONCE = /** @type {Record<string, string>} */ ({ b: "B", n: "N", m: "M", "<": "<", ">": ">", x: "X", z: "Z", g: "G", l: "L" });
-
-/** @type {[string, string][]} */
-const HELP = [
-  ["↑ ↓ ← →", "walk and turn"],
-  ["W A S D", "walk where you look; drag, or click and move the mouse, to look"],
-  ["Shift", "run, or faster"],
-  ["B", "pick up"],
-  ["N", "put down"],
-  ["M", "board or leave a bus or tram"],
-  ["<", "get on or off a bicycle"],
-  [">", "go through a door"],
-  ["X, Z", "sit down or get up, lie down"],
-  ["G", "hand over"],
-  ["Enter", "talk"],
-  ["R, F", "robots: up and down"],
-  ["I K J L U O", "an arm's hand: ahead, back, left, right, up, down"],
-  ["[ ]", "an arm's grip: close, open"],
-  ["V", "through one's own eyes, or from behind"],
-  ["Esc", "let go: look at the city with the usual keys; click Play to go on"],
-  ["?", "this help"],
-];
 
 class Play {
   /** @param {any} vico what the page leaves for us */
@@ -42,6 +22,7 @@ class Play {
     this.eyes = false;
     this.predicted = new Predicted();
     this.input = new Input(vico.view?.cameras?.canvas ?? document.body, () => this.active);
+    this.input.onButton = (key) => this._button(key);
     this._last = performance.now();
     this._sent = 0;
     this._seq = 0;
@@ -144,6 +125,13 @@ class Play {
     this.chat.value = "";
     this.chat.blur();
     if (text) this.do({ type: "communicate", text });
+  }
+
+  /** Do what a button of the gamepad stands for. @param {string} key a key, or `first` for the first hint */
+  _button(key) {
+    const first = this.you?.hints?.find((/** @type {any} */ h) => h.key !== "Enter");
+    if (key !== "first") this._once(key);
+    else if (first) this.do(first.action);
   }
 
   /** Do what a key stands for here; without a hint, ask for the plain thing, and be told why not. @param {string} key */

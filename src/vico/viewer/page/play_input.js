@@ -30,6 +30,11 @@ const LOOKING = new Set(["KeyW", "KeyA", "KeyS", "KeyD"]);
 const LOOK = 0.0032;
 const STEEPEST = 1.2;
 const STICK = 60;
+/** Who drags a finger so many times as far as for walking runs. */
+const RUNS = 1.6;
+/** Buttons of a gamepad of the standard layout that do something once, by number; A does what is nearest at hand. @type {Record<number, string>} */
+const BUTTONS = { 0: "first", 2: "N", 3: ">" };
+const [RUN_BUTTON, STICK_BUTTON] = [1, 10];
 const IDLE = 0.12;
 
 export class Input {
@@ -47,7 +52,13 @@ export class Input {
     this.looks = false;
     /** @type {Map<number, {x: number, y: number, left: boolean}>} */
     this._fingers = new Map();
-    this._stick = { x: 0, y: 0 };
+    this._stick = { x: 0, y: 0, runs: false };
+    /** What the gamepad holds down. @type {Set<string>} */
+    this._padDown = new Set();
+    /** Buttons of the gamepad that were down the last time. @type {Set<number>} */
+    this._pressed = new Set();
+    /** Told what is to be done once. @type {((key: string) => void) | null} */
+    this.onButton = null;
     this._begun = false;
     this._listen();
   }
@@ -55,7 +66,8 @@ export class Input {
   release() {
     this.codes.clear();
     this._fingers.clear();
-    this._stick = { x: 0, y: 0 };
+    this._stick = { x: 0, y: 0, runs: false };
+    this._padDown.clear();
     this.axes = {};
   }
 
@@ -92,7 +104,10 @@ export class Input {
     if (!this.active()) return;
     const finger = this._fingers.get(event.pointerId);
     if (document.pointerLockElement === this.canvas) this._look(event.movementX, event.movementY);
-    else if (finger?.left) this._stick = { x: clamp((event.clientX - finger.x) / STICK), y: clamp((finger.y - event.clientY) / STICK) };
+    else if (finger?.left) {
+      const [x, y] = [(event.clientX - finger.x) / STICK, (finger.y - event.clientY) / STICK];
+      this._stick = { x: clamp(x), y: clamp(y), runs: Math.hypot(x, y) > RUNS };
+    }
     else if (finger) {
       this._look(event.clientX - finger.x, event.clientY - finger.y);
       finger.x = event.clientX;
@@ -102,7 +117,7 @@ export class Input {
 
   /** @param {PointerEvent} event */
   _up(event) {
-    if (this._fingers.get(event.pointerId)?.left) this._stick = { x: 0, y: 0 };
+    if (this._fingers.get(event.pointerId)?.left) this._stick = { x: 0, y: 0, runs: false };
     this._fingers.delete(event.pointerId);
   }
 
@@ -135,6 +150,7 @@ export class Input {
       axes.y = this._stick.y;
     }
     const pad = [...(navigator.getGamepads?.() ?? [])].find(Boolean);
+    this._padDown.clear();
     if (pad) this._pad(pad, axes, seconds);
     this.axes = axes;
     return this.message();
@@ -156,10 +172,17 @@ export class Input {
     if (button(12) !== button(13)) axes.hand_x = button(12) - button(13);
     if (button(14) !== button(15)) axes.hand_y = button(14) - button(15);
     if (button(5) !== button(4)) axes.hand_z = button(5) - button(4);
+    if (button(RUN_BUTTON) || button(STICK_BUTTON)) this._padDown.add("run");
+    for (const [number, key] of Object.entries(BUTTONS)) {
+      const k = Number(number);
+      if (button(k) && !this._pressed.has(k)) this.onButton?.(key);
+      if (button(k)) this._pressed.add(k);
+      else this._pressed.delete(k);
+    }
   }
 
   message() {
-    const down = [...new Set([...this.codes].map((code) => HELD[code]).filter(Boolean))];
+    const down = [...new Set([...[...this.codes].map((code) => HELD[code]).filter(Boolean), ...this._padDown, ...(this._stick.runs ? ["run"] : [])])];
     const turns = down.includes("turn_left") || down.includes("turn_right");
     return { down, yaw: this.looks && !turns ? wrap(this.yaw) : null, pitch: this.pitch, axes: this.axes };
   }

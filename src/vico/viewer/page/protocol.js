@@ -13,6 +13,7 @@
  * @property {Columns} agents
  * @property {Columns} robots
  * @property {Columns} joints
+ * @property {Columns} doors
  * @property {Record<string, Map<number, number>>} rows row of each entity, by table
  */
 
@@ -26,7 +27,7 @@ const TABLES = [
     "people",
     [
       ["entity", INT], ["phase", INT], ["pace", INT], ["phase_before", INT], ["pace_before", INT], ["clip_time", INT],
-      ["clip", SIGNED], ["clip_before", SIGNED],
+      ["clip", SIGNED], ["clip_before", SIGNED], ["hold", SIGNED], ["hold_share", SIGNED],
     ],
   ],
   [
@@ -38,6 +39,7 @@ const TABLES = [
   ],
   ["robots", [["entity", INT], ["x", INT], ["y", INT], ["z", INT], ["qw", INT], ["qx", INT], ["qy", INT], ["qz", INT]]],
   ["joints", [["entity", INT], ["joint", INT], ["angle", INT]]],
+  ["doors", [["entrance", INT], ["share", SIGNED]]],
 ];
 const HEAD = 40;
 const SKY = 16;
@@ -55,7 +57,7 @@ export const SKY_FIELDS = [
  */
 export function decodeFrame(buffer, start = 0) {
   const head = new DataView(buffer, start);
-  if (head.getUint8(0) !== 0x56 || head.getUint8(1) !== 1) throw new Error("no frame of version 1");
+  if (head.getUint8(0) !== 0x56 || head.getUint8(1) !== 2) throw new Error("no frame of version 2");
   /** @type {any} */
   const frame = {
     flags: head.getUint8(2),
@@ -67,7 +69,7 @@ export function decodeFrame(buffer, start = 0) {
   };
   let at = start + HEAD + 4 * SKY;
   TABLES.forEach(([name, columns], k) => {
-    const count = head.getUint32(16 + 4 * k, true);
+    const count = name === "doors" ? head.getUint8(3) : head.getUint32(16 + 4 * k, true);
     /** @type {Columns} */
     const found = {};
     for (const [key, kind] of columns) {
@@ -80,7 +82,7 @@ export function decodeFrame(buffer, start = 0) {
       }
     }
     frame[name] = found;
-    if (name !== "joints") frame.rows[name] = rowsOf(found.entity);
+    if (found.entity && name !== "joints") frame.rows[name] = rowsOf(found.entity);
   });
   return frame;
 }

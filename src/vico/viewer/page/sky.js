@@ -2,34 +2,53 @@
 
 import { THREE } from "./three.js";
 
-const DOME_VERTEX = /* glsl */ `
-varying vec3 vWay;
-void main() {
-  vWay = position;
-  vec4 at = projectionMatrix * mat4(mat3(viewMatrix)) * vec4(position, 1.0);
-  gl_Position = at.xyww;
-}`;
-const DOME_FRAGMENT = /* glsl */ `
-uniform vec3 zenith, horizon, sun, sunColour;
-uniform vec3 fog;
-uniform float night, clouds, time, plain, reach;
-varying vec3 vWay;
+const SKY_COLOUR = /* glsl */ `
+uniform vec3 zenith, horizon, sun, sunColour, fog;
+uniform float night, clouds, time, reach;
 float hash(vec2 p) { return fract(sin(dot(p, vec2(12.9898, 78.233))) * 43758.5453); }
 float noise(vec2 p) {
   vec2 i = floor(p), f = fract(p);
   f = f * f * (3.0 - 2.0 * f);
   return mix(mix(hash(i), hash(i + vec2(1, 0)), f.x), mix(hash(i + vec2(0, 1)), hash(i + vec2(1, 1)), f.x), f.y);
 }
+vec3 clear(vec3 way) {
+  float near = max(dot(way, sun), 0.0);
+  return mix(horizon, zenith, sqrt(max(way.z, 0.0))) + sunColour * 0.25 * pow(near, 24.0) * (1.0 - clouds * clouds);
+}
+// In fog there is no sky to see.
+vec3 behindFog(vec3 colour) { return mix(fog, colour, smoothstep(150.0, 1300.0, reach)); }
+`;
+const DOME_VERTEX = /* glsl */ `
+#ifdef PLAIN
+varying vec3 vColour;
+${SKY_COLOUR}
+#else
+varying vec3 vWay;
+#endif
+void main() {
+  #ifdef PLAIN
+  vec3 colour = clear(position);
+  vColour = behindFog(mix(colour, horizon, clouds * 0.35));
+  #else
+  vWay = position;
+  #endif
+  vec4 at = projectionMatrix * mat4(mat3(viewMatrix)) * vec4(position, 1.0);
+  gl_Position = at.xyww;
+}`;
+// Clouds and stars are worth their pixels where a graphics card paints them, and in a picture that rests.
+const DOME_FRAGMENT = /* glsl */ `
+#ifdef PLAIN
+varying vec3 vColour;
+void main() { gl_FragColor = vec4(vColour, 1.0); }
+#else
+varying vec3 vWay;
+${SKY_COLOUR}
 void main() {
   vec3 way = normalize(vWay);
   float up = max(way.z, 0.0);
-  vec3 colour = mix(horizon, zenith, pow(up, 0.5));
-  float near = max(dot(way, sun), 0.0);
-  colour += sunColour * (0.25 * pow(near, 24.0) + 1.6 * smoothstep(0.9992, 0.9996, near)) * (1.0 - clouds * clouds);
-  // Clouds and stars are worth their pixels where a graphics card paints them.
-  if (plain > 0.5) {
-    colour = mix(colour, horizon, clouds * 0.35);
-  } else if (up > 0.02) {
+  vec3 colour = clear(way);
+  colour += sunColour * 1.6 * smoothstep(0.9992, 0.9996, dot(way, sun)) * (1.0 - clouds * clouds);
+  if (up > 0.02) {
     vec2 plane = way.xy / (up + 0.12) * 1.6 + time * 0.002;
     float puff = noise(plane) * 0.55 + noise(plane * 2.3) * 0.3 + noise(plane * 5.1) * 0.15;
     float cover = smoothstep(0.85 - 0.75 * clouds, 1.05 - 0.55 * clouds, puff) * smoothstep(0.02, 0.2, up);
@@ -38,9 +57,34 @@ void main() {
     float star = step(0.9965, hash(cell)) * (1.0 - cover) * smoothstep(0.5, 1.0, night);
     colour += star * 0.7 * hash(cell + 3.0);
   }
-  // In fog there is no sky to see.
-  gl_FragColor = vec4(mix(fog, colour, smoothstep(150.0, 1300.0, reach)), 1.0);
-}`;
+  gl_FragColor = vec4(behindFog(colour), 1.0);
+}
+#endif`;
+
+/** Rings of the dome, degrees above the horizon: close where colours change fast. */
+const RINGS = [-90, -8, 0, 0.7, 1.6, 3, 5, 8, 12, 18, 26, 36, 48, 62, 76, 90];
+const AROUND = 30;
+
+/** @returns {any} a sphere of unit vectors, z up */
+function domeGeometry() {
+  /** @type {number[]} */
+  const position = [];
+  /** @type {number[]} */
+  const index = [];
+  RINGS.forEach((degrees, ring) => {
+    const [flat, up] = [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)];
+    for (let k = 0; k <= AROUND; k++) {
+      const angle = (2 * Math.PI * k) / AROUND;
+      position.push(Math.cos(angle) * flat, Math.sin(angle) * flat, up);
+      const v = ring * (AROUND + 1) + k;
+      if (ring && k) index.push(v - 1, v, v - AROUND - 1, v - 1, v - AROUND - 1, v - AROUND - 2);
+    }
+  });
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(position), 3));
+  geometry.setIndex(index);
+  return geometry;
+}
 
 const FALL_VERTEX = /* glsl */ `
 attribute vec3 seed;
@@ -72,20 +116,27 @@ export class Sky {
   constructor(scene, light) {
     const { zenith, horizon, sun, sunColour, night, clouds, time, fog, reach } = light;
     this.light = light;
-    const material = new THREE.ShaderMaterial({
-      uniforms: { zenith, horizon, sun, sunColour, night, clouds, time, fog, reach, plain: (this.plain = { value: 0 }) },
+    this.material = new THREE.ShaderMaterial({
+      uniforms: { zenith, horizon, sun, sunColour, night, clouds, time, fog, reach },
       vertexShader: DOME_VERTEX,
       fragmentShader: DOME_FRAGMENT,
-      side: THREE.BackSide,
+      side: THREE.DoubleSide,
       depthWrite: false,
     });
-    this.dome = new THREE.Mesh(new THREE.SphereGeometry(100, 24, 12), material);
+    this.dome = new THREE.Mesh(domeGeometry(), this.material);
     this.dome.frustumCulled = false;
     // Drawn last: only where nothing else is.
     this.dome.renderOrder = 5;
     scene.add(this.dome);
     this.rain = fall(scene, light, { lines: true, speed: 9, opacity: 0.32, colour: [0.78, 0.82, 0.88] });
     this.snow = fall(scene, light, { lines: false, speed: 1.3, opacity: 0.85, colour: [1, 1, 1] });
+  }
+
+  /** Paint the sky by vertex, without clouds and stars, or by pixel with them. @param {boolean} plain */
+  setPlain(plain) {
+    if (plain === Boolean(this.material.defines.PLAIN)) return;
+    this.material.defines = plain ? { PLAIN: 1 } : {};
+    this.material.needsUpdate = true;
   }
 
   /**

@@ -28,8 +28,9 @@ class Batch {
 
   /** @param {number} size @returns {any} */
   _mesh(size) {
-    const mesh = new THREE.InstancedMesh(this.part.geometry, this.city.materials[this.part.array], size);
+    const mesh = new THREE.InstancedMesh(this.part.geometry, this.city.instancedMaterials[this.part.array], size);
     mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = false;
     this.scene.add(mesh);
     return mesh;
   }
@@ -131,6 +132,10 @@ export class Vehicles {
       }
     }
     this._rented(between);
+    for (const { name, matrix } of this.people?.inHands.shown ?? []) {
+      this._matrix.copy(matrix);
+      this._add(name, 0);
+    }
     this.signals.draw(between.time, camera.position, this._frustum, (name, matrix) => {
       this._matrix.copy(matrix);
       this._add(name, 0);

@@ -1,9 +1,12 @@
 // The 3D picture: scene, camera, renderer, and how much of it is drawn so that it stays fluent.
 
 import { THREE } from "./three.js";
+import { BuildingShade } from "./building_shade.js";
 import { makeLight, setLight } from "./light.js";
+import { setShaded } from "./materials.js";
 import { City } from "./city.js";
 import { Cameras } from "./cameras.js";
+import { Doors } from "./doors.js";
 import { Sky } from "./sky.js";
 import { People } from "./people.js";
 import { Vehicles } from "./vehicles.js";
@@ -35,7 +38,7 @@ export class View {
   constructor(canvas, source) {
     this.canvas = canvas;
     this.source = source;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance", preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, stencil: true, powerPreference: "high-performance", preserveDrawingBuffer: true });
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setClearColor(0x9fb4c6);
     const software = /swiftshader|llvmpipe|software|basic render/i.test(nameOf(this.renderer.getContext()));
@@ -52,8 +55,12 @@ export class View {
     this.vehicles = new Vehicles(this.scene, this.city, this.light, source);
     this.robots = new Robots(this.scene, this.city, source);
     this.vehicles.people = this.people;
+    this.doors = new Doors(this.scene, this.city);
     this.overlay = new Overlay(this.scene, this);
     this.happenings = new Happenings(this.scene, this);
+    /** @type {BuildingShade | null} */
+    this.shade = null;
+    this._trees = false;
     this.care = 3;
     /** Whether the level of care follows the frames a second. */
     this.adapts = true;
@@ -76,6 +83,9 @@ export class View {
     const outlook = await this.city.open(base);
     const { count, ground, tile, half } = base.manifest;
     this._heights = { data: new Float32Array(outlook, ground.offset, ground.points ** 2 * count ** 2), count, ground, tile, half };
+    this.shade = new BuildingShade(this.renderer, this.light, { half, low: this.city.lowest, side: this.city.software ? 1024 : 2048 });
+    this.shade.addBuildings(this.city.walls.map((/** @type {any} */ mesh) => mesh.geometry));
+    this.setCare(this.care);
     this.cameras.target.set(0, 0, this.groundAt({ x: 0, y: 0 }) + 1.4);
   }
 
@@ -106,7 +116,9 @@ export class View {
     this.care = Math.min(Math.max(level, 0), CARE.length - 1);
     const care = CARE[this.care];
     this.stats.care = this.care;
-    this.sky.plain.value = this.city.software && this.care < FINE ? 1 : 0;
+    const spares = this.city.software && this.care < FINE;
+    this.sky.setPlain(spares);
+    setShaded(this.light, !spares && (this.shade?.can ?? true));
     this.city.nearReach = care.tiles;
     this.people.nearReach = care.bodies;
     this.city.setReach({ near: care.things, far: care.far });
@@ -148,14 +160,25 @@ export class View {
       this.people.update(between, this.camera, this.cameras.mode === "first" ? followed?.entity : 0);
       this.vehicles.update(between, this.camera, now);
       this.robots.update(between, this.camera, now);
+      this.doors.update(between, this.camera);
     }
     if (!always && this._isStill(between, now)) return;
     this.city.showRoom(indoors ? followed.room : -1);
     this.happenings.group.visible = !indoors;
     this.city.update(this.camera);
     this.overlay.update();
+    this._castShadows();
     this.renderer.render(this.scene, this.camera);
     this._count(now);
+  }
+
+  _castShadows() {
+    if (!this.shade || !this.light.shaded) return;
+    if (!this._trees && this.city.trees.length) {
+      this.shade.addTrees(this.city.trees);
+      this._trees = true;
+    }
+    this.shade.update();
   }
 
   /**

@@ -13,7 +13,7 @@ from vico.errors import SchemaError
 from vico.viewer.sources.skylight import SKY_FIELDS, Skylight
 from vico.viewer.sources.tables import Columns, StepTables
 
-MAGIC, VERSION = 0x56, 1
+MAGIC, VERSION = 0x56, 2
 #: Flags: it answers a range; it is the newest.
 OF_RANGE, NEWEST = 1, 2
 
@@ -29,6 +29,8 @@ FRAME_COLUMNS: dict[str, dict[str, str]] = {
         "clip_time": "<i4",
         "clip": "i1",
         "clip_before": "i1",
+        "hold": "i1",
+        "hold_share": "i1",
     },
     "agents": {
         "entity": "<i4",
@@ -44,9 +46,12 @@ FRAME_COLUMNS: dict[str, dict[str, str]] = {
     },
     "robots": dict.fromkeys(("entity", "x", "y", "z", "qw", "qx", "qy", "qz"), "<i4"),
     "joints": dict.fromkeys(("entity", "joint", "angle"), "<i4"),
+    "doors": {"entrance": "<i4", "share": "i1"},
 }
+# Doors that a frame tells of at most: their number is a byte.
+_MOST_DOORS = 255
 
-# Magic, version, flags, 0; step; time; rows of each table; the range's id.
+# Magic, version, flags, doors; step; time; rows of each other table; the range's id.
 _HEAD = struct.Struct("<BBBBId5II")
 _HEAD_BYTES = _HEAD.size + 4 * SKY_FIELDS
 # Steps whose rows are looked for at once.
@@ -74,12 +79,17 @@ class Frame:
 
     def encoded(self, *, flags: int = 0, range_id: int = 0) -> bytes:
         """Return the bytes of the frame."""
-        counts = [len(self.tables[name]["entity"]) for name in FRAME_COLUMNS]
-        head = _HEAD.pack(MAGIC, VERSION, flags, 0, self.step, self.time, *counts, range_id)
+        most = {"doors": _MOST_DOORS}
+        counts = {
+            name: min(len(self.tables[name][next(iter(form))]), most.get(name, 2**31))
+            for name, form in FRAME_COLUMNS.items()
+        }
+        doors = counts.pop("doors")
+        head = _HEAD.pack(MAGIC, VERSION, flags, doors, self.step, self.time, *counts.values(), range_id)
         parts = [head, self.sky.astype("<f4").tobytes()]
         for name, form in FRAME_COLUMNS.items():
             for key, kind in form.items():
-                content = self.tables[name][key].astype(kind).tobytes()
+                content = self.tables[name][key][: most.get(name)].astype(kind).tobytes()
                 parts.append(content + bytes(-len(content) % 4))
         return b"".join(parts)
 
@@ -94,10 +104,10 @@ def decoded(content: bytes) -> tuple[Frame, int, int]:
     """
     if len(content) < _HEAD_BYTES or content[0] != MAGIC or content[1] != VERSION:
         raise SchemaError(f"frame: {len(content)} bytes are no frame of version {VERSION}")
-    _, _, flags, _, step, time, *counts, range_id = _HEAD.unpack_from(content)
+    _, _, flags, doors, step, time, *counts, range_id = _HEAD.unpack_from(content)
     sky = np.frombuffer(content, "<f4", SKY_FIELDS, _HEAD.size)
     at, tables = _HEAD_BYTES, dict[str, Columns]()
-    for (name, form), n in zip(FRAME_COLUMNS.items(), counts, strict=True):
+    for (name, form), n in zip(FRAME_COLUMNS.items(), (*counts, doors), strict=True):
         tables[name] = {}
         for key, kind in form.items():
             size = n * np.dtype(kind).itemsize
