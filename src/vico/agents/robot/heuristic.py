@@ -14,6 +14,7 @@ from vico.agents.base import Action, Info, Observation
 from vico.agents.robot.body import Stance
 from vico.agents.robot.depositor import TAKEN
 from vico.agents.robot.driving import Drive
+from vico.agents.robot.pushing import FARTHEST, Pusher
 from vico.agents.robot.sight import seen_at
 from vico.agents.robot.skill import ArmSkill
 from vico.agents.robot.team import Team, deck_spot, heard_from, says_come, told_seen, told_where
@@ -38,6 +39,9 @@ _FAR = 15.0
 _AHEAD, _WITHIN, _ABOUT = 0.75, 2.2, 1.6
 # Sides that are tried one after the other are turned by so much, rad: none comes twice.
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+# Why a thing that cannot be picked is pushed; how often at most, and how far where the destination is not near, metres.
+_NO_HOLD = ("too wide for the jaw", "out of reach", "the jaw closed on nothing", "it slipped")
+_PUSHES, _ON = 4, 0.6
 # Seconds of standing that end going along.
 _STANDS, _SPEED = 4.0, 0.03
 
@@ -49,6 +53,7 @@ class Stage(StrEnum):
     CALL = "call the person"
     SEARCH = "look for the thing"
     PICK = "pick it"
+    PUSH = "push it"
     LOAD = "put it on the carrier"
     ALONG = "go along with the carrier"
     UNLOAD = "take it off the carrier"
@@ -71,6 +76,8 @@ class Manipulator:
         Name of the carrier.
     uses_deck
         Whether things travel on the carrier's deck; else in the jaw.
+    pushes
+        Whether it pushes what its jaw cannot hold: to the destination where that is near, else to where it may.
     worker
         Picks and places; the arm's own skills if None.
     """
@@ -82,6 +89,7 @@ class Manipulator:
         *,
         carrier: str,
         uses_deck: bool = True,
+        pushes: bool = False,
         worker: ArmSkill | None = None,
     ) -> None:
         self.told, self.team, self.carrier = dict(told), team, carrier
@@ -89,6 +97,8 @@ class Manipulator:
         self.period = float(told["period"])
         self.worker: ArmSkill = ArmWorker(team.arm, period=self.period) if worker is None else worker
         self.drive = Drive(period=self.period)
+        self.pushes, self.pusher = pushes, Pusher(team.arm, period=self.period)
+        self._pushed = 0
         self.stage = Stage.GO
         self.entity = 0
         self.seen: Array | None = None
@@ -105,8 +115,8 @@ class Manipulator:
     @property
     def wants_picture(self) -> bool:
         """Whether it looks for the thing, or at what its arm is at, the next time."""
-        if self.worker.busy:
-            return self.worker.wants_picture
+        if self.worker.busy or self.pusher.busy:
+            return self.worker.wants_picture or self.pusher.wants_picture
         looks = self.stage in (Stage.CALL, Stage.SEARCH) or (self.stage is Stage.GO and self._lies_about)
         return looks and self._clock + self.period - self._looked >= _LOOKS_EVERY
 
@@ -173,13 +183,47 @@ class Manipulator:
             self._waits_to_say.append(TAKEN)
             far = _away(Stance.of(observation).position, self.told["destination"]["centre"]) > _FAR
             along = Stage.BRING if self._lies_about else Stage.FOLLOW
-            self._next(Stage.LOAD if self.uses_deck and far else along)
+            self._next(Stage.LOAD if self.uses_deck and far and not self._tips_over() else along)
             return action
         self._tries += 1
+        if self.pushes and self._pushed < _PUSHES and self.worker.why in _NO_HOLD and self._on_the_ground(observation):
+            self._next(Stage.PUSH)
+            return action
+        return self._search_anew(action)
+
+    def _search_anew(self, action: Action) -> Action:
         self.seen = None
         self.worker.fold()  # a hand left where it failed is in the way of the next try
         self._next(Stage.SEARCH)
         return action
+
+    def _push(self, observation: Observation, info: Info) -> Action:
+        """Push what could not be taken up, and look for it again; at the destination leave it."""
+        assert self.seen is not None
+        if not self._began:
+            self._began = True
+            self.pusher.push(self.entity, self.seen, self._pushed_to(Stance.of(observation).position))
+            self._pushed += 1
+        action = self.pusher.act(observation)
+        if self.pusher.busy:
+            return action
+        if isinstance(self.worker, ArmWorker):
+            self.worker.moved(self.pusher.servos)
+        there = self._lies_about and _away(self.pusher.thing, self.told["destination"]["centre"]) < _WITHIN
+        if self.pusher.outcome == "pushed" and there:
+            self._next(Stage.END)
+            return action
+        return self._search_anew(action)
+
+    def _pushed_to(self, here: Array) -> Array:
+        """Return where a thing is pushed to: the destination, or half a metre on, another way each time, ENU metres."""
+        assert self.seen is not None
+        thing, goal = self.seen[:2], np.array(self.told["destination"]["centre"][:2], np.float64)
+        if self._lies_about and _away(thing, goal) < FARTHEST and self._pushed < 2:
+            return goal
+        away = thing - here[:2]
+        turn = math.atan2(float(away[1]), float(away[0])) + _GOLDEN * self._pushed
+        return np.asarray(thing + _ON * np.array([math.cos(turn), math.sin(turn)]))
 
     def _load(self, observation: Observation, info: Info) -> Action:
         """Call the carrier, wait until it stands, and put the thing on its deck."""
@@ -195,7 +239,8 @@ class Manipulator:
             return {"type": "communicate", "text": says_come(*aside.tolist())}
         self._said += self.period
         if self._carrier_at is not None and _away(self._carrier_at.position, here.position) < _BY:
-            spot, beside = deck_spot(self.team.deck, self._carrier_at, here.position)
+            wide = 0.0 if self.worker.held is None else 2.0 * float(self.worker.held.half[0])
+            spot, beside = deck_spot(self.team.deck, self._carrier_at, here.position, wide=wide)
             self.worker.place(spot, beside=beside)
             return self.worker.act(observation)
         if self._said > _WAITS:
@@ -278,6 +323,10 @@ class Manipulator:
 
     # How it does it.
 
+    def _tips_over(self) -> bool:
+        """Return whether what is held would not stay upright on a deck that drives over kerbs."""
+        return self.worker.held is not None and self.worker.held.slender
+
     def _hear_of_it(self, seen: Array | None) -> None:
         """Go where the other robot sees the thing, unless it is in view already."""
         looks = self.stage is Stage.SEARCH or (self.stage is Stage.GO and self._lies_about)
@@ -353,12 +402,13 @@ class Manipulator:
         return {
             "worker": self.worker.state(),
             "drive": self.drive.state(),
+            "pusher": self.pusher.state(),
             "stage": str(self.stage),
             "entity": self.entity,
             "seen": None if self.seen is None else self.seen.copy(),
             "middle": self._middle.copy(),
             "seconds": [self._clock, self._looked, self._said, self._turned, self._stood],
-            "counts": [self._tries, self._place, self._around],
+            "counts": [self._tries, self._place, self._around, self._pushed],
             "began": self._began,
             "carrier": None if at is None else [at.position.copy(), at.rotation.copy()],
             "to_say": list(self._waits_to_say),
@@ -372,7 +422,8 @@ class Manipulator:
         self.seen = None if state["seen"] is None else np.array(state["seen"])
         self._middle = np.array(state["middle"])
         self._clock, self._looked, self._said, self._turned, self._stood = (float(v) for v in state["seconds"])
-        self._tries, self._place, self._around = (int(value) for value in state["counts"])
+        self._tries, self._place, self._around, self._pushed = (int(value) for value in state["counts"])
+        self.pusher.restore(state["pusher"])
         at = state["carrier"]
         self._carrier_at = None if at is None else Stance(np.array(at[0]), np.array(at[1]))
         self._waits_to_say = [str(text) for text in state["to_say"]]
@@ -387,6 +438,7 @@ _STAGES = {
     Stage.CALL: Manipulator._call,
     Stage.SEARCH: Manipulator._search,
     Stage.PICK: Manipulator._picks,
+    Stage.PUSH: Manipulator._push,
     Stage.LOAD: Manipulator._load,
     Stage.ALONG: Manipulator._along,
     Stage.UNLOAD: Manipulator._unload,

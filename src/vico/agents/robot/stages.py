@@ -19,6 +19,7 @@ class Stage(StrEnum):
     AWAY = "away"
     BACK = "back"
     CARRY = "carry"
+    INSPECT = "inspect"
 
 
 class Work(StrEnum):

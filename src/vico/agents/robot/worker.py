@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.driving import Drive
 from vico.agents.robot.following import go_along
+from vico.agents.robot.footing import reach_footing
 from vico.agents.robot.grasps import ThingBox, grasps_of, thing_box
 from vico.agents.robot.reaching import (
     Held,
@@ -24,8 +25,9 @@ from vico.agents.robot.reaching import (
     reach_spot,
     reach_thing,
     room_around,
+    seen_in_hand,
 )
-from vico.agents.robot.sight import Look, height_at, look, room_ahead
+from vico.agents.robot.sight import Look, look, room_ahead
 from vico.agents.robot.stages import Stage, Work
 from vico.agents.state import AgentState
 
@@ -115,7 +117,7 @@ class ArmWorker:
     def wants_picture(self) -> bool:
         """Whether it looks at what is around it the next time."""
         return self.busy and (
-            self.stage in (Stage.ALIGN, Stage.LOOK) or (self.stage is Stage.CARRY and self._way is None)
+            self.stage in (Stage.ALIGN, Stage.LOOK, Stage.INSPECT) or (self.stage is Stage.CARRY and self._way is None)
         )
 
     def pick(self, entity: int, position: Array, *, beside: Array | None = None) -> None:
@@ -280,10 +282,8 @@ class ArmWorker:
 
     def _plan_place(self, stance: Stance, seen: Look) -> Reach | None:
         assert self.held is not None
-        spot = stance.inside(self._target)
-        around = seen.without(self._entity)
-        spot[2] = height_at(around, spot) + 0.01
-        return reach_spot(self.body, room_around(self.body, around), self._set[:7], spot, self.held)
+        around, now = seen.without(self._entity), self._set[:7]
+        return reach_footing(self.body, around, now, stance, self._target, self.held, beside=self._beside)
 
     def _plan_offer(self, stance: Stance, seen: Look) -> Reach | None:
         assert self.held is not None
@@ -370,8 +370,17 @@ class ArmWorker:
                 return self._done()  # it stays where it is, which is free
         if not self._follow(angles):
             return self._hold()
-        if self.work is Work.PICK and not self._grips(observation, angles):
+        if self.work is not Work.PICK:
+            return self._done()
+        if not self._grips(observation, angles):
             return self._slipped()
+        self._next(Stage.INSPECT)
+        return self._hold()
+
+    def _inspect(self, observation: Mapping[str, Any], angles: Array) -> Action:
+        """Look at what is in the hand once more: on a table no more than one face of it may have been in view."""
+        assert self.held is not None
+        self.held = seen_in_hand(self.body, angles[:7], self.held, look(observation).of(self._entity))
         return self._done()
 
     # How it does it.
@@ -498,6 +507,7 @@ _STAGES = {
     Stage.AWAY: ArmWorker._away,
     Stage.BACK: ArmWorker._back,
     Stage.CARRY: ArmWorker._carry,
+    Stage.INSPECT: ArmWorker._inspect,
 }
 
 
