@@ -11,6 +11,7 @@ from grasp_trials import LIMIT, PERIOD, step
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import Stance
+from vico.agents.robot.held import is_slender
 from vico.agents.robot.team import deck_spot
 from vico.agents.robot.worker import ArmWorker
 from vico.assets.models.movable import movable_colours, movable_prototype, movable_surfaces
@@ -27,6 +28,8 @@ SORTS = ("in the jaw", "on the deck")
 LENGTH, KERB, FREE = 5.0, 0.07, 0.9
 #: How fast one drives and turns, m/s and rad/s; what shifts by more on a deck, or sinks so far in a jaw, was lost.
 SPEED, TURN, LOST = 0.6, 0.7, 0.3
+# A thing is let go of so high above a deck, and lies there if it is no farther off its spot then, metres.
+_ABOVE, _LIES = 0.03, 0.1
 _TRIES = 100_000
 _ROBOT = "robot_0"
 
@@ -93,9 +96,9 @@ def kerbs(world: World, count: int, *, seed: int) -> list[Kerb]:
 def drive(world: World, kerb: Kerb, number: int, *, seed: int) -> Driven:
     """Drive over a kerb, turn about, and back again."""
     chance = rng(seed, "grasps", "drive", number)
-    kinds, colours = sorted(fitting_kinds()), list(movable_colours())
+    sort, colours = SORTS[number % 2], list(movable_colours())
+    kinds = _kinds(sort)
     kind = kinds[number // 2 % len(kinds)]
-    sort = SORTS[number % 2]
     run = _Run(world, kerb, sort, kind, colours[int(chance.integers(len(colours)))], seed=number)
     if not run.load():
         return Driven(number, sort, kind, began=False)
@@ -108,6 +111,12 @@ def drive(world: World, kerb: Kerb, number: int, *, seed: int) -> Driven:
     return Driven(number, sort, kind, True, lost, round(shift, 4), round(run.driven - start, 1), run.crossed)
 
 
+def _kinds(sort: str) -> list[str]:
+    """Return what is carried: what would tip over on a deck, robots keep in the jaw."""
+    kinds = sorted(fitting_kinds().items())
+    return [name for name, kind in kinds if sort == SORTS[0] or not is_slender(min(kind.size[:2]) / 2, kind.size[2])]
+
+
 class _Run:
     """A robot at a kerb, and a thing."""
 
@@ -117,9 +126,9 @@ class _Run:
         self._sort, self._kerb, self._world = sort, kerb, world
         self.driven, self.crossed = 0.0, 0
         held = sort == SORTS[0]
-        self._yaw, reach = kerb.yaw, 0.75
+        reach = 0.75 if held else 1.5
         ahead = np.array([math.cos(kerb.yaw), math.sin(kerb.yaw)])
-        spot = kerb.start + reach * ahead if held else kerb.start - 2.0 * ahead
+        spot = kerb.start + reach * ahead
         self._at = np.array([*spot, float(world.height(spot))])
         size = fitting_kinds()[kind].size
 
@@ -151,11 +160,15 @@ class _Run:
         """Pick the thing, or have it lie on the deck; return whether that is so."""
         entity = self._sim.ground_truth.object_entity("thing")
         if self._sort == SORTS[1]:
-            spot = deck_spot(self._team.deck, self._stance(), self._at).spot
-            row = self._sim.state.objects.index(entity)
-            self._sim.state.objects.position[row] = spot + np.array([0.0, 0.0, 0.005])
+            objects = self._sim.state.objects
+            row = objects.index(entity)
+            size = objects.size[row]
+            spot = deck_spot(self._team.deck, self._stance(), self._at, wide=float(size[:2].min())).spot
+            # Along the deck, as an arm lays it down, and let go of a little above.
+            objects.position[row] = spot + np.array([0.0, 0.0, _ABOVE])
+            objects.set_yaw(row, self._kerb.yaw + (math.pi / 2 if size[1] > size[0] else 0.0))
             self.go(1.5)
-            return bool(self._where()[2] > spot[2] - 0.05)
+            return bool(np.linalg.norm(self._where() - spot) < _LIES)
         worker = self._worker
         worker.pick(entity, self._where())
         for _ in range(round(LIMIT / PERIOD)):

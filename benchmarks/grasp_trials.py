@@ -187,16 +187,17 @@ class Scene:
         """Put down what is held; return what came of it."""
         beside, spot = None, self.spot
         if self.target == "deck":
-            spot, beside = deck_spot(self.team.deck, self._carrier(), self._where())
+            wide = 0.0 if self.worker.held is None else 2.0 * float(self.worker.held.half[0])
+            spot, beside = deck_spot(self.team.deck, self._carrier(), self._where(), wide=wide)
         self.worker.place(spot, beside=beside)
         seconds = self._work()
         why = self.worker.why
         self._rest()
-        at, before = self._where(), self._where().copy()
+        before = self._where()
         self._rest(PERIOD)
         still = float(np.linalg.norm(self._where() - before)) < 0.02 * PERIOD
-        off, leans = float(np.hypot(*(at - spot)[:2])), self._leans()
-        low = at[2] - self._below(self.target)
+        off, leans = float(np.hypot(*(self._middle() - spot)[:2])), self._leans()
+        low = before[2] - self._below(self.target)
         cause = ""
         if why or self._pressed() > PRESSED / 2:
             cause = why or "still held"
@@ -233,6 +234,13 @@ class Scene:
     def _where(self) -> Array:
         return np.array(self.sim.ground_truth.object_position("thing"), np.float64)
 
+    def _middle(self) -> Array:
+        """Return the middle of the thing's box: where it lies on its side, that is not above its underside."""
+        objects = self.sim.state.objects
+        row = objects.index(self.entity)
+        up = matrix_of(objects.orientation[row])[:, 2]
+        return np.asarray(objects.position[row] + up * objects.size[row, 2] / 2)
+
     def _leans(self) -> float:
         row = self.sim.state.objects.index(self.entity)
         return float(math.acos(np.clip(matrix_of(self.sim.state.objects.orientation[row])[2, 2], -1.0, 1.0)))
@@ -252,5 +260,5 @@ class Scene:
     def _below(self, surface: str) -> float:
         """Return how high a surface is, metres."""
         if surface == "deck":
-            return float(self._carrier().outside(self.team.deck.centre)[2])
+            return float(self._carrier().outside((self.team.deck.recess or self.team.deck).centre)[2])
         return self.top if surface == "table" else 0.0

@@ -165,7 +165,8 @@ def _drives(rows: Sequence[Row], world: str) -> list[str]:
     missing = len(rows) - len(done)
     return [
         *lines, "", f"World: {world}. A drive: 5 m over a kerb of 7 cm or more at 0.6 m/s, half a turn at "
-        f"0.7 rad/s, and back. Not begun, for nothing was in the jaw or on the deck: {missing}.", "",
+        f"0.7 rad/s, and back. What is slender is not put on a deck. Not begun, for nothing was in the jaw or on the "
+        f"deck: {missing}.", "",
     ]  # fmt: skip
 
 

@@ -79,6 +79,17 @@ def test_a_thing_dropped_off_balance_lies_on_its_side() -> None:
     assert body.height[0] == pytest.approx(0.2, abs=0.02)
 
 
+def test_a_thing_that_is_moved_within_a_sub_step_stays_where_it_was_put() -> None:
+    sim = simulation()
+    k = add(sim, ahead(sim, 1.5, aside=1.0))
+    sim.advance(0.05)
+    assert sim.state.robots.engine.objects().present.any()
+    put = ahead(sim, 2.0, aside=-1.0)
+    sim.state.objects.position[k] = put
+    sim.advance(0.45)
+    assert sim.state.objects.position[k] == pytest.approx(put, abs=0.01)
+
+
 def test_a_thing_that_lies_and_has_no_robot_near_it_is_left_alone() -> None:
     sim = simulation()
     k = add(sim, ahead(sim, ENTER + 1.0))

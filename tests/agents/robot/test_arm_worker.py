@@ -86,6 +86,10 @@ def test_a_thing_is_picked_from_the_ground_and_put_down_elsewhere(size: tuple[fl
     assert trial.position[2] > 0.3
     assert trial.sim.state.objects.holder[0] == 0  # friction holds it
     assert trial.worker.forces > 20.0
+    before = trial.position.copy()
+    for _ in range(20):
+        trial.sim.step({"robot_0": {"type": "stop"}})
+    assert trial.position == pytest.approx(before, abs=0.006)  # what nobody moves does not creep out of the jaw
     trial.worker.place(np.array([0.5, -2.5, 0.0]))
     trial.until_done()
     assert trial.worker.outcome == "placed"

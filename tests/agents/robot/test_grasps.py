@@ -70,21 +70,27 @@ def test_what_is_high_up_is_taken_from_the_side_and_what_is_too_wide_not_at_all(
     assert grasps_of(wide, BODY) == []
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.9, 2.0, 4.0])
-def test_a_can_is_held_by_its_body_and_not_by_spout_or_handle(yaw: float) -> None:
+def shown(kind: str, at: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
+    """Return points of a thing's faces that a camera above the base sees."""
     stream = np.random.default_rng(6)
     c, s = np.cos(yaw), np.sin(yaw)
-    turn, at = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), np.array([0.65, 0.05, -0.25])
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     found = []
-    for surface in movable_surfaces("watering can", "red"):
+    for surface in movable_surfaces(kind, "red"):
         corners = surface.positions[surface.triangles].astype(np.float64) @ turn.T + at
         faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         seen_from = np.array([0.0, 0.0, 0.9]) - corners.mean(axis=1)
-        shown = (faces * seen_from).sum(axis=1) > 0.0
-        counts = np.ceil(np.linalg.norm(faces, axis=1) / 2 * 40_000 * shown).astype(int)
+        visible = (faces * seen_from).sum(axis=1) > 0.0
+        counts = np.ceil(np.linalg.norm(faces, axis=1) / 2 * 40_000 * visible).astype(int)
         share = stream.dirichlet(np.ones(3), int(counts.sum()))
         found.append(np.einsum("sk,skc->sc", share, np.repeat(corners, counts, axis=0)))
-    points = np.concatenate(found)
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.9, 2.0, 4.0])
+def test_a_can_is_held_by_its_body_and_not_by_spout_or_handle(yaw: float) -> None:
+    at = np.array([0.65, 0.05, -0.25])
+    points = shown("watering can", at, yaw)
     box = thing_box(points)
     assert box is not None
     grasps = grasps_of(box, BODY, points)
@@ -94,3 +100,15 @@ def test_a_can_is_held_by_its_body_and_not_by_spout_or_handle(yaw: float) -> Non
     assert first.opening > 0.125
     off = first.pose[:2, 3] - at[:2]
     assert np.hypot(*off) < 0.035
+
+
+def test_a_bottle_is_held_below_its_neck_and_an_umbrella_where_it_is_heavy() -> None:
+    at = np.array([0.6, 0.0, -0.1])
+    bottle = shown("water bottle", at, 0.3)
+    box = thing_box(bottle)
+    assert box is not None
+    assert grasps_of(box, BODY, bottle)[0].pose[2, 3] - at[2] < 0.225  # shoulders begin at 0.19, the neck at 0.27
+    umbrella = shown("umbrella", at, 0.0)
+    box = thing_box(umbrella)
+    assert box is not None
+    assert grasps_of(box, BODY, umbrella)[0].pose[0, 3] - at[0] < -0.1  # its canopy is on that side

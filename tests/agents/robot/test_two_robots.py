@@ -110,7 +110,7 @@ def test_a_scout_stands_once_the_thing_is_held_and_goes_with_a_person() -> None:
 def test_what_slips_out_of_the_jaw_is_looked_for_where_that_was() -> None:
     arm = Manipulator(told(), TEAM, carrier="robot_1", uses_deck=False)
     arm.stage = ErrandStage.BRING
-    arm.worker.held = Held(np.zeros((1, 3)), 0.1, 0.1, 0.05, np.eye(3), np.zeros(2))
+    arm.worker.held = Held(np.zeros((1, 3)), 0.1, 0.1, 0.05, np.eye(3), np.zeros(2), np.full(2, 0.05), 0.0)
     for _ in range(10):
         arm.act(observation((40.0, 0.0), grip=30.0), info(sees=False))
     assert arm.stage is ErrandStage.BRING

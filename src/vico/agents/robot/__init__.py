@@ -36,6 +36,6 @@ def make_robots(
     """
     if method not in METHODS:
         raise InputError(f"robot: no method called {method!r}; there are {', '.join(METHODS)}")
-    arm = Manipulator(told, team, carrier="robot_1", uses_deck=method == "heuristic")
+    arm = Manipulator(told, team, carrier="robot_1", uses_deck=method == "heuristic", pushes=method == "ours")
     carrier = Carrier("robot_0", period=float(told["period"])) if method != "ours" else Scout(told, "robot_0")
     return {"robot_0": arm, "robot_1": carrier}

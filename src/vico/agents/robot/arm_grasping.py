@@ -9,10 +9,11 @@ import numpy as np
 
 from vico.agents.robot.arm_job import FELT, STUCK, TAKES, Action, ArmJob, Array
 from vico.agents.robot.body import Stance
+from vico.agents.robot.footing import reach_footing
 from vico.agents.robot.grasps import grasps_of, thing_box
-from vico.agents.robot.held import came_off, held_thing
+from vico.agents.robot.held import came_off, held_thing, seen_in_hand
 from vico.agents.robot.reaching import Reach, carry_way, reach_spot, reach_thing, room_around
-from vico.agents.robot.sight import Look, height_at, look
+from vico.agents.robot.sight import Look, look
 from vico.agents.robot.stages import Stage, Work
 
 # Seconds for fingers to close, and after which a hand that still trembles where it leans on something is as far as it
@@ -53,10 +54,8 @@ def _plan_pick(job: ArmJob, stance: Stance, seen: Look) -> Reach | None:
 
 def _plan_place(job: ArmJob, stance: Stance, seen: Look) -> Reach | None:
     assert job.held is not None
-    spot = stance.inside(job.target)
     around = seen.without(job.entity)
-    spot[2] = height_at(around, spot) + 0.01
-    return reach_spot(job.body, room_around(job.body, around), job.servos[:7], spot, job.held)
+    return reach_footing(job.body, around, job.servos[:7], stance, job.target, job.held, beside=job.beside)
 
 
 def _plan_offer(job: ArmJob, stance: Stance, seen: Look) -> Reach | None:
@@ -141,8 +140,18 @@ def carry(job: ArmJob, observation: Mapping[str, Any], angles: Array) -> Action:
             return job.finish()  # it stays where it is, which is free
     if not job.follow(angles):
         return job.hold()
-    if job.work is Work.PICK and not job.grips(observation, angles):
+    if job.work is not Work.PICK:
+        return job.finish()
+    if not job.grips(observation, angles):
         return _slipped(job)
+    job.enter(Stage.INSPECT)
+    return job.hold()
+
+
+def inspect(job: ArmJob, observation: Mapping[str, Any], angles: Array) -> Action:
+    """Look at what is in the hand once more: on a table no more than one face of it may have been in view."""
+    assert job.held is not None
+    job.held = seen_in_hand(job.body, angles[:7], job.held, look(observation).of(job.entity))
     return job.finish()
 
 

@@ -71,7 +71,9 @@ class DeckTrip:
         self._waited += self._period
         at = self._carrier_at
         if at is not None and metres_apart(at.position, here.position) < _BY:
-            spot, beside = deck_spot(self._team.deck, at, here.position)
+            held = self._worker.held
+            wide = 0.0 if held is None else 2.0 * float(held.half[0])
+            spot, beside = deck_spot(self._team.deck, at, here.position, wide=wide)
             self._worker.place(spot, beside=beside)
             return DeckStep(self._worker.act(observation))
         return DeckStep({"type": "stop"}, ErrandStage.BRING if self._waited > _WAITS else None)

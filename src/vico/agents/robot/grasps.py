@@ -20,6 +20,10 @@ ROOM, BACK, PADS = 0.02, 0.13, 0.035
 _TILTS, _SLANTS = (0.0, 0.25, -0.25, 0.5, -0.5), (0.35, 0.0, 0.8)
 # A thing this high is taken from the side, too, metres; cosine of the angle off the way from the base.
 _TALL, _ASIDE = 0.14, 0.5
+# Share of the largest width within reach of pads that counts as that.
+_AS_WIDE = 0.95
+# From its top the pads' middle is so deep, from and to, metres: below that the palm touches it.
+_SHALLOW, _DEEP = 0.06, 0.1
 # Above this a hand cannot come from above, in the base's frame, metres.
 _TOO_HIGH = 0.75
 # Fewer points do not tell a thing's size; of the rest so many at each end are left out as strays.
@@ -121,7 +125,7 @@ def grasps_of(box: ThingBox, body: ArmBody, points: Array | None = None) -> list
 
 def _from_above(box: ThingBox, body: ArmBody, seen: Array) -> list[Grasp]:
     # The pads hold the upper part of what is high, and do not touch the ground beside what is low.
-    grip = max(box.high - 0.06, box.low + PADS + _OFF)
+    grip = max(_grip_height(box, seen), box.low + PADS + _OFF)
     found: list[Grasp] = []
     for axis in sorted((0, 1), key=lambda axis: _opening(box, axis)):
         opening = _opening(box, axis)
@@ -130,7 +134,8 @@ def _from_above(box: ThingBox, body: ArmBody, seen: Array) -> list[Grasp]:
         across, along = box.axes[axis], box.axes[1 - axis]
         first, last = _wide_part(box, seen, axis, low=grip - PADS)
         room = min(_PAD_WIDE, (last - first) / 2)
-        level = box.centre + along * min(max(0.0, first + room), last - room)
+        # In the middle of that part is most of what it weighs: held off it, a long thing swings in the jaw.
+        level = box.centre + along * min(max((first + last) / 2, first + room), last - room)
         for tilt in _TILTS:
             for sign in (1.0, -1.0):
                 pose = downward(np.array([*level, grip]), across * sign, tilt)
@@ -168,6 +173,21 @@ def _opening(box: ThingBox, axis: int) -> float:
     """Return how far each finger is off the middle before it closes: more where the thing's far side is hidden."""
     away = box.centre / max(float(np.hypot(*box.centre)), 1e-6)
     return float(box.half[axis]) + ROOM + _HIDDEN * abs(float(box.axes[axis] @ away))
+
+
+def _grip_height(box: ThingBox, seen: Array) -> float:
+    """Return how high the pads' middle is from above: as high as the thing is about as wide as anywhere in reach.
+
+    A bottle is held below its neck, a bag below its handles.
+    """
+    heights = np.arange(_SHALLOW, _DEEP + 1e-9, 0.01)
+    widths = np.zeros(len(heights))
+    for k, height in enumerate((box.high - heights).tolist()):
+        slice_ = seen[np.abs(seen[:, 2] - height) < _BIN]
+        if len(slice_) >= _FEWEST:
+            widths[k] = float(np.ptp(slice_[:, :2] @ box.axes.T, axis=0).max())
+    wide = np.flatnonzero(widths >= _AS_WIDE * widths.max())
+    return float(box.high - heights[wide[0]])
 
 
 def _wide_part(box: ThingBox, seen: Array, axis: int, *, low: float, high: float = math.inf) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
-from vico.agents.robot.grasps import ThingBox
+from vico.agents.robot.grasps import ThingBox, thing_box
 from vico.kinematics.limbs import Limbs, with_held
 
 Array = NDArray[np.float64]
@@ -19,6 +19,9 @@ _THERE = 0.03  # metres that a hand may miss the end of its way by
 # Metres before a person, and above the ground, that things are held out to them.
 _ARM_LENGTH, _HELD_OUT = 0.5, 0.75
 _BALL = 0.018  # metres: radius of the balls that a held thing is made of
+# Half the width of what is slender, as a share of its height; fewer points are no look; farther off, metres, its middle
+# is not where it was taken to be, but the thing another one.
+_SLENDER, _GLANCE, _SHIFTED = 0.18, 40, 0.2
 
 
 class Held(NamedTuple):
@@ -37,6 +40,10 @@ class Held(NamedTuple):
         stands as it stood.
     middle
         From the hand to the thing's middle as it closed, level, in the base's frame, metres, shape ``(2,)``.
+    half
+        Half its sides on the ground, the shorter first, metres, shape ``(2,)``.
+    heading
+        Of its longer side as the hand closed, in the base's frame, rad.
     """
 
     points: Array
@@ -45,10 +52,23 @@ class Held(NamedTuple):
     opening: float
     rotation: Array
     middle: Array
+    half: Array
+    heading: float
+
+    @property
+    def slender(self) -> bool:
+        """Whether it tips over where what it stands on drives: high for how wide it is."""
+        return is_slender(float(self.half[0]), self.below + self.above - _CLEAR)
 
     def on(self, limbs: Limbs) -> Limbs:
         """Return limbs with the thing."""
         return with_held(limbs, self.points, _BALL)
+
+    def box(self) -> ThingBox:
+        """Return the box round it, seen from between the pads, along the base as the hand closed."""
+        c, s = math.cos(self.heading), math.sin(self.heading)
+        axes = np.array([[-s, c], [c, s]])
+        return ThingBox(self.middle, axes, self.half, -self.below, self.above - _CLEAR)
 
     def turned(self, turn: float) -> Array:
         """Return the rotation of the hand with the thing turned about the vertical, rad, shape ``(3, 3)``."""
@@ -58,6 +78,11 @@ class Held(NamedTuple):
         """Return the pose of the hand with which the middle of the thing's underside is at a spot."""
         off = _about_vertical(turn) @ np.array([*self.middle, -self.below])
         return np.column_stack([self.turned(turn), spot - off])
+
+
+def is_slender(half: float, height: float) -> bool:
+    """Return whether what is so wide, half of it, and so high, metres, tips over where what it stands on drives."""
+    return half < _SLENDER * height
 
 
 def came_off(body: ArmBody, now: Array, there: Array, held: Held) -> bool:
@@ -85,16 +110,36 @@ def held_thing(body: ArmBody, angles: Array, box: ThingBox, opening: float) -> H
         Of each finger since, metres.
     """
     pose = body.hand(angles)
-    joint = pose[:, 3] - body.chain.grip * pose[:, 2]
-    points = (box.points(_BALL, 3.0 * _BALL) - joint) @ pose[:, :3]
-    return Held(
-        points,
-        float(pose[2, 3] - box.low),
-        float(max(box.high - pose[2, 3], 0.0)) + _CLEAR,
-        opening,
-        pose[:, :3].copy(),
-        box.centre - pose[:2, 3],
-    )
+    low, high = box.low - float(pose[2, 3]), box.high - float(pose[2, 3])
+    return _held(body, pose[:, :3].copy(), box._replace(centre=box.centre - pose[:2, 3], low=low, high=high), opening)
+
+
+def seen_in_hand(body: ArmBody, angles: Array, held: Held, points: Array) -> Held:
+    """Return what a hand holds, after another look at it: where one face of it was seen, others come into view.
+
+    Parameters
+    ----------
+    angles
+        Of the arm now, rad.
+    points
+        Of the thing, in the base's frame, metres, shape ``(n, 3)``.
+    """
+    pose = body.hand(angles)
+    # As it stood when the hand closed, seen from the hand.
+    stood = (points - pose[:, 3]) @ pose[:, :3] @ held.rotation.T
+    known = held.box()
+    box = thing_box(np.vstack([stood, known.points(0.0, _BALL)]))
+    if len(points) < _GLANCE or box is None or float(np.abs(box.centre - known.centre).max()) > _SHIFTED:
+        return held
+    return _held(body, held.rotation, box._replace(low=min(box.low, known.low)), held.opening)
+
+
+def _held(body: ArmBody, rotation: Array, box: ThingBox, opening: float) -> Held:
+    """Return a thing in the jaw by the box round it, seen from between the pads, along the base as the hand closed."""
+    points = box.points(_BALL, 3.0 * _BALL) @ rotation + np.array([0.0, 0.0, body.chain.grip])
+    heading = math.atan2(float(box.axes[1, 1]), float(box.axes[1, 0]))
+    above = max(box.high, 0.0) + _CLEAR
+    return Held(points, -box.low, above, opening, rotation, box.centre.copy(), box.half.copy(), heading)
 
 
 def _about_vertical(turn: float) -> Array:

@@ -13,6 +13,7 @@ from vico.agents.robot.body import Stance, metres_apart
 from vico.agents.robot.deck_trip import AT_GOAL, DeckStep, DeckTrip
 from vico.agents.robot.depositor import TAKEN
 from vico.agents.robot.driving import Drive
+from vico.agents.robot.push_trip import PushTrip
 from vico.agents.robot.put_spots import PLACES, goal_about, spot_ahead
 from vico.agents.robot.skill import ArmSkill
 from vico.agents.robot.stages import ErrandStage as Stage
@@ -45,6 +46,8 @@ class Manipulator:
         Name of the carrier.
     uses_deck
         Whether things travel on the carrier's deck; else in the jaw.
+    pushes
+        Whether it pushes what its jaw cannot hold.
     worker
         Picks and places; the arm's own skills if None.
     """
@@ -56,6 +59,7 @@ class Manipulator:
         *,
         carrier: str,
         uses_deck: bool = True,
+        pushes: bool = False,
         worker: ArmSkill | None = None,
     ) -> None:
         self.told, self.team, self.carrier = dict(told), team, carrier
@@ -66,6 +70,7 @@ class Manipulator:
         self.stage = Stage.GO
         self.search = ThingSearch(told)
         self.deck = DeckTrip(team, self.worker, self.drive, period=self.period)
+        self.pushes, self.push = pushes, PushTrip(told, team.arm, self.worker, period=self.period)
         self._said = self._stood = 0.0
         self._tries = self._around = 0
         self._began = False
@@ -76,8 +81,8 @@ class Manipulator:
     @property
     def wants_picture(self) -> bool:
         """Whether it looks for the thing, or at what its arm is at, the next time."""
-        if self.worker.busy:
-            return self.worker.wants_picture
+        if self.worker.busy or self.push.busy:
+            return self.worker.wants_picture or self.push.wants_picture
         looks = self.stage in (Stage.CALL, Stage.SEARCH) or (self.stage is Stage.GO and self._lies_about)
         return looks and self.search.is_due
 
@@ -139,9 +144,30 @@ class Manipulator:
             self._waits_to_say.append(TAKEN)
             far = metres_apart(Stance.of(observation).position, self.told["destination"]["centre"]) > _FAR
             along = Stage.BRING if self._lies_about else Stage.FOLLOW
-            self._next(Stage.LOAD if self.uses_deck and far else along)
+            tips_over = self.worker.held is not None and self.worker.held.slender
+            self._next(Stage.LOAD if self.uses_deck and far and not tips_over else along)
             return action
         self._tries += 1
+        if self.pushes and self.push.helps and self.search.lies_low(self._ground(observation)):
+            self._next(Stage.PUSH)
+            return action
+        return self._search_anew(action)
+
+    def _pushes(self, observation: Observation, info: Info) -> Action:
+        """Push what could not be taken up, and look for it again; at the destination leave it."""
+        if not self._began:
+            self._began = True
+            assert self.search.seen is not None
+            self.push.begin(self.search.entity, self.search.seen, Stance.of(observation).position)
+        action = self.push.act(observation)
+        if self.push.busy:
+            return action
+        if not self.push.is_there:
+            return self._search_anew(action)
+        self._next(Stage.END)
+        return action
+
+    def _search_anew(self, action: Action) -> Action:
         self.search.seen = None
         self.worker.fold()  # a hand left where it failed is in the way of the next try
         self._next(Stage.SEARCH)
@@ -269,6 +295,7 @@ class Manipulator:
             "counts": [self._tries, self._around],
             "began": self._began,
             "deck": self.deck.state(),
+            "push": self.push.state(),
             "to_say": list(self._waits_to_say),
         }
 
@@ -281,6 +308,7 @@ class Manipulator:
         self._said, self._stood = (float(value) for value in state["seconds"])
         self._tries, self._around = (int(value) for value in state["counts"])
         self.deck.restore(state["deck"])
+        self.push.restore(state["push"])
         self._waits_to_say = [str(text) for text in state["to_say"]]
 
 
@@ -289,6 +317,7 @@ _STAGES = {
     Stage.CALL: Manipulator._call,
     Stage.SEARCH: Manipulator._search,
     Stage.PICK: Manipulator._picks,
+    Stage.PUSH: Manipulator._pushes,
     Stage.LOAD: Manipulator._load,
     Stage.ALONG: Manipulator._along,
     Stage.UNLOAD: Manipulator._unload,

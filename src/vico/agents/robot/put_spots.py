@@ -14,8 +14,10 @@ Array = NDArray[np.float64]
 
 #: Places round a middle that are tried one after the other.
 PLACES = 6
-# Things are put down so far ahead, within so much of the middle of the destination, and come to from about it, metres.
-_AHEAD, _WITHIN, _ABOUT = 0.75, 2.2, 1.6
+#: Things are put down within so much of the middle of the destination, metres.
+WITHIN = 2.2
+# So far ahead things are put down, and come to from about the middle, metres.
+_AHEAD, _ABOUT = 0.75, 1.6
 
 
 def goal_about(centre: Sequence[float], number: int) -> Array:
@@ -41,6 +43,6 @@ def spot_ahead(centre: Sequence[float], here: Stance, *, stand: float, tries: in
     ahead = towards / away if away > 0.3 else here.rotation[:2, 0]
     c, s = math.cos(0.6 * tries), math.sin(0.6 * tries)
     ahead = np.array([c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1]])
-    reach = min(max(away - _WITHIN, _AHEAD), max(away, _AHEAD))
+    reach = min(max(away - WITHIN, _AHEAD), max(away, _AHEAD))
     spot = here.position[:2] + ahead * reach
     return np.array([*spot, here.position[2] - stand])

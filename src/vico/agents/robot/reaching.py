@@ -30,7 +30,8 @@ _NEARER = (0.0, -0.01, -0.02, _CLOSE)
 # Where things are carried: hand in the base's frame, the first that can be reached.
 _CARRY = ((0.46, -0.17, 0.78), (0.50, 0.0, 0.70), (0.42, -0.25, 0.70))
 _OVER = 0.10  # metres above what it is put on that a thing is brought near
-_TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))  # of what is held, about the vertical
+#: Turns of what is held about the vertical, rad.
+TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))
 
 
 class Reach(NamedTuple):
@@ -92,19 +93,23 @@ def reach_thing(
     return None
 
 
-def reach_spot(body: ArmBody, room: Room, now: Array, spot: Array, held: Held) -> Reach | None:
+def reach_spot(
+    body: ArmBody, room: Room, now: Array, spot: Array, held: Held, turns: Sequence[float] = TURNS
+) -> Reach | None:
     """Return ways that bring a held thing's underside to a spot, and the empty hand back up; None without one.
 
     Parameters
     ----------
     spot
         In the base's frame, metres, shape ``(3,)``.
+    turns
+        Of the thing about the vertical since it was taken up that may be, those to be preferred first, rad.
     """
     limbs = held.on(body.limbs(held.opening))
     arm = Arm(body.chain, limbs, room, GAP)
     # Swung about, things turn in the jaw: ways on which they stay level come first.
     for level, lift in product((True, False), _LIFTS):
-        for number, turn in enumerate(_TURNS):
+        for number, turn in enumerate(turns):
             pose = held.pose_over(spot, turn)
             above = pose.copy()
             above[2, 3] += lift
@@ -127,13 +132,13 @@ def carry_way(body: ArmBody, room: Room, now: Array, held: Held | None, *, openi
     if held is None:
         return _way(arm, now, body.rest)
     for place in _CARRY:
-        for turn in _TURNS:
+        for turn in TURNS:
             goal = np.column_stack([held.turned(turn), place])
             way = _level_way(arm, body, now, goal)
             if way is not None:
                 return way
     for place in _CARRY:
-        goals = [np.column_stack([held.turned(turn), place]) for turn in _TURNS]
+        goals = [np.column_stack([held.turned(turn), place]) for turn in TURNS]
         found = free_reach(arm, goals, now, posture=body.rest)
         way = None if found is None else _way(arm, now, found[0])
         if way is not None:

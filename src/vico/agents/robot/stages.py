@@ -19,6 +19,7 @@ class Stage(StrEnum):
     AWAY = "away"
     BACK = "back"
     CARRY = "carry"
+    INSPECT = "inspect"
 
 
 class Work(StrEnum):
@@ -38,6 +39,7 @@ class ErrandStage(StrEnum):
     CALL = "call the person"
     SEARCH = "look for the thing"
     PICK = "pick it"
+    PUSH = "push it"
     LOAD = "put it on the carrier"
     ALONG = "go along with the carrier"
     UNLOAD = "take it off the carrier"

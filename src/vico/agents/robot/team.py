@@ -18,16 +18,27 @@ _NUMBER = r"(-?\d+(?:\.\d+)?)"
 _HERE = re.compile(rf"^I stand at {_NUMBER} {_NUMBER} {_NUMBER}, heading {_NUMBER}\.$")
 _SEEN = re.compile(rf"^I see it at {_NUMBER} {_NUMBER} {_NUMBER}\.$")
 _COME = re.compile(rf"^Come to {_NUMBER} {_NUMBER}\.$")
-# Things lie so far from the edge of a deck that the arm reaches over, metres.
-_FROM_EDGE = 0.17
+# Things lie so far from the edge of a deck that the arm reaches over, and off its rails, metres.
+_FROM_EDGE, _OFF_RAILS = 0.17, 0.02
 
 
 class Deck(NamedTuple):
-    """A carrier's deck: its middle in the frame of the base, length along x and width along y, metres."""
+    """A carrier's deck.
+
+    Attributes
+    ----------
+    centre
+        Its middle in the frame of the base, metres, shape ``(3,)``.
+    length, width
+        Along x and y of that frame, metres.
+    recess
+        The lower part between rails; None where it is level all over.
+    """
 
     centre: Array
     length: float
     width: float
+    recess: Deck | None = None
 
 
 class Team(NamedTuple):
@@ -38,19 +49,37 @@ class Team(NamedTuple):
 
 
 class DeckSpot(NamedTuple):
-    """Where to put something on a deck, ENU metres, and the unit vector to the side from which it is reached."""
+    """Where to put something on a deck.
+
+    Attributes
+    ----------
+    spot
+        For the middle of its underside, ENU metres, shape ``(3,)``.
+    beside
+        Unit vector to the side from which it is reached; the thing lies along the deck, across to it, shape ``(2,)``.
+    """
 
     spot: Array
     beside: Array
 
 
-def deck_spot(deck: Deck, carrier: Stance, near: Array) -> DeckSpot:
-    """Return where a deck is reached from the side that is nearer to a point, ENU metres."""
+def deck_spot(deck: Deck, carrier: Stance, near: Array, *, wide: float = 0.0) -> DeckSpot:
+    """Return where a deck is reached from the side that is nearer to a point, ENU metres.
+
+    Parameters
+    ----------
+    wide
+        Of the thing across the deck, metres: between rails it stands on neither of them.
+    """
     across = carrier.rotation[:, 1]
     side = 1.0 if float((near - carrier.position)[:2] @ across[:2]) > 0.0 else -1.0
-    inside = np.array([0.0, side * (deck.width / 2 - _FROM_EDGE), 0.0])
+    floor, off = deck.centre, deck.width / 2 - _FROM_EDGE
+    if deck.recess is not None:
+        room = deck.recess.width / 2 - _OFF_RAILS - wide / 2
+        # What is wider than the recess lies on both rails.
+        floor, off = (deck.recess.centre, min(off, room)) if room > 0.0 else (deck.centre, 0.0)
     beside = side * across[:2] / max(float(np.hypot(*across[:2])), 1e-6)
-    return DeckSpot(carrier.outside(deck.centre + inside), beside)
+    return DeckSpot(carrier.outside(floor + np.array([0.0, side * off, 0.0])), beside)
 
 
 def says_where(stance: Stance) -> str:

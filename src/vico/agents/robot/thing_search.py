@@ -28,9 +28,15 @@ _LOW = 0.2
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
-def side_of_try(number: int) -> Array:
-    """Return the side of a thing from which it is tried, a unit vector on the map, shape ``(2,)``."""
-    turn = _GOLDEN * number
+def side_of_try(number: int, first: float = 0.0) -> Array:
+    """Return the side of a thing from which it is tried, a unit vector on the map, shape ``(2,)``.
+
+    Parameters
+    ----------
+    first
+        Heading of the side that is tried first, rad.
+    """
+    turn = first + _GOLDEN * number
     return np.array([math.cos(turn), math.sin(turn)])
 
 

@@ -94,7 +94,8 @@ class ArmWorker:
     def wants_picture(self) -> bool:
         """Whether it looks at what is around it the next time."""
         stage = self._job.stage
-        return self.busy and (stage in (Stage.ALIGN, Stage.LOOK) or (stage is Stage.CARRY and self._job.way is None))
+        looks = stage in (Stage.ALIGN, Stage.LOOK, Stage.INSPECT) or (stage is Stage.CARRY and self._job.way is None)
+        return self.busy and looks
 
     def pick(self, entity: int, position: Array, *, beside: Array | None = None) -> None:
         """Begin to pick a thing up that is about at a position, ENU metres.
@@ -200,6 +201,7 @@ _STAGES: dict[Stage, Callable[[ArmJob, Mapping[str, Any], Array], Action]] = {
     Stage.AWAY: grasping.away,
     Stage.BACK: coming.back,
     Stage.CARRY: grasping.carry,
+    Stage.INSPECT: grasping.inspect,
 }
 
 

@@ -112,6 +112,14 @@ def _wheel() -> list[Surface]:
     return joined(parts)
 
 
+def _fittings() -> list[Surface]:
+    """Return what physics lets things lie on and bump into, and the manufacturer's meshes leave out."""
+    plates = [box((0.81, 0.1, 0.012), (0, sign * 0.25, 0.2), colour=_YELLOW) for sign in (1, -1)]  # over the wheels
+    lid = box((0.808, 0.414, 0.012), (0, 0, 0.224), colour=_YELLOW)
+    foot = cylinder(0.022, 0.07, sides=12, colour=_BLACK, centre=(0.26, 0, 0.25))  # of the camera
+    return [*plates, lid, foot, box((0.05, 0.12, 0.035), (0.262, 0, 0.335), colour=_GREY)]
+
+
 def _own_shapes() -> dict[str, list[Surface]]:
     side = [
         (-0.40, 0.02),
@@ -125,19 +133,16 @@ def _own_shapes() -> dict[str, list[Surface]]:
     ]
     base = [extrusion(side, 0.42, colour=_YELLOW)]
     base.append(box((0.78, 0.43, 0.05), (0, 0, 0.115), colour=_BLACK))  # the band above the wheels
-    base.append(box((0.812, 0.414, 0.012), (0, 0, 0.217), colour=_YELLOW))
     for sign in (1, -1):
-        base.append(box((0.81, 0.1, 0.012), (0, sign * 0.25, 0.2), colour=_YELLOW))  # the deck over the wheels
         base.append(box((0.545, 0.028, 0.028), (0, sign * 0.196, 0.237), colour=_DARK))  # user rails
         base.append(box((0.02, 0.534, 0.028), (sign * 0.485, 0, 0.091), colour=_DARK))  # bumpers
         for y in (-0.2, 0.2):
             base.append(box((0.09, 0.025, 0.025), (sign * 0.44, y, 0.091), colour=_DARK))
     base.append(box((0.028, 0.42, 0.028), (0.26, 0, 0.237), colour=_DARK))
     base.append(box((0.028, 0.42, 0.028), (-0.26, 0, 0.237), colour=_DARK))
-    base.append(box((0.09, 0.14, 0.004), (-0.33, 0, 0.225), colour=_BLACK))  # the panel
-    base.append(cylinder(0.018, 0.02, sides=10, colour=(200, 30, 30), centre=(-0.35, 0.15, 0.223)))  # emergency stop
-    base.append(cylinder(0.022, 0.07, sides=12, colour=_BLACK, centre=(0.26, 0, 0.25)))  # the camera's foot
-    base.append(box((0.05, 0.12, 0.035), (0.262, 0, 0.335), colour=_GREY))
+    base.append(box((0.09, 0.14, 0.004), (-0.33, 0, 0.232), colour=_BLACK))  # the panel
+    base.append(cylinder(0.018, 0.02, sides=10, colour=(200, 30, 30), centre=(-0.35, 0.15, 0.23)))  # emergency stop
+    base += _fittings()
     wheel = _wheel()
     return {"base": joined(base)} | dict.fromkeys(WHEELS, wheel)
 
@@ -163,8 +168,8 @@ def husky(packs: bool = True) -> RobotModel:
         control_period=0.02,
         sensors=Sensors(contacts=("base", *WHEELS), camera=(0.29, 0.0, 0.335), battery=True),
         battery=BATTERY,
-        # The rails' tops, behind the camera's mast.
-        deck=DeckModel((-0.095, 0.0, 0.252), 0.63, 0.62),
+        # The rails' tops, behind the camera's mast; between the rails is the lid of the chassis.
+        deck=DeckModel((-0.095, 0.0, 0.252), 0.63, 0.62, DeckModel((-0.0045, 0.0, 0.23), 0.483, 0.364)),
         stand=_STAND,
         half_length=0.495,
         half_width=0.3425,
@@ -172,5 +177,5 @@ def husky(packs: bool = True) -> RobotModel:
         grade=0.5,
         lookahead=0.9,
         arrival=0.4,
-        shapes=meshes or _own_shapes(),
+        shapes=_own_shapes() if meshes is None else {**meshes, "base": joined([*meshes["base"], *_fittings()])},
     )

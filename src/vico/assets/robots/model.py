@@ -144,11 +144,14 @@ class DeckModel:
         Middle of its surface in the frame of the body, metres.
     length, width
         Extents along the body's x and y, metres.
+    recess
+        The lower part of it between rails; None where it is level all over.
     """
 
     centre: tuple[float, float, float]
     length: float
     width: float
+    recess: DeckModel | None = None
 
 
 class ControllerSettings(Protocol):

@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.agents.robot.body import ArmBody
 from vico.agents.robot.team import Deck, Team
-from vico.assets.robots import MobileManipulator, RobotModel
+from vico.assets.robots import DeckModel, MobileManipulator, RobotModel
 from vico.errors import InputError
 from vico.kinematics.arm import Chain
 from vico.kinematics.limbs import Jaw
@@ -53,4 +53,9 @@ def team_of(manipulator: RobotModel, carrier: RobotModel) -> Team:
     deck = carrier.deck
     if deck is None:
         raise InputError(f"{carrier.title} has no deck; take husky")
-    return Team(arm_body(manipulator), Deck(np.array(deck.centre), deck.length, deck.width))
+    return Team(arm_body(manipulator), _deck(deck))
+
+
+def _deck(deck: DeckModel) -> Deck:
+    recess = None if deck.recess is None else _deck(deck.recess)
+    return Deck(np.array(deck.centre), deck.length, deck.width, recess)

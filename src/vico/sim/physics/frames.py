@@ -27,7 +27,7 @@ class FrameNeeds:
     fallen
         A robot lies on the ground, or gets up: limbs are thrown about.
     manipulation
-        A robot that can hold things is there.
+        A robot's hand is at work, or holds a thing.
     loose_objects
         A free rigid object moves.
     """

@@ -180,6 +180,12 @@ class LooseObjects:
         points = np.column_stack([x + c * u - s * v, y + s * u + c * v, np.full(len(u), z + height)])
         return self._engine.clearance_below(points) - height
 
+    def _moved(self, k: int) -> bool:
+        """Return whether somebody else has written a thing's pose since it was last seen or written."""
+        objects = self._objects
+        stays = np.array_equal(objects.position[k], self._position[k])
+        return not (stays and np.array_equal(objects.orientation[k], self._orientation[k]))
+
     @property
     def moving(self) -> bool:
         """Whether physics moves any of them."""
@@ -196,6 +202,8 @@ class LooseObjects:
         motion, objects = self._engine.objects(), self._objects
         for slot in taken:
             k = objects.index(int(self.entity[slot]))
+            if self._moved(k):
+                continue  # by somebody else, within a sub-step: `update` takes it from there
             up = matrix_of(motion.quaternion[slot])[:, 2]
             objects.position[k] = motion.position[slot] - up * objects.size[k, 2] / 2
             objects.orientation[k] = motion.quaternion[slot]

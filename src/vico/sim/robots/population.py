@@ -336,9 +336,23 @@ class RobotPopulation:
         return FrameNeeds(
             motor_commands=_MOTORS in arrays.mode.tolist(),
             fallen=_FALLEN in arrays.status.tolist(),
-            manipulation=any(work is not None and work.busy for work in self.run.work),
+            manipulation=any(work is not None and work.busy for work in self.run.work) or self._holds_things(),
             loose_objects=self._loose.moving,
         )
+
+    def _holds_things(self) -> bool:
+        """Return whether a finger touches a thing: in soft friction what a jaw holds would creep out of it."""
+        if not self._loose.entity.any():
+            return False
+        contacts = self.engine.contacts()
+        for work in self.run.work:
+            if work is None:
+                continue
+            for robot in work.robots.tolist():
+                links = self.engine.link_names(robot)
+                if any(contacts.objects_at(robot, links.index(name)) for name in work.model.sensors.contacts):
+                    return True
+        return False
 
     def set_grip(self, grip: float) -> None:
         """Have robots grip the ground with a share of what they do on dry ground, 0..1; told before every sub-step."""

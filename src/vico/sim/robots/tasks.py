@@ -41,7 +41,8 @@ _DONE = {Kind.PICK: "picked", Kind.PLACE: "placed", Kind.OFFER: "handed_over"}
 _ARM_LENGTH, _HELD_OUT = 0.45, 0.95
 _LOW = 0.05  # metres below where things are carried that make a hand low
 _GRIP_TIME, _STALE, _SETTLED = 1.2, 25.0, 0.02
-_REACH = 1.5  # metres from the base's middle in which what is in the hand can be
+# Metres from the base's middle in which what is in the hand can be, and that the hand may be out of its box.
+_REACH, _ABOUT = 1.5, 0.05
 _PEOPLE = 0.9  # metres ahead of the base in which nobody may be
 
 
@@ -446,8 +447,9 @@ def _depth_below_hand(run: RobotRun, robot: int, work: Work, objects: MovableObj
     poses = np.empty((7, 3)), np.empty((7, 3)), np.empty((3, 4))
     hand_pose(work.chain, run.engine.joints(robot)[0][:7].copy(), *poses)
     hand = apply_matrix(poses[2][:, 3], base.rotation) + base.position
-    middle = objects.position[k] + matrix_of(objects.orientation[k])[:, 2] * objects.size[k, 2] / 2
-    if float(np.hypot(*(middle - hand)[:2])) > 0.15 or abs(float(middle[2] - hand[2])) > 0.25:
+    lies, half = matrix_of(objects.orientation[k]), objects.size[k] / 2
+    middle = objects.position[k] + lies[:, 2] * half[2]
+    # Long things are not held by their middle.
+    if np.any(np.abs(apply_matrix(hand - middle, lies.T)) > half + _ABOUT):
         return None
-    half = np.abs(matrix_of(objects.orientation[k])[2]) * objects.size[k] / 2
-    return float(hand[2] - (middle[2] - half.sum()))
+    return float(hand[2] - (middle[2] - (np.abs(lies[2]) * half).sum()))
