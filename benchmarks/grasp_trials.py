@@ -172,8 +172,7 @@ class Scene:
     def pick(self) -> dict[str, Any]:
         """Pick the thing; return what came of it."""
         self.worker.pick(self.entity, self.at)
-        seconds = self._work()
-        ended, why = self.worker.outcome, self.worker.why
+        seconds, ended, why = self._work()
         self._rest()
         moved = float(np.linalg.norm(self._where() - self.at))
         picked = moved > MOVED and self._clear() > UP and self._pressed() > PRESSED
@@ -190,8 +189,7 @@ class Scene:
             wide = 0.0 if self.worker.held is None else 2.0 * float(self.worker.held.half[0])
             spot, beside = deck_spot(self.team.deck, self._carrier(), self._where(), wide=wide)
         self.worker.place(spot, beside=beside)
-        seconds = self._work()
-        why = self.worker.why
+        seconds, _, why = self._work()
         self._rest()
         before = self._where()
         self._rest(PERIOD)
@@ -212,15 +210,14 @@ class Scene:
             "leans": round(leans, 3),
         }  # fmt: skip
 
-    def _work(self) -> float:
-        """Have the worker act until it is done; return simulated seconds."""
+    def _work(self) -> tuple[float, str, str]:
+        """Have the worker act until it is done; return simulated seconds, what came of it, and why it failed."""
         for k in range(round(LIMIT / PERIOD)):
             action = self.worker.act(self.told)
             if not self.worker.busy:
-                return round(k * PERIOD, 2)
+                return round(k * PERIOD, 2), self.worker.outcome, self.worker.why
             self.told = self._step(action)
-        self.worker.outcome, self.worker.why = "failed", f"out of time at {self.worker.stage}"
-        return LIMIT
+        return LIMIT, "failed", f"out of time at {self.worker.stage}"
 
     def _rest(self, seconds: float = RESTS) -> None:
         for _ in range(max(round(seconds / PERIOD), 1)):

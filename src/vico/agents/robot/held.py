@@ -21,7 +21,7 @@ _ARM_LENGTH, _HELD_OUT = 0.5, 0.75
 _BALL = 0.018  # metres: radius of the balls that a held thing is made of
 # Half the width of what is slender, as a share of its height; fewer points are no look; farther off, metres, its middle
 # is not where it was taken to be, but the thing another one.
-_SLENDER, _GLANCE, _SHIFTED = 0.18, 40, 0.2
+_SLENDER, _GLANCE, _SHIFTED = 0.2, 40, 0.2
 
 
 class Held(NamedTuple):
