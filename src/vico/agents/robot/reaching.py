@@ -37,7 +37,7 @@ _OVER = 0.10  # metres above what it is put on that a thing is brought near
 _BALL = 0.018  # metres: radius of the balls that a held thing is made of
 # Half the width of what is slender, as a share of its height; fewer points are no look; farther off, metres, its middle
 # is not where it was taken to be, but the thing another one.
-_SLENDER, _GLANCE, _SHIFTED = 0.18, 40, 0.2
+_SLENDER, _GLANCE, _SHIFTED = 0.2, 40, 0.2
 #: Turns of what is held about the vertical, rad.
 TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))
 

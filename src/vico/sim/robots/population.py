@@ -345,8 +345,8 @@ class RobotPopulation:
         if not self._loose.entity.any():
             return False
         contacts = self.engine.contacts()
-        for work in self.run.work:
-            for robot in () if work is None else work.robots.tolist():
+        for work in [one for one in self.run.work if one is not None]:
+            for robot in work.robots.tolist():
                 links = self.engine.link_names(robot)
                 if any(contacts.objects_at(robot, links.index(name)) for name in work.model.sensors.contacts):
                     return True
