@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from vico.errors import InputError
-from vico.geo.buildings.files import read_buildings
+from vico.geo.buildings.files import checked_files, read_buildings
 from vico.geo.buildings.model import FoundBuildings
 from vico.geo.detections.model import Detections
 from vico.geo.detections.reader import read_detections
@@ -20,7 +20,6 @@ from vico.geo.osm import OsmData, read_osm
 from vico.geo.places.google import GooglePlaces, google_key
 from vico.geo.places.model import FoundPlace
 from vico.geo.places.overture import OverturePlaces
-from vico.geo.reference_systems import split_crs
 from vico.geo.street_images.folder import FolderImages
 from vico.geo.street_images.mapillary import Mapillary
 from vico.geo.street_images.model import StreetImage, StreetImages
@@ -90,10 +89,10 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
         Of whichever kind the source's reader raises; each is one sentence.
     """
     where = f"{frame} {half}"
+    precedence = _precedence(sources)
     with stages.timed("map"):
         data = read_osm(sources.osm, frame, half)
         stages.given(data, f"{data.sha256} {where}")
-        precedence = _precedence(sources)
         finest = precedence is None or precedence.terrain == "finest"
         samples = read_elevation(sources.dem, frame, half, finest_first=finest) if sources.dem else None
         if samples is not None:
@@ -174,7 +173,7 @@ def _precedence(sources: Sources) -> Precedence | None:
     """Read which source decides what, before anything that takes long; None where only the map is asked."""
     if not sources.buildings and sources.precedence is None:
         return None
-    return read_precedence(sources.precedence, [split_crs(given)[0].name for given in sources.buildings])
+    return read_precedence(sources.precedence, [path.name for path, _ in checked_files(sources.buildings)])
 
 
 def _buildings(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from vico.errors import InputError
+from vico.errors import InputError, MissingFileError
 from vico.geo.buildings.city_gml import read_citygml
 from vico.geo.buildings.city_json import read_cityjson
 from vico.geo.buildings.model import FoundBuildings
@@ -18,6 +18,7 @@ _READERS = (
     ((".gml", ".xml", ".citygml"), read_citygml),
     ((".parquet", ".geoparquet"), read_overture_buildings),
 )
+_ENDINGS = tuple(ending for endings, _ in _READERS for ending in endings)
 
 
 def read_buildings(given: Sequence[str | Path], frame: LocalFrame, half: float) -> list[FoundBuildings]:
@@ -42,20 +43,34 @@ def read_buildings(given: Sequence[str | Path], frame: LocalFrame, half: float) 
     MissingFileError, SchemaError
         As the readers raise them.
     """
+    return [_read(path, frame, half, crs) for path, crs in checked_files(given)]
+
+
+def checked_files(given: Sequence[str | Path]) -> list[tuple[Path, str]]:
+    """Return files and the reference systems said of them, after a look at their names, before anything is read.
+
+    Raises
+    ------
+    InputError, MissingFileError
+        If a file is of another kind by its name, given twice, or not there.
+    """
     files = [split_crs(one) for one in given]
     names = [path.name for path, _ in files]
     if doubled := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"buildings: {', '.join(doubled)} is given twice; rename one, so that each has a name")
-    return [_read(path, frame, half, crs) for path, crs in files]
+    for path, _ in files:
+        if not path.is_dir() and not path.name.lower().endswith(_ENDINGS):
+            raise InputError(
+                f"{path}: not a file of buildings by its name; it must end in .json or .jsonl (CityJSON), .gml or .xml "
+                "(CityGML) or .parquet (Overture)"
+            )
+        if not path.exists():
+            raise MissingFileError(f"{path}: no such file; give CityJSON, CityGML or Overture's GeoParquet")
+    return files
 
 
 def _read(path: Path, frame: LocalFrame, half: float, crs: str) -> FoundBuildings:
     if path.is_dir():
         return read_overture_buildings(path, frame, half, crs)
-    for endings, read in _READERS:
-        if path.name.lower().endswith(endings):
-            return read(path, frame, half, crs)
-    raise InputError(
-        f"{path}: not a file of buildings by its name; it must end in .json or .jsonl (CityJSON), .gml or .xml "
-        "(CityGML) or .parquet (Overture)"
-    )
+    read = next(read for endings, read in _READERS if path.name.lower().endswith(endings))
+    return read(path, frame, half, crs)
