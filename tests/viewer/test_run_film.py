@@ -116,7 +116,9 @@ def test_a_film_cuts_between_the_shots_of_a_file(run: Run, tmp_path: Path) -> No
 
 def test_a_thing_can_be_looked_at_from_near_by() -> None:
     sim = Simulation(toy_city.world(), toy_city.community(), SimConfig(observe=()))
-    sim.scenario.add_object("red box", "parcel", [box((0.2, 0.2, 0.2), (0, 0, 0.1))], (2.0, 1.0, 0.0), yaw=0.5)
+    sim.scenario.add_object(
+        "red box", "parcel", [box((0.2, 0.2, 0.2), (0, 0, 0.1))], (2.0, 1.0, 0.0), size=(0.2, 0.2, 0.2), yaw=0.5
+    )
     target = target_of(sim.state, "red box")
     assert (target.yaw, target.size) == (pytest.approx(0.5), pytest.approx(0.2))
     eye = FollowCamera("close", 64, 36).look(Scene([box((80, 80, 1), (0, 0, -0.5))]), target, 0.04)
