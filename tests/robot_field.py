@@ -11,8 +11,9 @@ from vico.sim.config import PHYSICS_ENGINES
 from vico.sim.physics import DEFAULT_ENGINE, engine_names
 from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import Manifest, Origin, Transit
+from vico.world.model import Manifest, Origin
 from vico.world.objects import Objects
+from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 HALF = 40.0

@@ -6,7 +6,8 @@ import numpy as np
 
 from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import Building, Category, Manifest, Origin, Place, Transit
+from vico.world.model import Building, Category, Manifest, Origin, Place
+from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap
 
 HALF = 120.0

@@ -16,8 +16,8 @@ from vico.sim.traffic.car_park_ways import places_in_car_parks
 from vico.sim.traffic.records import APPROACHING, BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, STANDING
 from vico.sim.traffic.stopping_places import with_places
 from vico.world.heights import HeightField
-from vico.world.model import ParkingSpot
 from vico.world.objects import Objects
+from vico.world.street_model import ParkingSpot
 from vico.worldgen.objects.car_park_ways import with_ways
 
 _ROWS, _PITCH = (14.0, 25.5), 2.5  # m from the lane's middle, and from spot to spot

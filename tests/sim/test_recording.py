@@ -27,8 +27,8 @@ from vico.sim.recording.schema import SEGMENT_STEPS
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
 from vico.world.lane_reader import read_lanes
-from vico.world.model import BikeStation, Transit
 from vico.world.public import PublicMap
+from vico.world.transit_model import BikeStation, Transit
 
 STEPS = 100
 EVERY = 40

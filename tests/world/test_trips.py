@@ -19,9 +19,10 @@ from hypothesis import strategies as st
 
 from vico.errors import InputError
 from vico.rules import BUS_DWELL, BUS_FARE, ride_price
-from vico.world.model import BikeStation, Line, Point2, Stop, Transit
+from vico.world.model import Point2
 from vico.world.routing import Router
 from vico.world.timetable import LineTimes
+from vico.world.transit_model import BikeStation, Line, Stop, Transit
 from vico.world.trips import MODES, Trip, Trips
 from vico.world.trips.network import AHEAD, ALIGHT, BOARD, DISMOUNT, MOUNT
 from vico.world.trips.ways import find_way

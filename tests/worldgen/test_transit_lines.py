@@ -16,7 +16,7 @@ from vico.geo.osm import OsmNode, OsmRelation
 from vico.sim.transit import DWELL, departure, plan_buses
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import Line, Transit
+from vico.world.transit_model import Line, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import empty_network
 from vico.worldgen.transit.routes import interval_of, routes_from_osm

@@ -10,7 +10,7 @@ import shapely
 from road_city import HALF, PLACES, road_city
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import Line, Transit
+from vico.world.transit_model import Line, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.transit.stage import BUS_LENGTH, transit_from_osm
 

@@ -15,7 +15,7 @@ from vico.world.check.streets import check_transit
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import Stop, Transit
+from vico.world.transit_model import Stop, Transit
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.transit.waiting import front_door, waiting_places
 

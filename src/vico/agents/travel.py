@@ -16,8 +16,8 @@ from vico.agents.state import AgentState
 from vico.agents.stays import RUN
 from vico.agents.wayfinding import Walker, closed_ground
 from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, TRAM_WIDTH, WALK_SPEED, ReasonCode, code_name
-from vico.world.model import Line, Stop, TramLine, TramStop
 from vico.world.public import PublicMap
+from vico.world.transit_model import Line, Stop, TramLine, TramStop
 from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
 from vico.world.walkable import ROADWAY
 

@@ -17,8 +17,9 @@ from vico.clock import DAY
 from vico.community.model import Mode
 from vico.community.walks import Walk, Walks
 from vico.rules import BIKE_RATE, BIKE_SPEED, BUS_FARE, WALK_SPEED
-from vico.world.model import Point2, Stop, TramStop, Transit
+from vico.world.model import Point2
 from vico.world.timetable import LineTimes, TramTimes
+from vico.world.transit_model import Stop, TramStop, Transit
 from vico.world.trips import AHEAD
 from vico.world.trips.network import ALIGHT, BOARD, DISMOUNT, MOUNT
 from vico.world.trips.ways import TURN

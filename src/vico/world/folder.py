@@ -40,9 +40,11 @@ from vico.world import model
 from vico.world.glb import read_glb
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import Building, Entrance, Manifest, ParkingSpot, Place, Record, Roads, Room, Transit
+from vico.world.model import Building, Entrance, Manifest, Place, Record, Room
 from vico.world.objects import Objects, read_objects
 from vico.world.routing import Router
+from vico.world.street_model import ParkingSpot, Roads
+from vico.world.transit_model import Transit
 from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap, read_walkable
 

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import BikeStation, Category, Line, Point3, Ring, Stop, TramLine, TramStop, Transit
+from vico.world.model import Category, Point3, Ring
 from vico.world.routing import Router
 from vico.world.streets import PublicStreet, StreetIndex, named_streets
+from vico.world.transit_model import BikeStation, Line, Stop, TramLine, TramStop, Transit
 from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.world.model import Point2, Roads
+from vico.world.model import Point2
+from vico.world.street_model import Roads
 
 
 @dataclass(frozen=True)

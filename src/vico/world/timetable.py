@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from vico.clock import DAY
 from vico.rules import BUS_DWELL, BUS_LAYOVER
-from vico.world.model import Line, TramLine
+from vico.world.transit_model import Line, TramLine
 
 
 def departure(line: Line, number: int) -> int:

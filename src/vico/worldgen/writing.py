@@ -17,21 +17,10 @@ from vico.world.heights import HeightField
 from vico.world.lane_reader import read_lanes
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
-from vico.world.model import (
-    Building,
-    Dropped,
-    Entrance,
-    Manifest,
-    Origin,
-    ParkingSpot,
-    Place,
-    Road,
-    Roads,
-    Room,
-    Source,
-    Transit,
-)
+from vico.world.model import Building, Dropped, Entrance, Manifest, Origin, Place, Room, Source
 from vico.world.objects import Objects, write_objects
+from vico.world.street_model import ParkingSpot, Road, Roads
+from vico.world.transit_model import Transit
 from vico.world.walkable import WalkableMap, write_walkable
 from vico.worldgen.buildings.stage import BuildingsResult
 from vico.worldgen.evidence import Evidence

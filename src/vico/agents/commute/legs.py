@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from vico.agents.commute.stops import nearest
 from vico.rules import BIKE_SPEED, WALK_SPEED, ride_price
-from vico.world.model import BikeStation, Point2
+from vico.world.model import Point2
 from vico.world.public import PublicMap
+from vico.world.transit_model import BikeStation
 from vico.world.trips.model import Leg, Trip
 from vico.world.trips.network import DISMOUNT, MOUNT, TripNetwork
 from vico.world.trips.ways import Way, find_way

@@ -24,8 +24,9 @@ from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError
 from vico.llm import LanguageModel
 from vico.llm.prompts import read_prompt
 from vico.rules import BIKE_ASTRAY, BIKE_RATE, BUS_FARE, WALK_SPEED
-from vico.world.model import Line, Point2, TramLine
+from vico.world.model import Point2
 from vico.world.public import PublicMap
+from vico.world.transit_model import Line, TramLine
 from vico.world.trips import Leg, Trip
 
 log = logging.getLogger(__name__)

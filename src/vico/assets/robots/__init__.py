@@ -1,6 +1,16 @@
 """Robots: what physics, control and drawing need to know of each."""
 
 from vico.assets.robots.catalogue import register_robot, robot_model, robot_names, robot_packages
+from vico.assets.robots.control_settings import (
+    ControllerSettings,
+    FourLegs,
+    MobileManipulator,
+    NoController,
+    PolicyNetwork,
+    Quadrotor,
+    SkidSteering,
+    TwoLegs,
+)
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -10,18 +20,10 @@ from vico.assets.robots.model import (
     TOUCH,
     ActionSpace,
     BatteryModel,
-    ControllerSettings,
     DeckModel,
-    FourLegs,
-    MobileManipulator,
-    NoController,
-    PolicyNetwork,
-    Quadrotor,
     RobotModel,
     RotorModel,
     Sensors,
-    SkidSteering,
-    TwoLegs,
     flight_space,
     velocity_space,
 )

@@ -15,17 +15,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots.model import (
-    BUMP,
-    BUMPER,
-    TOUCH,
-    ActionSpace,
-    Quadrotor,
-    RobotModel,
-    RotorModel,
-    Sensors,
-    flight_space,
-)
+from vico.assets.robots.control_settings import Quadrotor
+from vico.assets.robots.model import BUMP, BUMPER, TOUCH, ActionSpace, RobotModel, RotorModel, Sensors, flight_space
 from vico.assets.shapes import ball, box, cylinder, facing_x, pose_matrix, tube
 from vico.world.mesh import Surface, joined
 

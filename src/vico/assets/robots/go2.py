@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from vico.assets.robots.control_settings import FourLegs
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -18,7 +19,6 @@ from vico.assets.robots.model import (
     TOUCH,
     ActionSpace,
     BatteryModel,
-    FourLegs,
     RobotModel,
     Sensors,
     velocity_space,

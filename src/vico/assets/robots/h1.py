@@ -13,6 +13,7 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.robots.control_settings import TwoLegs
 from vico.assets.robots.h1_links import LEG, SIDES, arm_places, inertial, tensor_of, upper_body
 from vico.assets.robots.h1_shapes import own_shapes
 from vico.assets.robots.model import (
@@ -25,7 +26,6 @@ from vico.assets.robots.model import (
     BatteryModel,
     RobotModel,
     Sensors,
-    TwoLegs,
     velocity_space,
 )
 from vico.assets.robots.packs import h1_shapes

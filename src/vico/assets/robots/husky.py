@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from vico.assets.robots.control_settings import SkidSteering
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -19,7 +20,6 @@ from vico.assets.robots.model import (
     DeckModel,
     RobotModel,
     Sensors,
-    SkidSteering,
     velocity_space,
 )
 from vico.assets.robots.packs import husky_shapes

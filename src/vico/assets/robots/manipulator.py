@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from vico.assets.robots.control_settings import MobileManipulator
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -17,7 +18,6 @@ from vico.assets.robots.model import (
     TOUCH,
     ActionSpace,
     BatteryModel,
-    MobileManipulator,
     RobotModel,
     Sensors,
     velocity_space,

@@ -14,7 +14,8 @@ import numpy as np
 from defusedxml.ElementTree import parse
 
 from vico.assets.packages import Package, Tags, installed
-from vico.assets.robots.model import FOOT_CONTACT, PolicyNetwork
+from vico.assets.robots.control_settings import PolicyNetwork
+from vico.assets.robots.model import FOOT_CONTACT
 from vico.assets.robots.onnx import dense_layers
 from vico.assets.shading import shaded
 from vico.assets.simplify import thinned

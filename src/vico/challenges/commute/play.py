@@ -26,8 +26,8 @@ from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import recorded_in
 from vico.world.folder import World
-from vico.world.model import Stop, TramStop
 from vico.world.public import PublicMap
+from vico.world.transit_model import Stop, TramStop
 
 AGENT = "assistant_0"
 

@@ -11,8 +11,10 @@ from vico.version import __version__
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin, Roads, Transit
+from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin
 from vico.world.objects import Objects
+from vico.world.street_model import Roads
+from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 #: Half the side, metres; name of such worlds.

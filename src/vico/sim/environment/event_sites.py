@@ -14,7 +14,8 @@ from vico.errors import InputError
 from vico.sim.environment.city_event import CityEvent
 from vico.sim.environment.event_kinds import kind_of_event
 from vico.world.folder import World
-from vico.world.model import Category, Place, Road
+from vico.world.model import Category, Place
+from vico.world.street_model import Road
 from vico.world.walkways import SIDEWALK, Walkways
 
 #: Places that close when the power is cut: all but homes and open ground.

@@ -14,7 +14,7 @@ from vico.sim.traffic.records import STOPPING_PLACE, Records
 from vico.sim.traffic.state import LaneNetwork
 from vico.sim.traffic.stopping import WAY_LEAD
 from vico.world.lanes import LaneGraph
-from vico.world.model import ParkingSpot
+from vico.world.street_model import ParkingSpot
 from vico.world.walkways import Walkways
 
 _BEYOND = 10.0  # m of lane after a way out that belong to it

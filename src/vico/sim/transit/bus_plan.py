@@ -11,8 +11,8 @@ from vico.clock import DAY
 from vico.errors import InputError
 from vico.sim.traffic.state import BusRoutes
 from vico.world.lanes import LaneGraph
-from vico.world.model import Transit
 from vico.world.timetable import buses_needed, departure
+from vico.world.transit_model import Transit
 
 
 @dataclass(frozen=True)

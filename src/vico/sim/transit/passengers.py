@@ -17,7 +17,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.traffic.population import Traffic
 from vico.sim.traffic.records import BOARD, NONE, STOP
 from vico.sim.traffic.seen import Seating
-from vico.world.model import Stop, TramStop, Transit
+from vico.world.transit_model import Stop, TramStop, Transit
 from vico.world.walkable import WalkableMap
 from vico.world.walkways import SIDEWALK
 

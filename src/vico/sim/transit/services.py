@@ -19,7 +19,7 @@ from vico.rules import TRAM_SECTIONS
 from vico.sim.traffic import Traffic
 from vico.sim.transit.bus_plan import BusPlan
 from vico.sim.transit.trams import AWAY, Trams
-from vico.world.model import Line, Transit
+from vico.world.transit_model import Line, Transit
 
 _OUT_OF_SIGHT = -40.0  # metres above the ground
 _TINY = 1e-6  # seconds by which clocks err

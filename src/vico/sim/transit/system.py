@@ -29,8 +29,8 @@ from vico.sim.transit.services import Services
 from vico.sim.transit.tram_network import TramNetwork
 from vico.sim.transit.trams import Trams
 from vico.world.mesh import Surface
-from vico.world.model import Transit
 from vico.world.timetable import departure, next_departure
+from vico.world.transit_model import Transit
 from vico.world.walkable import WalkableMap
 
 # Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside, and a

@@ -13,8 +13,8 @@ from vico.sim.transit.tram_outlines import spots_near
 from vico.sim.transit.tram_signals import TramSignal, signals_of
 from vico.sim.transit.tram_zones import TramZone, zones_of
 from vico.world.lanes import LaneGraph
-from vico.world.model import TramLine
 from vico.world.rails import Track
+from vico.world.transit_model import TramLine
 from vico.world.walkways import CORNER, CROSSING, Walkways
 
 _WALKER = 0.25  # m beside a tram that walkers keep

@@ -38,7 +38,6 @@ from vico.sim.transit.tram_outlines import (
 )
 from vico.sim.transit.tram_signals import TramSignal, metres_to_signal
 from vico.world.mesh import Surface
-from vico.world.model import TramLine
 from vico.world.rails import (
     ACROSS_REACH,
     STEP,
@@ -48,6 +47,7 @@ from vico.world.rails import (
     TRAM_LENGTH,
     TRAM_SPEED,
 )
+from vico.world.transit_model import TramLine
 
 #: Where the front of a tram is that is not in the city.
 AWAY = -1.0

@@ -9,8 +9,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from vico.rules import BIKE_SPEED, BUS_FARE, ride_price
-from vico.world.model import Point2, Stop, TramStop, Transit
+from vico.world.model import Point2
 from vico.world.timetable import LineTimes, TramTimes
+from vico.world.transit_model import Stop, TramStop, Transit
 
 #: Seconds that each takes: getting into a bus, out of it, on and off a bicycle. An agent acts once a second.
 BOARD = ALIGHT = MOUNT = DISMOUNT = 1.0

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from vico.errors import InputError
 from vico.rules import WALK_SPEED
-from vico.world.model import Point2, Transit
+from vico.world.model import Point2
 from vico.world.routing import Router
+from vico.world.transit_model import Transit
 from vico.world.trips.model import MODES, Closure, Leg, Trip
 from vico.world.trips.network import TripNetwork
 from vico.world.trips.search import Label, Question, best_trips

@@ -22,8 +22,9 @@ from vico.geo.osm import OsmData
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import FIRST_OBJECT, Dropped, Transit
+from vico.world.model import FIRST_OBJECT, Dropped
 from vico.world.objects import FEET, Objects
+from vico.world.transit_model import Transit
 from vico.worldgen.facts.expendable import NamedShape, expendable, widened
 from vico.worldgen.objects.barriers import barrier_wishes
 from vico.worldgen.objects.catalogue import standing

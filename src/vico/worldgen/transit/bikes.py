@@ -13,7 +13,7 @@ from vico.geo import overlay
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import BikeStation
+from vico.world.transit_model import BikeStation
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts

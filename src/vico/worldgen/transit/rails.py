@@ -17,8 +17,9 @@ from vico.geo.gtfs.feed import DAY, Feed, Pattern
 from vico.geo.osm import OsmData, OsmRelation, OsmWay
 from vico.rules import BUS_DWELL, TRAM_WIDTH
 from vico.world.heights import HeightField
-from vico.world.model import Dropped, TramLine, TramStop
+from vico.world.model import Dropped
 from vico.world.rails import TRAM_LENGTH, Track, tram_door
+from vico.world.transit_model import TramLine, TramStop
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import is_bridge, on_the_ground

@@ -15,7 +15,8 @@ from vico.geo.osm import OsmData
 from vico.rules import BUS_DOOR_BEHIND_FRONT
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import FAILED, Dropped, Line, Stop, Transit
+from vico.world.model import FAILED, Dropped
+from vico.world.transit_model import Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.worldgen.facts.expendable import expendable, leave_out
 from vico.worldgen.facts.site import SiteFacts

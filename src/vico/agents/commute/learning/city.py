@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.clock import DAY
-from vico.world.model import Stop, TramStop
 from vico.world.public import PublicMap
 from vico.world.timetable import LineTimes, TramTimes
+from vico.world.transit_model import Stop, TramStop
 
 
 class CityArrays(NamedTuple):
