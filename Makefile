@@ -39,9 +39,10 @@ endef
 demo: .venv/assets
 	$(BIN)/vico demo --out $(DEMO) --seed $(SEED) --force
 
-# Many tests start processes: none need compile the sources' byte code, whatever the environment says.
+# Many tests start processes: none need compile the sources' byte code, whatever the environment says, and each has one
+# processor, on which more threads of linear algebra only wait for each other.
 test: .venv/dev
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
 
 # The Khronos glTF validator, for a test; without npm that test is skipped.
 .venv/gltf:

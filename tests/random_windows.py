@@ -22,7 +22,7 @@ from damaged_maps import DAMAGES, read_map, write_map
 from vico.errors import EmptyInputError, VicoError
 from vico.geo.frame import LocalFrame
 from vico.seeds import rng
-from vico.world import mesh
+from vico.world import glb, mesh
 from vico.world.check import check_world
 from vico.world.folder import read_world
 from vico.worldgen.facades.textures import materials
@@ -155,7 +155,7 @@ def painted_once() -> Iterator[None]:
     def painter(name: str, paint: Callable[[Any], Any]) -> Callable[[Any], Any]:
         return lambda random: kept(name, lambda: paint(random))
 
-    pack = mesh._picture
+    pack = glb._picture
 
     def packed(material: mesh.Material) -> Any:
         if material.texture is None:
@@ -163,7 +163,7 @@ def painted_once() -> Iterator[None]:
         return kept(f"{material.name} {zlib.crc32(material.texture)}", lambda: pack(material))
 
     painters = {name: painter(name, paint) for name, paint in materials.PAINTERS.items()}
-    with mock.patch.dict(materials.PAINTERS, painters), mock.patch.object(mesh, "_picture", packed):
+    with mock.patch.dict(materials.PAINTERS, painters), mock.patch.object(glb, "_picture", packed):
         yield
 
 

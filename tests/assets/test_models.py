@@ -112,7 +112,7 @@ def test_a_list_of_colours_goes_round_the_copies(tmp_path: Path) -> None:
         ('[model.m]\nparts = [{ shape = "box", size = [1, nan, 1], colour = "oak" }]', "parts.0.box.size.1"),
         ('[model.m]\nparts = [{ shape = "box", size = [1, -0.1, 1], colour = "oak" }]', "parts.0.box.size.1"),
         ('[model.m]\nparts = [{ shape = "box", size = [1, 0, 1], colour = "oak" }]', "parts.0.box.size.1"),
-        ('[model.m]\nkind = "bench"', "model.m: .*either its parts or the model it is like"),
+        ('[model.m]\nkind = "bench"', "model.m: .*either its parts, its mesh, or the model it is like"),
         ('[model.m]\nlike = "n"', "no model 'n'"),
         ("[model.m\n", "not valid TOML"),
     ],
