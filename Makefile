@@ -39,10 +39,9 @@ endef
 demo: .venv/assets
 	$(BIN)/vico demo --out $(DEMO) --seed $(SEED) --force
 
-# Many tests start processes: none need compile the sources' byte code, whatever the environment says, and each has one
-# processor, on which more threads of linear algebra only wait for each other.
+# Many tests start processes: none need compile the sources' byte code, whatever the environment says.
 test: .venv/dev
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
 
 # The Khronos glTF validator, for a test; without npm that test is skipped.
 .venv/gltf:

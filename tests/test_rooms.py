@@ -37,6 +37,8 @@ ALLOWED = {
         "world.timetable",
         "world.walkable",
         "world.model",
+        "world.street_model",
+        "world.transit_model",
         "world.heights",
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
