@@ -121,13 +121,14 @@ def main() -> None:
         "# An episode of the assistant challenge",
         "",
         machine(),
-        "Made by `python benchmarks/assistant_episode.py WORLD... --before CHECKOUT "
+        f"Made by `python benchmarks/assistant_episode.py WORLD... {'--before CHECKOUT ' * (given.before is not None)}"
         f"--category {given.category} --steps {given.steps} -n {given.n} "
         "--table benchmarks/results/assistant_episode.md`.",
         "",
         f"{given.steps} steps, one assistant that sees everything (`{given.method}`), its residents and the traffic; "
-        "processor seconds of the whole process, median (least to greatest). Others used the machine meanwhile. The "
-        "states after every step are the same before and now.",
+        "processor seconds of the whole process, median (least to greatest)."
+        + " The states after every step are the same before and now."
+        * (given.before is not None),
         "",
         "| episode | code | start to first step | the other steps | whole | steps: now by before |",
         "|---|---|---|---|---|---|",
