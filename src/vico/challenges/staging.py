@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vico.agents.base import Agent
-from vico.agents.wrappers import usage_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
 from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
 from vico.challenges.assistant.model import Start, TaskObject
+from vico.challenges.condensing import condensed
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
 from vico.challenges.task_files import PlacedTask
-from vico.clock import seconds_of_day
 from vico.community import build_community
 from vico.community.model import Community
 from vico.envs import CommunityEnv, Simulation, make
@@ -192,21 +191,12 @@ def record_of(
 ) -> EpisodeRecord:
     """Condense an episode that was played out."""
     sim, faults = runner.sim, runner.faults
-    return EpisodeRecord(
-        challenge=challenge,
-        category=task.category,
-        method=method,
-        setting=dict(setting) | {"steps": task.steps},
-        world=task.world,
-        seed=task.seed,
-        metrics=verdict.metrics,
-        parts=[verdict.part],
-        steps=round(sim.state.second) - seconds_of_day(task.start),
-        limit=task.steps,
+    return condensed(
+        task,
+        sim,
+        faults,
+        robots.values(),
+        judged=(verdict.metrics, [verdict.part]),
+        of=(challenge, method, dict(setting) | {"steps": task.steps}),
         wall_seconds=wall_seconds,
-        state_hash=sim.state_hash(),
-        tokens=sum(usage_of(robot).tokens for robot in robots.values()),
-        cost=sum(usage_of(robot).cost for robot in robots.values()),
-        fault_counts=faults.by_kind(),
-        faults=faults.first,
     )

@@ -13,13 +13,14 @@ from vico.agents.assistant import METHODS, make_planner
 from vico.agents.base import Agent
 from vico.agents.requester import Requester
 from vico.agents.schedule import followers_of
-from vico.agents.wrappers import model_faults_of, usage_of
+from vico.agents.wrappers import model_faults_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
 from vico.challenges.assistant.causes import Chronicle
 from vico.challenges.assistant.judge import Judge
 from vico.challenges.assistant.model import Category, Task
 from vico.challenges.assistant.theatre import HUMAN, Performance, PlayedByHand, Seconds
 from vico.challenges.assistant.thresholds import RESIDENTS
+from vico.challenges.condensing import condensed
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
 from vico.clock import seconds_of_day
 from vico.community import build_community
@@ -278,21 +279,13 @@ def _record(
     }
     if task.category == "carry":
         metrics["HR"], metrics["HR_escort"] = judge.following(task.steps)
-    return EpisodeRecord(
-        challenge="assistant",
-        category=task.category,
-        method=method,
-        setting=dict(setting) | {"assistants": len(task.assistants), "advanced": task.advanced, "steps": task.steps},
-        world=task.world,
-        seed=task.seed,
-        metrics=metrics,
-        parts=parts,
-        steps=round(sim.state.second) - seconds_of_day(task.start),
-        limit=task.steps,
+    about = {"assistants": len(task.assistants), "advanced": task.advanced, "steps": task.steps}
+    return condensed(
+        task,
+        sim,
+        faults,
+        planners.values(),
+        judged=(metrics, parts),
+        of=("assistant", method, dict(setting) | about),
         wall_seconds=seconds,
-        state_hash=sim.state_hash(),
-        tokens=sum(usage_of(planner).tokens for planner in planners.values()),
-        cost=sum(usage_of(planner).cost for planner in planners.values()),
-        fault_counts=faults.by_kind(),
-        faults=faults.first,
     )
