@@ -1,13 +1,14 @@
 """The world folder: what is written is what is read, and what is wrong is said in one sentence."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
 import pytest
 
 from vico.errors import MissingFileError, SchemaError
-from vico.world.folder import LAYERS, World, read_records, read_world, seal
+from vico.world.folder import LAYERS, World, kept_world, read_records, read_world, seal
 from vico.world.model import VERSION, Place
 
 
@@ -28,6 +29,17 @@ def test_every_object_has_a_model(helsinki: World) -> None:
 
 def test_the_digest_is_the_manifests(helsinki: World, copy: Path) -> None:
     assert read_world(copy).digest == helsinki.digest
+
+
+def test_an_opened_world_is_kept_until_it_is_built_anew(copy: Path) -> None:
+    world = kept_world(copy)
+    assert kept_world(copy / "." / "") is world
+    later = (copy / "world.json").stat().st_mtime_ns + 1_000_000
+    os.utime(copy / "world.json", ns=(later, later))
+    assert kept_world(copy) is not world
+    (copy / "world.json").unlink()
+    with pytest.raises(MissingFileError, match=r"no finished world"):
+        kept_world(copy)
 
 
 def test_a_folder_without_manifest_is_no_finished_world(copy: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from vico.agents.base import Agent
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
-from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, world_in
+from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size
 from vico.challenges.assistant.model import Start, TaskObject
 from vico.challenges.condensing import condensed
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
@@ -24,13 +24,13 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedOnce, recorded_in
-from vico.world.folder import World
+from vico.world.folder import World, kept_world
 
 
 @lru_cache(maxsize=2)
 def world_and_people(folder: Path, residents: int) -> tuple[World, Community]:
     """Read a world, and make the people among whom its episodes take place: always the same ones."""
-    world = world_in(folder)
+    world = kept_world(folder)
     return world, build_community(world, residents=residents, seed=0)
 
 

@@ -24,7 +24,7 @@ import json
 import os
 import zipfile
 from collections.abc import Iterable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -281,6 +281,27 @@ def read_world(path: Path) -> World:
     except ValidationError as error:
         raise _invalid(folder / "world.json", error) from None
     return World(manifest, folder)
+
+
+def kept_world(path: Path) -> World:
+    """Open a world folder; the last two are kept, with all that was derived of them, until they are built anew.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        As `read_world`.
+    """
+    folder = Path(path).resolve()
+    try:
+        state = (folder / "world.json").stat()
+    except OSError:
+        return read_world(path)  # says what is missing
+    return _opened(folder, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=2)
+def _opened(folder: Path, _changed: int, _size: int) -> World:
+    return read_world(folder)
 
 
 def write_records(path: Path, records: Iterable[Record]) -> None:

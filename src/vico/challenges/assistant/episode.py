@@ -34,23 +34,17 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedOnce, recorded_in
-from vico.world.folder import World, read_world
+from vico.world.folder import World, kept_world
 from vico.world.public import PublicMap
 
 # In a window of 800 m; smaller ones have as many for their size, so that the cars find room.
 CARS, PEDESTRIANS = 30, 30
 
 
-@lru_cache(maxsize=2)
-def world_in(folder: Path) -> World:
-    """Read a world; the last two are kept."""
-    return read_world(folder)
-
-
 @lru_cache(maxsize=4)
 def world_and_people(folder: Path, category: Category) -> tuple[World, Community]:
     """Read a world, and make the people among whom a category's episodes take place: always the same ones."""
-    world = world_in(folder)
+    world = kept_world(folder)
     return world, build_community(world, residents=RESIDENTS[category], seed=0)
 
 

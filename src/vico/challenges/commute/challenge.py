@@ -13,7 +13,7 @@ from vico.challenges.commute.play import play_day
 from vico.challenges.commute.rules import HOURS
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.errors import InputError
-from vico.world.folder import World, read_world
+from vico.world.folder import World, kept_world
 
 CATEGORY = "commute"
 
@@ -51,11 +51,11 @@ class CommuteChallenge:
         vico.errors.InputError
             If the setting is not usable, or the world has too few places far enough apart.
         """
-        return self._task(job, read_world(job.world)).model_dump(mode="json")
+        return self._task(job, kept_world(job.world)).model_dump(mode="json")
 
     def play(self, job: Job, *, recording: Path | None = None, progress: Progress | None = None) -> EpisodeRecord:
         """Play one day and judge it; see `vico.challenges.records.Challenge.play`."""
-        world = read_world(job.world)
+        world = kept_world(job.world)
         return play_day(world, self._task(job, world), job, recording=recording, progress=progress)
 
     def _task(self, job: Job, world: World) -> CommuteTask:

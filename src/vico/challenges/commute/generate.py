@@ -16,6 +16,7 @@ Success: within 3 m of the place's point, on foot or on a bicycle, when the appo
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +24,7 @@ import numpy as np
 from vico.challenges.commute import rules
 from vico.challenges.commute.model import Appointment, Commuter, CommuteTask
 from vico.community import build_community
-from vico.community.model import Resident
+from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError, InputError
 from vico.rules import WALK_SPEED
 from vico.seeds import rng
@@ -59,7 +60,7 @@ def generate_commute(world: World, *, seed: int, hours: float = rules.HOURS) -> 
         raise InputError(f"commute: {hours:g} hours; give {rules.LEAST_HOURS:g} to {rules.MOST_HOURS:g}")
     chance = rng(seed, "commute", world.digest)
     number = seed // DAYS_A_COMMUNITY
-    community = build_community(world, residents=RESIDENTS, seed=number)
+    community = _people(world, number)
     adults = [r for r in community.residents if _ADULT[0] <= r.age <= _ADULT[1]]
     for _ in range(_TRIES):
         resident = adults[int(chance.integers(len(adults)))]
@@ -70,6 +71,12 @@ def generate_commute(world: World, *, seed: int, hours: float = rules.HOURS) -> 
         f"commute: {world.manifest.name}: no resident has {rules.LEAST_PLACES} places to go to, each "
         f"{rules.LEAST_LEG:g} m or more from the next; use a larger world"
     )
+
+
+@lru_cache(maxsize=2)
+def _people(world: World, number: int) -> Community:
+    """Return a community; methods that play the same day one after the other share it."""
+    return build_community(world, residents=RESIDENTS, seed=number)
 
 
 def _places(world: World, resident: Resident, chance: np.random.Generator) -> list[tuple[Place, list[str]]] | None:

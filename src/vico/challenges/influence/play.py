@@ -34,7 +34,7 @@ from vico.runner.faults import Fault, FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import recorded_in
-from vico.world.folder import World, read_world
+from vico.world.folder import World, kept_world
 
 NAME = "influence"
 CATEGORY = "day"
@@ -69,7 +69,7 @@ class Influence:
     def task(self, job: Job) -> Mapping[str, object]:
         """Return what is asked in an episode; the same for all strategies."""
         settings = settings_of(job.setting)
-        world = _world(job.world)
+        world = kept_world(job.world)
         community = _community(job.world, job.seed)
         return generate_influence(world, community, job.seed, settings).record()
 
@@ -99,7 +99,7 @@ class Influence:
         settings = settings_of(job.setting)
         for name in strategies_of(job.method):
             strategy_parts(name)
-        world, community = _world(job.world), _community(job.world, job.seed)
+        world, community = kept_world(job.world), _community(job.world, job.seed)
         task = generate_influence(world, community, job.seed, settings)
         names = {resident.id: f"{resident.id} {resident.name}" for resident in community.residents}
         verdicts, parts, hashes = [], [], []
@@ -232,19 +232,14 @@ def _joined(hashes: Sequence[str]) -> str:
     return hashes[0] if len(hashes) == 1 else sha256("".join(hashes).encode()).hexdigest()
 
 
-@lru_cache(maxsize=2)
-def _world(path: Path) -> World:
-    return read_world(Path(path))
-
-
 @lru_cache(maxsize=8)
 def _community(path: Path, seed: int) -> Community:
-    return community_of(_world(path), seed)
+    return community_of(kept_world(path), seed)
 
 
 @lru_cache(maxsize=2)
 def _walks_of(path: Path) -> Walks:
-    return Walks(_world(path))
+    return Walks(kept_world(path))
 
 
 def _walks(world: World) -> Walks:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from vico.challenges.robot.model import Category as RobotCategory
 from vico.community import build_community
 from vico.community.model import Community
 from vico.envs.vector import VectorAgentEnv, makers
-from vico.world.folder import World, read_world
+from vico.world.folder import World, kept_world
 
 if TYPE_CHECKING:
     from vico.challenges.learning.robot_team import RobotTeamEnv
@@ -199,12 +199,7 @@ def _made(world: Path, community: None, *, maker: str, **options: Any) -> Any:
 
 def world_of(source: World | Path | str) -> World:
     """Return a world; one that is read from a folder is kept."""
-    return source if isinstance(source, World) else _world(Path(source))
-
-
-@lru_cache(maxsize=2)
-def _world(folder: Path) -> World:
-    return read_world(folder)
+    return source if isinstance(source, World) else kept_world(Path(source))
 
 
 def _env(make: Callable[..., Any], of_options: Any, options: Mapping[str, Any], *, form: Any = "arrays") -> TaskEnv:
