@@ -41,7 +41,7 @@ from vico.world.public import PublicMap
 WAYS = {"no viewer": (False, 0), "server, nobody there": (True, 0), "one viewer": (True, 1), "ten viewers": (True, 10)}
 _WARM = 20
 
-_READER = """
+READER = """
 import asyncio, json, sys, websockets
 place, token, count = sys.argv[1], sys.argv[2], int(sys.argv[3])
 async def read():
@@ -89,7 +89,7 @@ def measured(world: Path, community: Path, way: str, steps: int) -> dict[str, fl
         if streams:
             base, _, token = viewer.url.partition("/?token=")
             place_of = base.replace("http:", "ws:") + "/stream"
-            reader = subprocess.Popen([sys.executable, "-c", _READER, place_of, token, str(streams)])
+            reader = subprocess.Popen([sys.executable, "-c", READER, place_of, token, str(streams)])
             stack.callback(reader.kill)
         director = control if served else None
         Runner(sim, agents, hooks=hooks, faults=faults, director=director).run(steps + _WARM)
