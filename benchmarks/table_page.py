@@ -32,7 +32,9 @@ def blocks_in(out: Path) -> list[Path]:
     return found
 
 
-def page(blocks: Sequence[Path], title: str, frozen: str = "", note: str = "") -> str:
+def page(
+    blocks: Sequence[Path], title: str, frozen: str = "", note: str = "", compared: str = "docs/challenges.md"
+) -> str:
     """Return the page: what it was played with, and each part's own page a level lower."""
     found = [read_results(block / "results.json") for block in blocks]
     first, _ = found[0]
@@ -49,7 +51,7 @@ def page(blocks: Sequence[Path], title: str, frozen: str = "", note: str = "") -
         lines += [
             f"`ours` is frozen at commit `{frozen}`; seeds begin with its first six hexadecimal digits, "
             f"{int(frozen[:6], 16)}. What is comparable with the paper's rows, and what is not: "
-            "[docs/challenges.md](../../docs/challenges.md#results).",
+            f"[{compared}](../../{compared}#results).",
             "",
         ]
     for block in blocks:
@@ -64,7 +66,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--title", required=True)
     parser.add_argument("--frozen", default="", help="hash of the commit at which ours was frozen")
     parser.add_argument("--note", default="", help="a sentence on how and where it was played")
-    return write_page(parser, lambda it: page(blocks_in(it.out), it.title, it.frozen, it.note), words)
+    parser.add_argument("--compared", default="docs/challenges.md", help="page whose results say what is comparable")
+    return write_page(parser, lambda it: page(blocks_in(it.out), it.title, it.frozen, it.note, it.compared), words)
 
 
 if __name__ == "__main__":

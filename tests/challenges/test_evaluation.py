@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -52,6 +53,23 @@ def test_what_is_there_is_not_played_again(worlds: list[Path], tmp_path: Path) -
     assert len(played(count)) == len(set(played(count))) == len(asked)
     assert records(again)[:5] == records(first)
     assert [outcome.kept for outcome in again] == [True] * 5 + [False] * (len(asked) - 5)
+
+
+def test_a_table_goes_on_from_one_file_of_its_episodes(worlds: list[Path], tmp_path: Path) -> None:
+    script = Path(__file__).parents[2] / "benchmarks" / "kept_episodes.py"
+    asked, file = jobs(worlds), tmp_path / "kept.jsonl"
+    evaluate(TOY, asked[:5], tmp_path / "here" / "part")
+    for words in (("pack", tmp_path / "here", file), ("unpack", file, tmp_path / "there")):
+        subprocess.run([sys.executable, script, *map(str, words)], check=True)
+    there = evaluate(TOY, asked, tmp_path / "there" / "part")
+    assert [outcome.kept for outcome in there] == [True] * 5 + [False] * (len(asked) - 5)
+    file.write_text(json.dumps({"path": "../episodes/x.json", "content": {}}) + "\n")
+    done = subprocess.run(
+        [sys.executable, script, "unpack", file, tmp_path / "there"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "line 1" in done.stderr
+    assert not (tmp_path / "episodes").exists()
 
 
 def test_a_changed_world_and_a_damaged_episode_are_played_again(worlds: list[Path], tmp_path: Path) -> None:
