@@ -129,6 +129,12 @@ def test_a_flat_roof_that_nobody_mapped_is_pitched_in_a_town_of_pitched_roofs() 
     assert roofed(flat, "wall_jugend", "finnish").roof.shape in ("mansard", "gabled", "hipped")
     assert roofed(flat, "wall_jugend", "finnish", flat_town=True).roof.shape == "flat"
     assert roofed(plan_of(), "wall_grid", "finnish").roof.shape == "flat"
+    below = PartPlan(HOUSE, 0.0, 7.0, 2, Roof("flat", 0.0), {})
+    stacked = BuildingPlan(
+        "w1", None, "office", {}, HOUSE, 4, 0, [below, PartPlan(HOUSE, 7.0, 13.2, 2, Roof("flat", 0.6), {})]
+    )
+    for wall in ("wall_jugend", "wall_grid"):
+        assert roofed(stacked, wall, "finnish") == below
     assert is_flat_town([flat, flat, plan_of()])
     assert not is_flat_town([flat, plan_of(), plan_of()])
 

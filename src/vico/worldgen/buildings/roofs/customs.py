@@ -66,9 +66,11 @@ def with_customary_roofs(
         return plan
     shape = picked(list(shapes.items()), draw)
     told = plan.rule == "height tag"
+    # What is flat among several parts may carry another.
+    flat_too = not flat_town and len(plan.parts) == 1 and shape != "flat"
     parts = [
         _with_roof(part, shape, _street_side(part, streets) if family.ridge else None, family.ridge, told=told)
-        if _supposed(part, flat_too=not flat_town)
+        if _supposed(part, flat_too=flat_too)
         else part
         for part in plan.parts
     ]
