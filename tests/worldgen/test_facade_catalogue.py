@@ -37,7 +37,7 @@ def test_a_region_of_ones_own_lines_its_streets_with_its_own_family(own_data: Pa
     (own_data / "regions_portugal.toml").write_text(region)
     (own_data / "families_portugal.toml").write_text(family)
     assert region_of(*LISBON) == "portuguese"
-    assert region_of(41.9, 12.5) == "southern"
+    assert region_of(41.9, 12.5) == "italian"
     looks = [
         look_of("residential", {"start_date": "1890"}, levels=5, area=500.0, region="portuguese", random=rng(k, "look"))
         for k in range(200)
@@ -52,7 +52,7 @@ def test_a_region_of_ones_own_lines_its_streets_with_its_own_family(own_data: Pa
 
 
 def test_without_data_of_ones_own_the_package_s_regions_stand() -> None:
-    assert region_of(*LISBON) == "southern"
+    assert region_of(*LISBON) == "portuguese"
     assert "wall_tiled" not in styles().families
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from vico.seeds import rng
 from vico.worldgen.buildings.roofs.solid import building_solid
-from vico.worldgen.facades.catalogue import region_of
+from vico.worldgen.facades.catalogue import region_of, styles
 from vico.worldgen.facades.cuts import cut_at_heights
 from vico.worldgen.facades.families import family_of
 from vico.worldgen.facades.looks import look_of
@@ -67,9 +67,17 @@ def test_textures_are_painted_alike_each_time() -> None:
 
 
 def test_a_city_needs_few_materials_but_has_many_families() -> None:
-    families = [name for name in PAINTERS if name.startswith("wall_") and "back" not in name]
-    assert len(families) >= 14
-    assert sum(name.startswith(("wall", "ground_", "blank", "roof", "door")) for name in PAINTERS) <= 48
+    assert len([name for name in PAINTERS if name.startswith("wall_") and "back" not in name]) >= 30
+    known, uses = styles(), styles().uses
+    elsewhere = [*uses.tower_of_homes, *uses.tower_of_offices, *uses.public, *uses.trade, *uses.works, *uses.church]
+    for region in known.regions.values():
+        ages = [getattr(region.streets, age) for age in type(region.streets).model_fields]
+        worn = {name for shares in (*ages, region.towers, elsewhere) for name in shares}
+        families = [known.families[name] for name in sorted(worn)]
+        sheets = {
+            sheet for family in families for sheet in (family.name, *family.ground_floors, family.blank, family.back)
+        }
+        assert len(sheets) <= 52, region.name
 
 
 @pytest.mark.parametrize("name", sorted(n for n in PAINTERS if n.startswith("wall_") and "shed" not in n))
@@ -143,14 +151,15 @@ def test_tags_decide_the_family(use: str, tags: dict[str, str], levels: int, reg
     assert family_of(use, tags, levels=levels, area=300.0, region=region, draw=(0.9, 0.5)) == family
 
 
-def test_towers_are_of_glass_or_panels_whatever_the_region() -> None:
+def test_towers_of_offices_are_of_glass_or_panels_or_of_their_region() -> None:
     random = rng(0, "towers")
     for region in ("northern", "southern", "american", "british", "german", "nordic", "elsewhere"):
         seen = {
             family_of("office", {}, levels=30, area=1500.0, region=region, draw=tuple(random.random(2)))
             for _ in range(40)
         }
-        assert seen <= {"wall_glass", "wall_fins", "wall_ribbon", "wall_grid"}
+        known = {"wall_glass", "wall_fins", "wall_ribbon", "wall_grid"}
+        assert seen <= known | ({"wall_set_back"} if region == "american" else set())
         assert len(seen) > 1
 
 
@@ -168,6 +177,13 @@ def test_every_family_has_all_its_materials_in_every_region() -> None:
 
 
 def test_regions_are_told_apart() -> None:
-    places = {(60.17, 24.94): "nordic", (51.51, -0.1): "british", (49.41, 8.7): "german", (43.73, 7.42): "southern",
-              (40.72, -73.99): "american", (50.85, 4.35): "northern"}  # fmt: skip
+    places = {
+        (60.17, 24.94): "finnish", (59.33, 18.06): "nordic", (51.51, -0.1): "british", (49.41, 8.7): "german",
+        (52.52, 13.4): "east_german", (43.73, 7.42): "southern", (40.72, -73.99): "northeastern",
+        (42.33, -83.05): "american", (50.85, 4.35): "low_countries", (52.37, 4.9): "low_countries",
+        (48.86, 2.35): "french", (47.49, 11.1): "alpine", (42.51, 1.52): "southern", (40.42, -3.7): "spanish",
+        (38.71, -9.14): "portuguese", (41.9, 12.48): "italian", (45.46, 9.19): "italian", (48.14, 11.58): "german",
+        (55.75, 37.62): "eastern", (52.23, 21.01): "eastern", (35.68, 139.75): "japanese", (50.94, 6.96): "german",
+        (53.55, 10.0): "german", (-33.87, 151.2): "northern",
+    }  # fmt: skip
     assert {at: region_of(*at) for at in places} == places

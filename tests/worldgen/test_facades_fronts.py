@@ -9,6 +9,7 @@ import pytest
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Entrance, Place
 from vico.worldgen.facades.fronts import street_fronts
+from vico.worldgen.facades.pieces import cell_uv
 from vico.worldgen.facades.textures.materials import material
 from vico.worldgen.facades.textures.walls import BAYS
 from vico.worldgen.facades.walls import GroundFloors
@@ -172,3 +173,21 @@ def test_of_two_houses_fronts_in_one_plane_the_later_one_is_left_out() -> None:
     assert losses.ids == {"e2"}
     assert made.counts["doors"] == 1
     assert {int(entity) for surface in made.surfaces for entity in surface.entity} == {1000}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_pharmacy_s_cross_hangs_below_the_fascia_and_beside_the_front(seed: int) -> None:
+    shop = _shop("Apteekki", kind="pharmacy")
+    made = street_fronts([shop], [_entrance(9.0)], [_building()], [_wall("ground_rusticated")], seed=seed)
+    doors = next(surface for surface in made.surfaces if surface.material.name == "doors")
+    left, low, right, high = cell_uv("cross")
+    of_cross = (doors.uv >= (left - 1e-4, low - 1e-4)).all(axis=1) & (doors.uv <= (right + 1e-4, high + 1e-4)).all(
+        axis=1
+    )
+    cross = of_cross & (np.abs(doors.normals[:, :2] @ _RIGHT) > 0.99)
+    assert cross.any()
+    boards = [surface for surface in made.surfaces if surface.material.name.startswith("signs")]
+    lowest_letter = min(float(surface.positions[:, 2].min()) for surface in boards)
+    assert doors.positions[cross, 2].max() <= lowest_letter
+    assert doors.positions[cross, 2].min() > 12.1
+    assert _away(doors)[cross].max() < 1.0

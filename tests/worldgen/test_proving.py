@@ -29,7 +29,7 @@ HOUSE = shapely.box(0, 0, 12, 10)
 
 
 def house(name: str, polygon: Polygon = HOUSE, **more: Any) -> BuildingPlan:
-    part = PartPlan(polygon, 0.0, 10.0, 3, Roof("hipped", 3.0), {})
+    part = PartPlan(polygon, 0.0, 10.0, 3, Roof("hipped", 3.0), {"roof:shape": "hipped"})
     return BuildingPlan(name, None, "residential", {}, polygon, 3, 0, [replace(part, **more)])
 
 
@@ -134,7 +134,7 @@ def test_a_small_solid_at_fault_goes_and_its_building_stays(monkeypatch: pytest.
 
 
 def test_what_cant_be_cut_costs_a_building_its_details_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(plan: BuildingPlan, *_: Any) -> list[PartPlan]:
+    def failing(plan: BuildingPlan, *_: Any, **__: Any) -> list[PartPlan]:
         if plan.id == "w2":
             raise OverlayError("side location conflict")
         return []

@@ -9,6 +9,7 @@ from vico.geo.osm import OsmArea, OsmData
 from vico.seeds import rng
 from vico.world.check.solids import coplanar_overlaps
 from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
+from vico.worldgen.buildings.solids import Footing, part_mesh
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof
 from vico.worldgen.ground.terrain import flat_terrain
@@ -52,7 +53,9 @@ def test_nothing_is_put_where_another_part_stands() -> None:
     base = PartPlan(shapely.box(0, 0, 60, 40), 0.0, 10.0, 3, Roof("flat", 0.6), {})
     tower = PartPlan(shapely.box(10, 8, 50, 32), 10.0, 40.0, 9, Roof("flat", 0.6), {})
     for seed in range(5):
-        made = rooftop_parts(plan_of("w1", base, tower), rng(seed, "rooftop"))
+        plan, fronts = plan_of("w1", base, tower), [np.zeros(4, bool)] * 2
+        meshes = [part_mesh(part, Footing(-1.0, 0.0)) for part in plan.parts]
+        made = rooftop_parts(plan, meshes, 0.0, fronts, rng(seed, "rooftop"), region="german")
         low = [solid for solid in made if solid.low < 11.0]
         assert all(shapely.intersection(solid.polygon, tower.polygon).area == 0.0 for solid in low)
 

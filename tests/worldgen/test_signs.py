@@ -63,6 +63,13 @@ def test_long_names_are_cut_at_a_word() -> None:
     assert text.lower().endswith(" long")
 
 
+@pytest.mark.parametrize("name", ["Worshipful Haberdashers and of the Glovers", "Schuhmacherei am Gendarmenmarkt & Co"])
+def test_no_board_ends_in_a_word_that_joins_others(name: str) -> None:
+    text = board_text(_place(name))
+    assert text is not None
+    assert len(text.split()[-1]) > 3
+
+
 def test_chains_share_one_board() -> None:
     boards = paint_boards([_place("Fazer", "a"), _place("Fazer", "b"), _place("東京", "c")])
     assert boards.by_place["a"] == boards.by_place["b"]

@@ -13,10 +13,12 @@ from vico.geo import overlay
 from vico.seeds import rng
 from vico.world.model import Dropped
 from vico.worldgen.buildings.drafts import Draft
+from vico.worldgen.buildings.gables import stepped_gables
 from vico.worldgen.buildings.projections import projections, water_tank
 from vico.worldgen.buildings.roofs.dormers import dormers
 from vico.worldgen.buildings.roofs.eaves import eaves
 from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
+from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import PartPlan
 
@@ -66,6 +68,7 @@ def details_of(
     outlines = shapely.STRtree([plan.outline for plan in plans])
     hanging: list[list[PartPlan]] = [[] for _ in plans]
     made: list[list[PartPlan]] = []
+    families = styles().families
     for p, plan in enumerate(plans):
         base = bases[p]
         beside = outlines.query(plan.outline, predicate="dwithin", distance=3.0).tolist()
@@ -90,11 +93,12 @@ def details_of(
 
         made.append([*ledges[p], *fringes[p]])
         with expendable(f"{plan.id} details", dropped):
-            sitting = rooftop_parts(plan, rng(seed, "rooftop", plan.id))
+            sitting = rooftop_parts(plan, meshes[p], base, fronts[p], rng(seed, "rooftop", plan.id), region=region)
             tanks = water_tank(plan, region, rng(seed, "tank", plan.id))
             sitting = [solid for solid in sitting if not any(solid.polygon.distance(t.polygon) < 0.5 for t in tanks)]
             sitting += tanks
             windows = dormers(plan, meshes[p], base, sitting, region, rng(seed, "dormers", plan.id))
             hanging[p] = projections(plan, looks[p], fronts[p], free, region, rng(seed, "projections", plan.id))
-            made[p] += [*sitting, *windows, *hanging[p], *posts(plan, streets)]
+            gables = stepped_gables(plan, fronts[p]) if families[looks[p].wall].gable else []
+            made[p] += [*sitting, *windows, *gables, *hanging[p], *posts(plan, streets)]
     return made

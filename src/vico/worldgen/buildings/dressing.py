@@ -94,8 +94,8 @@ class _Levels:
         Below this a wall is stone; NaN: it has no plinth.
     small
         Whether it is a small solid with a finish.
-    hall
-        Whether it has one row of windows from a low base to the eaves.
+    by_storey
+        Whether its picture begins at the first floor: that of halls, and of families whose storeys are unlike.
     whole
         Small solids that are not cut at their eaves.
     storeys
@@ -107,7 +107,7 @@ class _Levels:
     eaves: NDArray[np.float64]
     plinth: NDArray[np.float64]
     small: NDArray[np.bool_]
-    hall: NDArray[np.bool_]
+    by_storey: NDArray[np.bool_]
     whole: NDArray[np.bool_]
     storeys: NDArray[np.float64]
 
@@ -206,7 +206,9 @@ def _levels(
     plinth = np.where((base - bottom > 0.75) & (low <= 0) & ~small, base, np.nan)
     whole = small & ~np.array([part.finish == "dormer" for part in parts])
     storeys = np.array([storeys.count for storeys in divided])
-    return _Levels(base, ground_top, eaves, plinth, small, hall, whole, storeys)
+    families = styles().families
+    by_storey = hall | np.array([families[look.wall].by_storey for look in looks])
+    return _Levels(base, ground_top, eaves, plinth, small, by_storey, whole, storeys)
 
 
 def _cut(mesh: SolidMesh, levels: _Levels) -> None:
@@ -260,9 +262,10 @@ def _of_look(look: FacadeStyle, shop: str) -> dict[Zone, _Cloth]:
     }
 
 
-def _of_finish(finish: Finish) -> dict[Zone, _Cloth]:
+def _of_finish(finish: Finish, look: FacadeStyle) -> dict[Zone, _Cloth]:
     """Return what a finish has zones wear instead."""
-    worn = {Zone.BLANK: (finish.side, finish.tint), Zone.GROUND_FLOOR: (finish.picture or finish.side, finish.tint)}
+    tint = look.tint if finish.as_wall else finish.tint
+    worn = {Zone.BLANK: (finish.side, tint), Zone.GROUND_FLOOR: (finish.picture or finish.side, tint)}
     if finish.cover:
         worn[Zone.ROOF] = (finish.cover, finish.cover_tint)
     return worn
@@ -287,9 +290,9 @@ class _Wardrobe:
         worn = [finishes[part.finish] if part.finish else None for part in parts]
         clothes = [_of_look(look, shop) for look, shop in zip(looks, shops, strict=True)]
         under: list[_Cloth] = []
-        for outfit, finish in zip(clothes, worn, strict=True):
+        for outfit, finish, look in zip(clothes, worn, looks, strict=True):
             if finish is not None:
-                outfit |= _of_finish(finish)
+                outfit |= _of_finish(finish, look)
             under.append(
                 ("blank_plaster", outfit[Zone.ROOF][1]) if finish is None else (finish.under, finish.under_tint)
             )
@@ -347,9 +350,10 @@ def _bay_uv(
     z, base, top = corner[..., 2], levels.base[mine], levels.ground_top[mine]
     if zone in (Zone.UPPER_FLOORS, Zone.BACK):
         v = sheets.storey_coordinates(z, top[:, None], levels.eaves[mine][:, None], levels.storeys[mine][:, None])
-        v = v + np.where(levels.hall[mine][:, None], 0.0, shift[line, 1:])
+        v = v + np.where(levels.by_storey[mine][:, None], 0.0, shift[line, 1:])
     else:
         v = np.clip((z - base[:, None]) / (top - base)[:, None], 0.004, 0.996)
+        v = v * np.where(levels.small[mine], levels.storeys[mine], 1.0)[:, None]  # an oriel's storeys are alike
     return np.stack([u, v], axis=-1)
 
 

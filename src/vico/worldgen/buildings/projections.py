@@ -21,6 +21,7 @@ from vico.worldgen.facts.outlines.roof_shapes import Roof
 
 _LEAST_HEIGHT = 2.9  # metres under whatever hangs over a pavement
 _MOST = 40  # pieces a building
+_STOREY = 3.25  # metres: of an oriel
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,12 @@ class _Wall:
         """Return a rectangle before the wall; side, front and side come first, the edge at the wall last."""
         start, along, out = self.edges.start[self.k], self.edges.along[self.k], self.edges.out[self.k]
         corners = [(s0, d0), (s0, d1), (s1, d1), (s1, d0)]
+        return Polygon([start + along * s + out * d for s, d in corners])
+
+    def bay_window(self, s0: float, s1: float) -> Polygon:
+        """Return the canted outline of an oriel; its corners come in the order of a box's."""
+        start, along, out = self.edges.start[self.k], self.edges.along[self.k], self.edges.out[self.k]
+        corners = [(s0, 0.0), (s0 + _CANT, _ORIEL), (s1 - _CANT, _ORIEL), (s1, 0.0)]
         return Polygon([start + along * s + out * d for s, d in corners])
 
 
@@ -104,6 +111,8 @@ _Pieces = list[tuple[Polygon, float, float, str]]
 
 
 def _planned(box: Polygon, low: float, high: float, finish: str) -> PartPlan:
+    if finish == "oriel":
+        return PartPlan(box, low, high, max(round((high - low) / _STOREY), 1), Roof("flat", 0.0), {}, finish)
     if finish != "steps":
         return PartPlan(box, low, high, 0, Roof("flat", 0.0), {}, finish)
     # A flight of steps is a sheet seen from both sides: closed, but without the edges of a board.
@@ -174,6 +183,41 @@ def _alpine(wall: _Wall, share: float, region: RegionalStyle, random: np.random.
     return made
 
 
+_ORIEL, _CANT = 0.85, 0.3  # metres: how far an oriel juts out, and by how much its front is narrower
+
+
+def _oriels(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
+    """Return oriels: closed bays before one axis in four, from the first floor up to below the last, or none."""
+    count, bays = int(wall.storeys.count), round(wall.length / wall.bay)
+    if share > 0.62 or count < 2 or bays < 2 or wall.length < 4.6:
+        return []
+    half = min(max(0.46 * wall.bay, 0.95), 1.5)
+    made: list[_Pieces] = []
+    for i in range(bays // 2 if bays < 6 else 1, bays, 4):
+        middle = (i + 0.5) * wall.bay
+        low, high = wall.storeys.floor(0) - 0.12, wall.storeys.floor(count - 1 if count > 2 else count) - 0.12
+        if middle - half > 0.5 and middle + half < wall.length - 0.5:
+            made.append([(wall.bay_window(middle - half, middle + half), low, high, "oriel")])
+    return made
+
+
+def _oriels_and_balconies(
+    wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator
+) -> list[_Pieces]:
+    """Return oriels, or an iron balcony before the middle axis of every floor where a house has none."""
+    made = _oriels(wall, share * 1.2, region, random)
+    count, bays = int(wall.storeys.count), round(wall.length / wall.bay)
+    if made or bays < 3 or wall.length < 6.0:
+        return made
+    half = min(0.8 * wall.bay, 1.6)
+    for k in range(count):
+        for i in range(bays // 2 if bays < 7 else 1, bays, 4):
+            middle = (i + 0.5) * wall.bay
+            if middle - half > 0.3 and middle + half < wall.length - 0.3:
+                made.append(_balcony(wall, middle - half, middle + half, wall.storeys.floor(k), 1.0, "rail_iron"))
+    return made
+
+
 def _escape(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
     """Return iron fire escapes as in New York: a landing at every floor before two windows, steps between."""
     count = int(wall.storeys.count)
@@ -203,6 +247,8 @@ _MAKERS: dict[str, Callable[[_Wall, float, RegionalStyle, np.random.Generator], 
     "small_balconies": _southern,
     "wooden_balconies": _alpine,
     "fire_escapes": _escape,
+    "oriels": _oriels,
+    "oriels_and_balconies": _oriels_and_balconies,
 }
 
 

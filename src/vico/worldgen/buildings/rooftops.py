@@ -15,6 +15,8 @@ from vico.exact import apply_matrix
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
 from vico.world.model import Dropped
+from vico.worldgen.buildings.chimneys import party_wall_stacks, ridge_chimneys
+from vico.worldgen.buildings.solids import Mesh
 from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
@@ -27,15 +29,29 @@ _POST_EVERY = 6.0
 _ROADWAY = 3.6  # metres from a street's centre line that stay free of posts
 
 
-def rooftop_parts(plan: BuildingPlan, random: np.random.Generator) -> list[PartPlan]:
+def rooftop_parts(
+    plan: BuildingPlan,
+    meshes: Sequence[Mesh],
+    base: float,
+    fronts: Sequence[NDArray[np.bool_]],
+    random: np.random.Generator,
+    *,
+    region: str,
+) -> list[PartPlan]:
     """Decide the small solids of a building's roof: penthouses and chimneys.
 
     Parameters
     ----------
     plan
         The building.
+    meshes, fronts
+        Of each part its solid, ENU metres, and the edges that show a front.
+    base
+        Height of the ground floor.
     random
         The building's own stream.
+    region
+        As `facades.catalogue.region_of` says.
 
     Returns
     -------
@@ -43,7 +59,8 @@ def rooftop_parts(plan: BuildingPlan, random: np.random.Generator) -> list[PartP
         Without storeys; `finish` says what they are.
     """
     made: list[PartPlan] = []
-    for part in plan.parts:
+    stacked = styles().region(region).chimneys == "on_party_walls"
+    for part, mesh, front in zip(plan.parts, meshes, fronts, strict=True):
         if part.levels == 0 or part.eaves < 4.5 or part.polygon.area < 50.0:
             continue
         bare = part.roof.shape == "flat" and part.roof.height <= 0.0
@@ -54,7 +71,10 @@ def rooftop_parts(plan: BuildingPlan, random: np.random.Generator) -> list[PartP
         if part.roof.shape == "flat":
             made += _penthouses(part, free, random)
         elif part.roof.shape in _CHIMNEYED and plan.use in ("residential", "hotel", "commercial", "civic"):
-            made += _chimneys(part, free, random)
+            if stacked:
+                made += party_wall_stacks(part, free, mesh, base, front, random)
+            else:
+                made += ridge_chimneys(part, free, mesh, base, random)
     return made
 
 
@@ -192,22 +212,6 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
         box = _box(_spot(room, at), size, _main_direction(part.polygon))
         if free.contains(overlay.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
             made.append(_solid(box, part.eaves - 0.2, part.eaves + float(random.uniform(1.6, 3.0)), "penthouse"))
-    return made
-
-
-def _chimneys(part: PartPlan, free: BaseGeometry, random: np.random.Generator) -> list[PartPlan]:
-    # Towards the ridge: a chimney at the eaves would have to stand free as high as the roof.
-    inset = max(1.2, 0.65 * part.polygon.area / part.polygon.exterior.length)
-    room = max(polygons_of(overlay.buffer(free, -inset)), key=lambda shape: shape.area, default=None)
-    if room is None:
-        return []
-    made: list[PartPlan] = []
-    count = min(int(part.polygon.area / 210.0) + 1, 4)
-    for at in random.random((count, 2)):
-        box = _box(_spot(room, at), np.array([1.1, 0.6]), _main_direction(part.polygon))
-        if free.contains(box) and not any(box.intersects(m.polygon) for m in made):
-            # Its foot lies a little under the eaves: on them it would share a plane with other solids' tops.
-            made.append(_solid(box, part.eaves - 0.07, part.top + float(random.uniform(0.5, 1.1)), "chimney"))
     return made
 
 

@@ -18,6 +18,7 @@ from vico.worldgen.buildings.details import details_of
 from vico.worldgen.buildings.drafts import Draft, bodies_of, drafted, record_of, with_rooftop
 from vico.worldgen.buildings.dressing import dressed
 from vico.worldgen.buildings.proving import proven
+from vico.worldgen.buildings.roofs.customs import is_flat_town, with_customary_roofs
 from vico.worldgen.buildings.solids import leaky
 from vico.worldgen.buildings.wall_lines import fronts_of, is_street, wall_lines
 from vico.worldgen.facades import looks
@@ -106,12 +107,16 @@ def buildings_from_plans(decided: BuildingPlans, osm: OsmData, terrain: HeightFi
 
     dropped = list(decided.dropped)
     drafts: list[Draft] = []
+    streets = shapely.STRtree([shapely.LineString(way.line) for way in osm.ways if is_street(way)])
+    flat = is_flat_town(decided.plans)
     for plan in decided.plans:
         with expendable(plan.id, dropped):
-            drafts.append(drafted(plan, look_of(plan, plan.parts[0].tags), terrain))
+            look = look_of(plan, plan.parts[0].tags)
+            random = rng(seed, "roof customs", plan.id)
+            roofed = with_customary_roofs(plan, look.wall, streets, region=region, flat_town=flat, random=random)
+            drafts.append(drafted(roofed, look, terrain))
     drafts = _told_apart(drafts)
     fronts = fronts_of([draft.plan for draft in drafts], [draft.seat for draft in drafts], osm)
-    streets = shapely.STRtree([shapely.LineString(way.line) for way in osm.ways if is_street(way)])
     details = details_of(drafts, fronts, streets, dropped, region=region, seed=seed)
     drafts = [with_rooftop(draft, small, dropped) for draft, small in zip(drafts, details, strict=True)]
     drafts, mesh = proven(drafts, terrain, dropped)

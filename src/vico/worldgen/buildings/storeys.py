@@ -34,7 +34,7 @@ class Storeys:
 def storeys_of(plan: BuildingPlan, part: PartPlan, *, hall: bool) -> Storeys:
     """Divide a part's height; a hall has one row of windows from a low base to the eaves."""
     if part.finish:
-        return Storeys(part.eaves, part.eaves, 1.0)
+        return Storeys(part.eaves, part.eaves, float(max(part.levels, 1)))
     if hall:
         ground = min(2.4, 0.25 * part.eaves)
     else:

@@ -34,8 +34,8 @@ from vico.worldgen.facades.records import (
     Uses,
     UsesFile,
 )
+from vico.worldgen.facades.textures.block_walls import UPPER_FLOORS
 from vico.worldgen.facades.textures.ground_floors import GROUNDS
-from vico.worldgen.facades.textures.walls import WALLS
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _families_by_value(entries: Iterable[TagValues]) -> dict[str, Shares]:
 def _check_pictures(files: Iterable[tuple[Path, FamiliesFile]]) -> None:
     for path, file in files:
         for k, family in enumerate(file.family):
-            _check_painted(f"{path}: family.{k}.picture", family.picture or family.name, WALLS)
+            _check_painted(f"{path}: family.{k}.picture", family.picture or family.name, UPPER_FLOORS)
             for floor in family.ground_floors:
                 _check_painted(f"{path}: family.{k}.ground_floors", floor, GROUNDS)
 
@@ -175,6 +175,9 @@ def _shares_of_regions(file: RegionsFile) -> Iterator[tuple[str, Shares]]:
         for age in StreetMix.model_fields:
             yield f"region.{k}.streets.{age}", getattr(region.streets, age)
         yield f"region.{k}.towers", region.towers
+        yield f"region.{k}.office_towers", region.office_towers
+        for value, shares in region.materials.items():
+            yield f"region.{k}.materials.{value}", shares
         yield f"region.{k}.wooden_gables", region.wooden_gables
 
 

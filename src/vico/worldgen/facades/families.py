@@ -95,7 +95,7 @@ def table_of(*shares: Shares) -> Table:
 def of_its_material(house: House) -> Table | None:
     """Decide by ``building:material``."""
     said = house.tags.get("building:material", house.tags.get("building:facade:material", "")).lower()
-    return table_of(house.styles.materials.get(said, {}))
+    return table_of(house.region.materials.get(said) or house.styles.materials.get(said, {}))
 
 
 def place_of_worship(house: House) -> Table | None:
@@ -135,7 +135,9 @@ def tower(house: House) -> Table | None:
     if house.levels < 14:
         return None
     uses = house.styles.uses
-    return table_of(uses.tower_of_homes if house.use == "residential" else uses.tower_of_offices)
+    if house.use == "residential":
+        return table_of(uses.tower_of_homes)
+    return table_of(house.region.office_towers or uses.tower_of_offices)
 
 
 def of_its_age(house: House) -> Table | None:

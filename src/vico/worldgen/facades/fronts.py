@@ -211,6 +211,8 @@ def _ground_area(building: Building) -> float:
     return abs(float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())) / 2
 
 
+_ASIDE = 0.13  # metres beside a shop front at which its projecting sign hangs
+_HEADROOM = 2.2  # metres below it
 _WIDTH = {
     "shop": 1.3,
     "hotel": 2.3,
@@ -463,7 +465,7 @@ class _Front:
         awning = random.random() < (0.45 if lead.category is Category.FOOD else 0.12)
         if awning and low - 0.75 - z > 2.0 and b - a > 1.8:
             self._awning(a, b, low, ground)
-        self._projecting(boards, shops, a, b, low, high)
+        self._projecting(boards, shops, a, b, low)
 
     def _names(self, boards: Sequence[Board], a: float, b: float, low: float, high: float) -> None:
         """Add the names on the fascia, side by side."""
@@ -483,20 +485,27 @@ class _Front:
         self.face.slope(a, b, (low - 0.5, 1.05), (low + 0.02, 0.14), uv=uv, colour=colour)
         self.face.slope(a, b, (low - 0.72, 1.06), (low - 0.5, 1.05), uv=uv, colour=colour)
 
-    def _projecting(
-        self, boards: Sequence[Board], shops: Sequence[Place], a: float, b: float, low: float, high: float
-    ) -> None:
-        """Add a sign at a right angle to the wall: a pharmacy's cross, or a short name."""
-        side = a + 0.1 if self.random.random() < 0.5 else b - 0.1
-        z = high - 0.1
+    def _projecting(self, boards: Sequence[Board], shops: Sequence[Place], a: float, b: float, low: float) -> None:
+        """Add a sign at a right angle to the wall, beside the front and below its fascia: a pharmacy's cross or a name.
+
+        There it hides no letters, seen from the side, and hangs clear of the awning.
+        """
+        assert self.spot.wall is not None
+        side = a - _ASIDE if self.random.random() < 0.5 else b + _ASIDE
+        side = min(max(side, 0.05), self.spot.wall.length - 0.05)
+        most = low - 0.04 - (self.z + _HEADROOM)
+        if most < 0.3:
+            return
         if any(shop.kind in ("pharmacy", "chemist") for shop in shops):
-            self.face.plate(side, z - 0.6, z, 0.2, 0.8, uv=cell_uv("cross"), stuff="doors")
+            tall = min(0.6, most)
+            self.face.plate(side, low - 0.04 - tall, low - 0.04, 0.2, 0.2 + tall, uv=cell_uv("cross"), stuff="doors")
         else:
             short = [board for board in boards if board.aspect < 4.2]
             if not short or self.random.random() > 0.35:
                 return
-            tall = 0.8 / short[0].aspect
-            self.face.plate(side, z - tall, z, 0.16, 0.96, uv=short[0].uv, stuff=self._page(short[0]))
+            tall = min(0.8 / short[0].aspect, most)
+            top, wide = low - 0.04, tall * short[0].aspect
+            self.face.plate(side, top - tall, top, 0.16, 0.16 + wide, uv=short[0].uv, stuff=self._page(short[0]))
         self.counts["projecting_signs"] += 1
 
 

@@ -175,7 +175,7 @@ def _back(family: Family, tint: Rgb, area: float, region: RegionalStyle, draws: 
 
 def _reach(family: Family, levels: int, region: RegionalStyle, draws: _Draws) -> float:
     """Return how far a pitched roof reaches out over the walls, metres."""
-    if family.cornice == "always":
+    if family.cornice == "always" or family.gable:
         return 0.0
     if family.hall or levels > 7:
         return 0.25

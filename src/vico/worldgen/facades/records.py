@@ -21,6 +21,8 @@ Share = Annotated[float, Field(gt=0.0)]
 Metres = Annotated[float, Field(gt=0.0)]
 #: Names, and how often each is taken beside the others.
 Shares = Mapping[str, Share]
+#: The same for shapes of roofs.
+RoofShares = Mapping[Literal["gabled", "hipped", "half-hipped", "mansard", "flat"], Share]
 
 
 class Family(DataRecord):
@@ -31,7 +33,7 @@ class Family(DataRecord):
     name
         Of the family and of its material; the upper floors' picture is painted under this name, or `picture`.
     picture
-        Name of the painter in `textures.walls.WALLS`; empty: the family's own name.
+        Name of the painter in `textures.block_walls.UPPER_FLOORS`; empty: the family's own name.
     bay
         Wished width of a bay, metres.
     tints
@@ -62,6 +64,17 @@ class Family(DataRecord):
         What cornices wear; each building gets one.
     hangs
         What hangs on its fronts (`buildings.projections`).
+    by_storey
+        The picture's rows are storeys from the first floor up, so that its best floor is the first; else a wall begins
+        on any row.
+    roofs
+        Shapes of its pitched roofs, where the map says none (`buildings.roofs.customs`); empty: the region's.
+    ridge
+        Whether a gabled roof's ridge runs along the street, or across; empty: along the longer side.
+    gable
+        What stands before a gable towards the street (`buildings.gables`).
+    source
+        What is known of such houses, and from where.
     """
 
     name: Name
@@ -80,7 +93,21 @@ class Family(DataRecord):
     cornice: Literal["none", "always", "under_flat_roofs"] = "none"
     cornice_size: tuple[Metres, Metres] = (0.42, 0.32)
     cornice_finishes: Annotated[tuple[str, ...], Field(min_length=1)] = ("cornice",)
-    hangs: Literal["", "balconies", "french_balconies", "small_balconies", "wooden_balconies", "fire_escapes"] = ""
+    hangs: Literal[
+        "",
+        "balconies",
+        "french_balconies",
+        "small_balconies",
+        "wooden_balconies",
+        "fire_escapes",
+        "oriels",
+        "oriels_and_balconies",
+    ] = ""
+    by_storey: bool = False
+    roofs: RoofShares = Field(default_factory=dict)
+    ridge: Literal["", "along", "across"] = ""
+    gable: Literal["", "stepped"] = ""
+    source: str = ""
 
 
 class GroundFloor(DataRecord):
@@ -155,10 +182,19 @@ class RegionalStyle(DataRecord):
         What pitched roofs are covered with.
     eaves
         How far pitched roofs reach out over the walls, metres.
+    pitched
+        Shapes of pitched roofs of houses of three storeys and more, where neither the map nor the family says any;
+        empty: as elsewhere.
     dormers
         Of houses with a suitable roof, how many have any; mansards always do.
+    chimneys
+        Whether they stand by the ridge, or as rows of pots on the walls between houses.
     towers
         Of homes of eight storeys and more; empty: as elsewhere.
+    office_towers
+        Of other houses of fourteen storeys and more; empty: as elsewhere.
+    materials
+        What a value of ``building:material`` stands for here, where that is not what it is elsewhere.
     small_town_trade
         Share of low houses of trade that are like the small old ones beside them; 0: they are as elsewhere.
     brick_backs
@@ -177,8 +213,12 @@ class RegionalStyle(DataRecord):
     streets: StreetMix
     roofs: Shares
     eaves: Annotated[float, Field(ge=0.0)] = 0.35
+    pitched: RoofShares = Field(default_factory=dict)
     dormers: Annotated[float, Field(ge=0.0, le=1.0)] = 0.7
+    chimneys: Literal["by_the_ridge", "on_party_walls"] = "by_the_ridge"
     towers: Shares = Field(default_factory=dict)
+    office_towers: Shares = Field(default_factory=dict)
+    materials: Mapping[str, Shares] = Field(default_factory=dict)
     small_town_trade: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     brick_backs: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     wooden_gables: Shares = Field(default_factory=dict)
@@ -260,6 +300,8 @@ class Finish(DataRecord):
         As a plan's `finish` says it.
     side, tint
         Material and colour of its sides.
+    as_wall
+        Its sides have the colour of the building's walls instead.
     picture
         What its outline's edges show from bottom to top, where that is not plain; "" nothing.
     bay
@@ -275,6 +317,7 @@ class Finish(DataRecord):
     name: str
     side: str
     tint: Rgb
+    as_wall: bool = False
     picture: str = ""
     bay: Metres = 1.0
     shown: tuple[int, ...] = ()

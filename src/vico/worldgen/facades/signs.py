@@ -66,6 +66,9 @@ def colours_of(place: Place) -> BoardColours:
     return boards[zlib.crc32(place.name.encode()) % len(boards)]
 
 
+_LONGEST = 30  # characters of a name that a board has room for
+
+
 def board_text(place: Place) -> str | None:
     """Return what a place's board says, shortened to fit; None where its letters can't be drawn."""
     text = spelled(place.name)
@@ -74,9 +77,17 @@ def board_text(place: Place) -> str | None:
     for cut in (" - ", " | ", " (", ", ", " / "):
         if len(text) > 22 and cut in text[3:]:
             text = text[: text.index(cut, 3)]
-    if len(text) > 30:
-        text = text[:30].rsplit(" ", 1)[0]
+    if len(text) > _LONGEST:
+        text = _cut_at_a_word(text)
     return text.upper() if zlib.crc32(b"case" + place.name.encode()) % 3 == 0 else text
+
+
+def _cut_at_a_word(text: str) -> str:
+    """Return a name's first words, as many as a board has room for: it doesn't end in "of", "und" or "&"."""
+    words = text.split()
+    while len(words) > 1 and (len(" ".join(words)) > _LONGEST or len(words[-1]) <= 3):
+        words.pop()
+    return " ".join(words)
 
 
 def paint_boards(places: Sequence[Place]) -> Boards:

@@ -167,9 +167,9 @@ def _shelves(
 
 
 def _shops(random: np.random.Generator) -> Picture:
-    """Recent shop fronts: panes from knee to fascia between slim piers, all with a board for the name."""
+    """Recent shop fronts: panes between slim piers, lights above a transom: who trades there, nobody says."""
     canvas = blocks(_PX, _W, random, 32, 64, (158, 155, 150))
-    boards = ((58, 62, 66), (78, 52, 46), (50, 66, 60), (62, 58, 72), (104, 94, 76), (46, 56, 74), (70, 70, 68))
+    paints = ((58, 62, 66), (78, 52, 46), (50, 66, 60), (62, 58, 72), (104, 94, 76), (46, 56, 74), (70, 70, 68))
     for i in range(BAYS):
         x = i * _PX
         canvas.rect(x + 14, 14, x + _PX - 14, 234, (48, 48, 50))
@@ -177,10 +177,13 @@ def _shops(random: np.random.Generator) -> Picture:
         kind = int(random.integers(4))
         for left, right in pairwise(edges):
             show_window(canvas, left + 2, 26, right - 2, 184, kind=kind, lamp=float(random.choice([0.25, 0.6, 0.85])))
-        board = np.asarray(boards[i % len(boards)], np.float32)
-        canvas.rect(x + 12, 190, x + _PX - 12, 230, board)
-        canvas.rect(x + 12, 227, x + _PX - 12, 230, board * 1.25)
-        canvas.shade(x + 14, 183, x + _PX - 14, 190, 0.5)
+        paint = np.asarray(paints[i % len(paints)], np.float32)
+        canvas.rect(x + 14, 184, x + _PX - 14, 192, paint)
+        for left, right in pairwise(np.linspace(x + 18, x + _PX - 18, 5 if i % 2 else 4)):
+            glass(canvas, left + 2, 194, right - 2, 228, lively=0.0, lit=0.4)
+        canvas.rect(x + 12, 228, x + _PX - 12, 233, paint * 1.2)
+        canvas.shade(x + 14, 180, x + _PX - 14, 184, 0.6)
+        canvas.shade(x + 16, 222, x + _PX - 16, 228, 0.6)
     _course(canvas, (206, 202, 196))
     canvas.rect(0, 0, _W, 12, (112, 108, 104))
     _soil(canvas)
@@ -204,8 +207,12 @@ def _cafes(random: np.random.Generator) -> Picture:
             canvas.rect(left, 18, right, 52, paint * 1.15)
             canvas.shade(left + 6, 23, right - 6, 47, 0.82)
             canvas.shade(left + 8, 25, right - 8, 45, 1.2)
-        canvas.rect(x + 26, 190, x + _PX - 26, 218, paint)
-        canvas.rect(x + 26, 216, x + _PX - 26, 222, paint * 1.3)
+        canvas.rect(x + 26, 190, x + _PX - 26, 222, paint)
+        for k in range(4):  # a frieze of panels, where a sign would be one board
+            panel = x + 34 + k * 47.5
+            canvas.shade(panel, 195, panel + 40, 215, 0.76)
+            canvas.shade(panel + 2, 197, panel + 38, 213, 1.26)
+        canvas.rect(x + 26, 218, x + _PX - 26, 222, paint * 1.3)
         canvas.shade(x + 30, 184, x + _PX - 30, 190, 0.55)
         if i in (2, 5):
             canvas.rect(x + 24, 152, x + _PX - 24, 190, paint * 1.2)
@@ -270,8 +277,45 @@ def _shuttered(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _brick_ground(random: np.random.Generator) -> Picture:
-    canvas = bricks(_PX, _W, random, 8, 16)
+def _stucco(random: np.random.Generator) -> Picture:
+    """Paint white stucco, lined out as stone, over an area's railings: the ground floor of a Georgian terrace."""
+    canvas = plaster(_PX, _W, random, (236, 234, 228))
+    for y in range(48, 236, 30):
+        canvas.shade(0, y, _W, y + 3, 0.8)
+        canvas.shade(0, y + 3, _W, y + 4, 1.04)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        for joint in (-100, 100):
+            canvas.shade(x + joint, 50, x + joint + 2, 232, 0.86)
+        look = window_style("ground_stucco", arch=i % 4 == 1)
+        window(canvas, x - 42, 74, x + 42, 214, look, lit=0.34)
+    canvas.rect(0, 0, _W, 40, (178, 176, 172))
+    canvas.shade(0, 0, _W, 34, 0.7)
+    railing(canvas, 2, 2, _W - 6, 66, (30, 32, 34), gap=12)
+    _course(canvas, (240, 238, 232), 238)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _granite(random: np.random.Generator) -> Picture:
+    """Paint rough-hewn granite with round-headed openings: below the roughcast of Nordic Art Nouveau."""
+    canvas = blocks(_PX, _W, random, 32, 64, (150, 140, 136))
+    canvas.grain(12)
+    canvas.noise(7, 64)
+    for y in range(0, _PX, 32):  # hewn faces catch the light above and throw a shadow below
+        canvas.shade(0, y + 24, _W, y + 31, 1.14)
+        canvas.shade(0, y + 2, _W, y + 8, 0.82)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        look = window_style("ground_granite", arch=i % 2 == 0)
+        window(canvas, x - 52, 72, x + 52, 212 if i % 2 == 0 else 196, look, lit=0.36)
+    _course(canvas, (172, 164, 158), 242)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _brick_ground(random: np.random.Generator, base: Colour = (158, 104, 86)) -> Picture:
+    canvas = bricks(_PX, _W, random, 8, 16, base)
     canvas.rect(0, 0, _W, 38, (176, 170, 164))
     canvas.shade(0, 38, _W, 41, 0.8)
     stone = (222, 216, 204)
@@ -412,7 +456,10 @@ GROUNDS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "ground_rusticated": _rusticated,
     "ground_plain": _plain,
     "ground_shuttered": _shuttered,
+    "ground_stucco": _stucco,
+    "ground_granite": _granite,
     "ground_brick": _brick_ground,
+    "ground_brick_stock": lambda random: _brick_ground(random, (148, 126, 98)),
     "ground_brownstone": _brownstone,
     "ground_boards": _boards_ground,
     "ground_arcade": _arcade,

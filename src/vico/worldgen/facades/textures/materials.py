@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from vico.seeds import rng
 from vico.world.mesh import Material
 from vico.worldgen.facades.catalogue import styles
+from vico.worldgen.facades.textures.block_walls import UPPER_FLOORS
 from vico.worldgen.facades.textures.doors import paint_doors
 from vico.worldgen.facades.textures.ground_floors import GROUNDS
 from vico.worldgen.facades.textures.trims import HOLED, TRIMS
-from vico.worldgen.facades.textures.walls import WALLS
 from vico.worldgen.texture_canvas import Canvas, blocks, bricks, plaster
 
 # ------------------------------------------------------------------------------------------------ blank walls, roofs
@@ -124,15 +124,18 @@ def _water(random: np.random.Generator) -> NDArray[np.uint8]:
 
 #: What paints the picture of a material, by name.
 PAINTERS: dict[str, Callable[[np.random.Generator], NDArray[np.uint8]]] = {
-    **WALLS,
+    **UPPER_FLOORS,
     **GROUNDS,
     **TRIMS,
     "blank_plaster": _blank_plaster,
     "blank_brick": lambda random: bricks(256, 256, random).texture(),
+    "blank_brick_stock": lambda random: bricks(256, 256, random, base=(148, 126, 98)).texture(),
+    "blank_brick_dark": lambda random: bricks(256, 256, random, base=(104, 72, 60)).texture(),
     "blank_stone": lambda random: blocks(256, 256, random, 64, 128).texture(),
     "blank_boards": _blank_boards,
     "roof_tiles": _tiles,
     "roof_metal": _seamed,
+    "roof_zinc": _seamed,
     "roof_slate": _slates,
     "roof_gravel": _gravel,
     "doors": paint_doors,

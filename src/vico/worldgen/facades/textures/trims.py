@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.worldgen.facades.textures.walls import BAYS
 from vico.worldgen.facades.textures.windows import window, window_style
-from vico.worldgen.texture_canvas import Canvas, plaster
+from vico.worldgen.texture_canvas import Canvas, bricks, plaster
 
 _PX = 128
 _RAIL = 64  # pixels a bay of railing, and its height
@@ -25,6 +25,42 @@ def _dormer(random: np.random.Generator) -> Picture:
         x = (i + 0.5) * _PX
         look = window_style("dormer")
         window(canvas, x - 44, 26, x + 44, 116, look, lit=0.3)
+    return canvas.texture()
+
+
+def _oriel(random: np.random.Generator) -> Picture:
+    """Paint a storey of an oriel: all but window, between mullions, over a panelled parapet."""
+    canvas = plaster(_PX, BAYS * _PX, random, (230, 228, 222))
+    for i in range(BAYS):
+        x = (i + 0.5) * _PX
+        canvas.rect(i * _PX, 0, (i + 1) * _PX, 5, (240, 238, 232))
+        canvas.shade(x - 46, 11, x + 46, 31, 0.9)
+        canvas.shade(x - 43, 13, x + 43, 29, 1.12)
+        window(canvas, x - 50, 40, x + 50, 112, window_style("oriel"), lit=0.32)
+        canvas.rect(i * _PX, 118, (i + 1) * _PX, _PX, (240, 238, 232))
+        canvas.shade(i * _PX, 115, (i + 1) * _PX, 118, 0.74)
+    return canvas.texture()
+
+
+def _gable_window(random: np.random.Generator) -> Picture:
+    """Paint the hatch of a warehouse loft in dark brick, below its hoisting beam."""
+    canvas = bricks(_PX, BAYS * _PX, random, 4, 8, (104, 72, 60))
+    for i in range(BAYS):
+        x = (i + 0.5) * _PX
+        window(canvas, x - 16, 18, x + 16, 104, window_style("gable"), lit=0.2)
+        canvas.rect(x - 2, 110, x + 2, 122, (48, 40, 36))
+    return canvas.texture()
+
+
+def _pots(random: np.random.Generator) -> Picture:
+    """Paint a row of chimney pots, with the dark between them."""
+    canvas = Canvas(32, BAYS * 32, (52, 48, 46), random)
+    for i in range(BAYS * 2):
+        tone = float(random.uniform(0.85, 1.1))
+        for k in range(13):
+            round_ = 0.66 + 0.5 * float(np.sin(np.pi * (k + 0.5) / 13))
+            canvas.rect(i * 16 + 1 + k, 0, i * 16 + 2 + k, 32, np.array([184, 118, 84]) * tone * round_)
+        canvas.shade(i * 16 + 1, 27, i * 16 + 14, 29, 0.7)
     return canvas.texture()
 
 
@@ -133,6 +169,9 @@ def _deck(random: np.random.Generator) -> Picture:
 
 TRIMS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "dormer": _dormer,
+    "oriel": _oriel,
+    "gable_window": _gable_window,
+    "chimney_pots": _pots,
     "rail_iron": _iron,
     "rail_steps": _steps,
     "rail_wood": _wood,

@@ -22,14 +22,14 @@ _W, _H = BAYS * _PX, STOREYS * _PX
 Picture = NDArray[np.uint8]
 
 
-def _cells() -> Iterator[tuple[int, int, float, float]]:
+def cells() -> Iterator[tuple[int, int, float, float]]:
     """Column, row, middle of the bay and floor of the storey, pixels."""
     for j in range(STOREYS):
         for i in range(BAYS):
             yield i, j, i * _PX + _PX / 2, float(j * _PX)
 
 
-def _band(canvas: Canvas, y: float, height: float, colour: Colour, shadow: float = 0.7) -> None:
+def band(canvas: Canvas, y: float, height: float, colour: Colour, shadow: float = 0.7) -> None:
     """Paint a string course right across, with the shadow it throws; over the sheet's lower edge the shadow wraps."""
     canvas.rect(0, y, _W, y + height, colour)
     canvas.shade(0, y + height, _W, y + height + 1, 0.92)
@@ -44,8 +44,8 @@ def _classic(random: np.random.Generator) -> Picture:
     hoods = ("gable", "flat", "flat", "")
     for j in range(STOREYS):
         if j % 2 == 0:
-            _band(canvas, j * _PX, 6, (244, 242, 238))
-    for _, j, x, y in _cells():
+            band(canvas, j * _PX, 6, (244, 242, 238))
+    for _, j, x, y in cells():
         look = window_style("classic", hood=hoods[j])
         window(canvas, x - 23, y + 30, x + 23, y + 101, look, lit=0.34)
         if j == 1:  # an apron below the sill
@@ -57,7 +57,7 @@ def _classic(random: np.random.Generator) -> Picture:
 def _plain(random: np.random.Generator) -> Picture:
     """Render with plain openings of the middle of the last century."""
     canvas = plaster(_H, _W, random)
-    for i, _, x, y in _cells():
+    for i, _, x, y in cells():
         look = window_style("plain", columns=3 if i % 2 else 2)
         half = 29 if i % 2 else 22
         window(canvas, x - half, y + 37, x + half, y + 98, look, lit=0.36)
@@ -70,8 +70,8 @@ def _brick(random: np.random.Generator) -> Picture:
     stone = (222, 216, 204)
     for j in range(STOREYS):
         if j == 2:
-            _band(canvas, j * _PX, 5, stone)
-    for _, _, x, y in _cells():
+            band(canvas, j * _PX, 5, stone)
+    for _, _, x, y in cells():
         look = window_style("brick", trim=stone)
         window(canvas, x - 21, y + 30, x + 21, y + 98, look, lit=0.34)
     return canvas.texture()
@@ -81,8 +81,8 @@ def _tenement(random: np.random.Generator, brick: Colour = (138, 84, 68), stone:
     """Dark brick, tall narrow sashes two to the bay, segmental heads and bands: walk-ups of the 1900s."""
     canvas = bricks(_H, _W, random, 4, 8, brick)
     for j in range(STOREYS):
-        _band(canvas, j * _PX, 4, stone, 0.76)
-    for _, _, x, y in _cells():
+        band(canvas, j * _PX, 4, stone, 0.76)
+    for _, _, x, y in cells():
         for side in (-26, 26):
             canvas.rect(x + side - 17, y + 98, x + side + 17, y + 104, stone)
             canvas.rect(x + side - 4, y + 98, x + side + 4, y + 107, (200, 178, 156))
@@ -99,8 +99,8 @@ def _stone(random: np.random.Generator) -> Picture:
     """Dressed stone with pilasters between the bays."""
     canvas = blocks(_H, _W, random, 16, 32)
     for j in range(STOREYS):
-        _band(canvas, j * _PX, 5, (232, 229, 223), 0.8)
-    for i, j, x, y in _cells():
+        band(canvas, j * _PX, 5, (232, 229, 223), 0.8)
+    for i, j, x, y in cells():
         left = i * _PX
         canvas.shade(left, y + 5, left + 10, y + _PX, 1.06)
         canvas.shade(left + 10, y + 5, left + 12, y + _PX, 0.82)
@@ -115,8 +115,8 @@ def _arched(random: np.random.Generator) -> Picture:
     canvas = blocks(_H, _W, random, 16, 64, (218, 206, 188))
     trim = (232, 221, 204)
     for j in range(STOREYS):
-        _band(canvas, j * _PX, 7, trim)
-    for _, j, x, y in _cells():
+        band(canvas, j * _PX, 7, trim)
+    for _, j, x, y in cells():
         if j % 2:
             window(canvas, x - 22, y + 32, x + 22, y + 98, window_style("pediment", trim=trim), lit=0.3)
             continue
@@ -132,8 +132,8 @@ def _french(random: np.random.Generator) -> Picture:
     """Pale stone or plaster, windows down to the floor behind iron railings, shutters beside some."""
     canvas = blocks(_H, _W, random, 16, 64, (222, 216, 204), joint=0.9)
     for j in range(STOREYS):
-        _band(canvas, j * _PX, 5, (234, 229, 218), 0.76)
-    for i, _, x, y in _cells():
+        band(canvas, j * _PX, 5, (234, 229, 218), 0.76)
+    for i, _, x, y in cells():
         look = window_style("french")
         window(canvas, x - 22, y + 10, x + 22, y + 106, look, lit=0.36)
         if i % 4 in (1, 2):
@@ -147,7 +147,7 @@ def _shuttered(random: np.random.Generator) -> Picture:
     canvas = plaster(_H, _W, random, (214, 211, 204))
     greens = ((96, 116, 96), (120, 108, 86), (104, 120, 132), (132, 96, 78))
     colour = greens[int(random.integers(len(greens)))]
-    for _, j, x, y in _cells():
+    for _, j, x, y in cells():
         look = window_style("shuttered")
         low = 12 if j == 1 else 30
         window(canvas, x - 19, y + low, x + 19, y + 102, look, lit=0.34)
@@ -164,7 +164,7 @@ def _alpine(random: np.random.Generator) -> Picture:
     canvas = plaster(_H, _W, random, (226, 223, 216))
     canvas.noise(3, 12)
     ochre = (214, 186, 138)
-    for i, j, x, y in _cells():
+    for i, j, x, y in cells():
         if (i + j) % 3 == 0:  # painted gable and scrolls around the frame
             for row in range(12):
                 side = 30 * (1 - row / 12)
@@ -196,7 +196,7 @@ def _timbered(random: np.random.Generator) -> Picture:
         canvas.rect(0, low + 118, _W, low + _PX, wood * 0.94)
         for k in range(BAYS * 4):
             canvas.rect(k * 32 + 10, low + 1, k * 32 + 18, low + 7, wood * 1.15)
-    for i, j, x, y in _cells():
+    for i, j, x, y in cells():
         left = i * _PX
         canvas.rect(left - 4 if i else 0, y + 8, left + 4, y + 120, wood * float(random.uniform(0.9, 1.08)))
         if i == 0:
@@ -231,7 +231,7 @@ def _boards(random: np.random.Generator) -> Picture:
     for j in range(STOREYS):
         canvas.rect(0, j * _PX, _W, j * _PX + 6, (240, 239, 236))
         canvas.shade(0, j * _PX + 6, _W, j * _PX + 7, 0.8)
-    for _, _, x, y in _cells():
+    for _, _, x, y in cells():
         look = window_style("boards")
         window(canvas, x - 20, y + 32, x + 20, y + 98, look, lit=0.36)
     return canvas.texture()
@@ -308,7 +308,7 @@ def _fins(random: np.random.Generator) -> Picture:
 def _grid(random: np.random.Generator) -> Picture:
     """Paint a recent office or hotel: a deep grid of stone or terracotta with storey-high windows set back in it."""
     canvas = blocks(_H, _W, random, 32, 64, (206, 200, 190), joint=0.9)
-    for i, _, x, y in _cells():
+    for i, _, x, y in cells():
         canvas.rect(x - 46, y + 14, x + 46, y + 120, (96, 94, 90))
         look = window_style("grid")
         window(canvas, x - 42, y + 14, x + 42, y + 116, look, lively=0.4, lit=0.34)
@@ -327,7 +327,7 @@ def _slab(random: np.random.Generator) -> Picture:
     canvas = Canvas(_H, _W, (204, 202, 198), random)
     canvas.noise(5, 40)
     canvas.grain(3)
-    for i, _, x, y in _cells():
+    for i, _, x, y in cells():
         tone = float(random.normal(1.0, 0.025))
         canvas.shade(i * _PX, y, (i + 1) * _PX, y + _PX, tone)
         half = (30, 30, 16, 30)[i % 4]
@@ -343,7 +343,7 @@ def _slab(random: np.random.Generator) -> Picture:
 def _balconies(random: np.random.Generator) -> Picture:
     """Homes with loggias in every other bay."""
     canvas = plaster(_H, _W, random)
-    for i, _, x, y in _cells():
+    for i, _, x, y in cells():
         left, right = x - _PX / 2, x + _PX / 2
         if i % 2:
             canvas.rect(left + 6, y + 7, right - 6, y + 113, (150, 148, 144))
@@ -368,7 +368,7 @@ def _panels(random: np.random.Generator) -> Picture:
     """Corrugated metal with a strip of lights high up."""
     canvas = Canvas(_H, _W, (214, 216, 218), random)
     canvas.pixels *= (1 + 0.07 * np.sin(np.arange(_W) * 2 * np.pi / 8))[None, :, None].astype(np.float32)
-    for i, j, x, y in _cells():
+    for i, j, x, y in cells():
         canvas.shade(x - _PX / 2, y, x + _PX / 2, y + 1.5, 0.7)
         if (i + j) % 2 == 0:
             look = window_style("panels")
@@ -380,7 +380,7 @@ def _panels(random: np.random.Generator) -> Picture:
 def _loft(random: np.random.Generator) -> Picture:
     """Paint factory brick: piers and wide steel windows of many panes."""
     canvas = bricks(_H, _W, random, 4, 8, (146, 92, 74))
-    for i, _, x, y in _cells():
+    for i, _, x, y in cells():
         canvas.shade(i * _PX, y, i * _PX + 12, y + _PX, 1.08)
         canvas.shade(i * _PX + 12, y, i * _PX + 14, y + _PX, 0.76)
         canvas.shade((i + 1) * _PX - 12, y, (i + 1) * _PX, y + _PX, 1.08)
@@ -394,7 +394,7 @@ def _back(random: np.random.Generator) -> Picture:
     """Paint the side nobody shows: bare render, small windows of stairs and kitchens, a down-pipe."""
     canvas = plaster(_H, _W, random, (198, 194, 188))
     canvas.noise(5, 5)
-    for i, j, x, y in _cells():
+    for i, j, x, y in cells():
         kind = (i * 5 + j) % 8 if i % 4 == 3 else i % 4
         if kind == 1:
             window(canvas, x - 11, y + 52, x + 11, y + 96, window_style("back_stairs"), lit=0.3)
@@ -410,7 +410,7 @@ def _back(random: np.random.Generator) -> Picture:
 def _back_brick(random: np.random.Generator) -> Picture:
     """Paint the same in stock brick."""
     canvas = bricks(_H, _W, random, 4, 8, (150, 116, 94))
-    for i, _, x, y in _cells():
+    for i, _, x, y in cells():
         if i % 3 == 2:
             window(canvas, x - 12, y + 46, x + 12, y + 94, window_style("back_brick_stairs"), lit=0.3)
         else:
