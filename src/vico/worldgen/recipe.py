@@ -19,7 +19,7 @@ from vico.io.files import sha256_of
 from vico.world.detected import FILE
 from vico.world.folder import World, write_records
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface
+from vico.world.mesh import Surface, joined
 from vico.world.model import Building, Dropped, Entrance, Place
 from vico.world.objects import Objects
 from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
@@ -30,6 +30,7 @@ from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.facts.outlines.merging import merged_buildings
 from vico.worldgen.facts.outlines.plans import BuildingPlans
 from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.ground.backdrop import backdrop_of
 from vico.worldgen.ground.bridges.stage import bridges_of
 from vico.worldgen.ground.grading import graded
 from vico.worldgen.ground.stage import ground_from_osm
@@ -154,6 +155,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     objects = write.objects(outdoors, indoors)
 
     ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids)
+    ground = joined([*ground, *run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):
         fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)

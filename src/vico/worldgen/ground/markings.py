@@ -176,7 +176,7 @@ def _kerb_lines(streets: StreetPolygons, breaks: BaseGeometry, longest: float | 
                 for piece in free_pieces(street, side * (street.width / 2 - 0.3), breaks) if not parking else ():
                     for part in shapely.get_parts(overlay.intersection(piece, kerb)):
                         if isinstance(part, LineString) and part.length > _LEAST_SOLID:
-                            path = divided(np.asarray(part.coords), longest)
+                            path = divided(np.asarray(overlay.simplify(part, 0.03).coords), longest)
                             found += [quad for shift in (-0.1, 0.1) for quad in ribbon(path, shift, 0.1)]
     return found
 
