@@ -154,7 +154,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     write.indoors(indoors, undrawn)
     objects = write.objects(outdoors, indoors)
 
-    ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids)
+    trees = outdoors.position[outdoors.kind == "tree", :2]
+    ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids, trees=trees)
     ground = joined([*ground, *run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):

@@ -91,9 +91,18 @@ class Markings:
 
 @dataclass(frozen=True)
 class StreetHabits:
-    """What is usual in the streets of a place: the name of the entry, paint, and pavings by kind of ground."""
+    """What is usual in the streets of a place.
+
+    Attributes
+    ----------
+    name, family
+        Of the entry, and of the one that it is `like` at last.
+    markings, pavings
+        Paint, and pavings by kind of ground.
+    """
 
     name: str
+    family: str
     markings: Markings
     pavings: dict[str, Paving]
 
@@ -155,6 +164,7 @@ def _resolved(entry: _Entry, entries: dict[str, _Entry]) -> StreetHabits:
     line = [entry]
     while line[-1].like is not None:
         line.append(entries[line[-1].like])
+    family = line[-1].name
     line.append(next(iter(entries.values())))
     said: dict[str, object] = {}
     pavings: dict[str, Paving] = {}
@@ -163,4 +173,4 @@ def _resolved(entry: _Entry, entries: dict[str, _Entry]) -> StreetHabits:
         pavings |= one.pavings
     if said.get("cycle_lane") == "none":
         said["cycle_lane"] = None
-    return StreetHabits(entry.name, Markings(**said), pavings)  # type: ignore[arg-type]
+    return StreetHabits(entry.name, family, Markings(**said), pavings)  # type: ignore[arg-type]

@@ -40,7 +40,9 @@ from vico.worldgen.ground.pitches import pitch_lines
 from vico.worldgen.ground.stairs import Flights
 from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.thinning import thinned
+from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
+from vico.worldgen.ground.yards import gardens_of
 
 _UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
 _UNDER_STAIRS = 0.3
@@ -53,6 +55,7 @@ _TACTILE = 0.012  # of ribbed slabs
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _AT_EDGE = 0.06  # metres within which two outlines are the same edge
 _OVERHANG = 6.0  # metres beside the ways of bridges where water that is hidden goes on
+_NO_TREES = np.zeros((0, 2))
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
 _PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 
@@ -65,6 +68,7 @@ def ground_from_osm(
     flights: Flights,
     *,
     standing: Sequence[BaseGeometry] = (),
+    trees: NDArray[np.float64] = _NO_TREES,
     apron: float = 40.0,
 ) -> list[Surface]:
     """Make the ground's surfaces.
@@ -84,6 +88,8 @@ def ground_from_osm(
     standing
         Footprints of the buildings as they were built, where they stand on the ground: nobody sees what lies well
         within them, and it is not drawn.
+    trees
+        Where trees stand, metres, shape ``(n, 2)``: those on paving have pits.
     apron
         How far the ground is drawn beyond the square, metres, so that its edge is not in sight from within streets.
 
@@ -106,8 +112,8 @@ def ground_from_osm(
         pieces = {name: _without(shapes, holes) for name, shapes in pieces.items()}
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
-    hidden = _hidden(osm, standing)
-    laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look)
+    hidden, gardens = _hidden(osm, standing), gardens_of(osm, reach)
+    laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, gardens=gardens)
     wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [
         shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
@@ -146,6 +152,7 @@ def ground_from_osm(
         stepped=flights.area,
     )
     quads += _fields(osm, window)
+    quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), gardens)}, bearing)
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return joined(surfaces)
@@ -180,12 +187,14 @@ def _laid(
     hidden: BaseGeometry,
     stairs: BaseGeometry,
     look: Callable[[str], GroundStyle],
+    gardens: BaseGeometry,
 ) -> list[_Piece]:
     """Lay the pieces of the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
     steep, sloping = _slopes(terrain, reach)
     laid: list[_Piece] = []
     walls: list[Polygon] = []
     hills: list[Polygon] = []
+    lawns: list[Polygon] = []
     for name, shapes in pieces.items():
         base = name.partition(":")[0]
         if base in ("yard", "field"):
@@ -200,6 +209,9 @@ def _laid(
             wide = [shape for shape in _within(shapes, sloping) if not overlay.buffer(shape, -_NARROW).is_empty]
             hills += wide
             shapes = _without(shapes, shapely.MultiPolygon(wide))
+        if name == "yard" and not gardens.is_empty:
+            lawns = _within(shapes, gardens)
+            shapes = _without(shapes, gardens)
         if name == "steps":
             lower = _within(shapes, stairs)
             shapes = _without(shapes, stairs)
@@ -207,6 +219,7 @@ def _laid(
         street = base == "carriageway"
         natural = not street and base not in _PAVED
         laid.append(_Piece(shapes, look(name), terrain.lower if street else terrain.upper, street, natural=natural))
+    laid.append(_Piece(lawns, LOOKS["garden"], terrain.upper, natural=True))
     laid.append(_Piece(hills, LOOKS["field"], terrain.upper, natural=True))
     laid.append(_Piece(walls, LOOKS["wall"], terrain.upper, natural=True))
     laid += [_Piece([water.polygon], LOOKS["water"], water.level, water=k) for k, water in enumerate(waters)]
