@@ -13,6 +13,8 @@ from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.io.data_files import VARIABLE
+from vico.world.heights import HeightField
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.street_habits import Markings, habits_at, street_habits
 from vico.worldgen.facts.streets import Crossing, Street, StreetPolygons
 from vico.worldgen.ground.crossing_paint import crossing_paint
@@ -20,6 +22,7 @@ from vico.worldgen.ground.markings import Quads, road_markings
 from vico.worldgen.ground.pavings import LOOKS, look_of
 from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.tree_pits import tree_pits
+from vico.worldgen.ground.wires import CONTACT, contact_wires
 from vico.worldgen.ground.yards import gardens_of
 from vico.worldgen.objects.kinds import thing_of
 from vico.worldgen.streets.crossings import crossings_of
@@ -155,7 +158,8 @@ def test_ribbed_fields_lie_along_the_kerb_and_not_over_each_other() -> None:
 
 
 def test_trees_on_paving_stand_in_pits_and_those_on_lawns_do_not() -> None:
-    pieces = {"sidewalk:asphalt": [shapely.box(0, 0, 20, 4)], "grass": [shapely.box(0, 4, 20, 20)]}
+    walks = [shapely.box(0, 0, 5.5, 4), shapely.box(5.5, 0, 20, 4)]
+    pieces = {"sidewalk:asphalt": walks, "grass": [shapely.box(0, 4, 20, 20)]}
     quads = tree_pits(np.array([(5.0, 2.0), (9.0, 12.0), (15.0, 3.9)]), pieces, 0.0)
     assert [len(group.corners) for group in quads] == [1, 1]
     assert quads[0].corners[0].mean(axis=0) == pytest.approx([5.0, 2.0])
@@ -200,3 +204,26 @@ def test_a_users_habits_replace_ours_and_wrong_ones_are_told(tmp_path: Path, mon
     monkeypatch.setenv(VARIABLE, f"{tmp_path}/")
     with pytest.raises(SchemaError, match="habits_japan"):
         habits_at(35.7, 139.7)
+
+
+def test_wires_hang_over_tram_tracks_and_are_held_by_walls_at_both_sides() -> None:
+    track = OsmWay(5, [1, 2], np.array([(-50.0, 0.0), (50.0, 0.0)]), False, {"railway": "tram"})
+    bare = OsmWay(6, [3, 4], np.array([(-50.0, 30.0), (50.0, 30.0)]), False, {"railway": "tram", "electrified": "no"})
+    site = site_facts(OsmData(LocalFrame(60.17, 24.94), 60.0, 0.0, [], [track, bare], [], []))
+    rows = [shapely.box(-60, 9, 60, 20), shapely.box(-60, -20, 60, -9)]
+    wires = contact_wires(site, HeightField.flat(60.0), rows, 60.0)
+    (wire,) = wires
+    assert wire.positions[:, 2].min() > CONTACT - 0.1
+    assert wire.positions[:, 2].max() > CONTACT + 1.0
+    assert np.abs(wire.positions[:, 1]).max() == pytest.approx(9.0, abs=0.1)
+    free = contact_wires(site, HeightField.flat(60.0), rows[:1], 60.0)
+    assert np.abs(free[0].positions[:, 1]).max() < 0.1
+    assert (
+        contact_wires(
+            site_facts(OsmData(LocalFrame(60.0, 25.0), 60.0, 0.0, [], [bare], [], [])),
+            HeightField.flat(60.0),
+            rows,
+            60.0,
+        )
+        == []
+    )

@@ -216,6 +216,7 @@ class World:
             model.ENTITY_WATER: {"kind": "water", "name": "water"},
             model.ENTITY_GREEN: {"kind": "green", "name": "green"},
             model.ENTITY_BACKDROP: {"kind": "backdrop", "name": "backdrop"},
+            model.ENTITY_WIRE: {"kind": "wire", "name": "contact wire"},
         }
         for b in self.buildings:
             found[b.entity] = {"kind": "building", "name": b.name or b.id}

@@ -177,9 +177,9 @@ def _house(
 
 
 def _shade(colour: str, random: np.random.Generator) -> tuple[int, int, int]:
-    """Read the colour of a building's record, a little lighter or darker."""
+    """Read the colour of a building's record, darker by what its walls have and a plain picture lacks."""
     text = colour.lstrip("#")
-    tone = float(random.uniform(0.94, 1.06))
+    tone = float(random.uniform(0.8, 0.95))
     rgb = [int(text[k : k + 2], 16) for k in (0, 2, 4)] if len(text) == 6 else [200, 196, 188]
     return tuple(min(round(value * tone), 255) for value in rgb)  # type: ignore[return-value]
 

@@ -9,10 +9,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from vico.geo import overlay
 from vico.worldgen.ground.markings import Quads
 
 _PAVED = ("sidewalk", "pedestrian", "yard", "parking")
 _FRAME, _EARTH = 1.7, 1.4  # metres, outer sides
+_WHOLE = 0.98  # share of a pit's frame on paving
 _STONE_COLOUR, _EARTH_COLOUR = (150, 147, 141), (86, 72, 56)
 
 
@@ -24,7 +26,7 @@ def tree_pits(trees: NDArray[np.float64], pieces: Mapping[str, Sequence[Polygon]
     trees
         Their places, metres, shape ``(n, 2)``.
     pieces
-        `ground_partition` of the map: a pit lies on one piece of it as a whole, or there is none.
+        `ground_partition` of the map: a pit lies on paving as a whole, or there is none.
     bearing
         Direction of the paving, radians from east.
     """
@@ -34,7 +36,11 @@ def tree_pits(trees: NDArray[np.float64], pieces: Mapping[str, Sequence[Polygon]
     c, s = np.cos(bearing), np.sin(bearing)
     square = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) @ np.array([[c, s], [-s, c]])
     frames = trees[:, None, :] + square * _FRAME
-    kept = np.unique(shapely.STRtree(paved).query(shapely.polygons(frames), predicate="within")[0])
+    squares = shapely.polygons(frames)
+    covered = np.zeros(len(trees))
+    for own, under in shapely.STRtree(paved).query(squares, predicate="intersects").T.tolist():
+        covered[own] += overlay.common_area(squares[own], paved[under])
+    kept = np.flatnonzero(covered > _WHOLE * _FRAME**2)
     if not len(kept):
         return []
     earth = trees[kept][:, None, :] + square * _EARTH
