@@ -166,7 +166,7 @@ def _meetings(streets: StreetPolygons) -> list[BaseGeometry]:
 
 def _kerb_lines(streets: StreetPolygons, breaks: BaseGeometry, longest: float | None) -> list[NDArray[np.float64]]:
     """Two lines along the kerbs of main streets, but where cars may park, and where there is no kerb after all."""
-    kerb = overlay.buffer(shapely.boundary(streets.carriageway), _AT_KERB, quad_segs=2)
+    kerb = overlay.buffer(shapely.boundary(streets.carriageway), _AT_KERB, quad_segs=1)
     found: list[NDArray[np.float64]] = []
     for street in streets.streets:
         if street.kind.removesuffix("_link") not in _LINED or not street.kerbed:
