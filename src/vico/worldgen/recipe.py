@@ -37,6 +37,7 @@ from vico.worldgen.ground.stage import ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.ground.walkable import walkable_from_site
+from vico.worldgen.ground.wires import contact_wires
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
 from vico.worldgen.objects.detections.matching import things_from_detections
@@ -156,7 +157,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
 
     trees = outdoors.position[outdoors.kind == "tree", :2]
     ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids, trees=trees)
-    ground = joined([*ground, *run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)])
+    around = run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)
+    ground = joined([*ground, *around, *run("wires", contact_wires, site, height, solids, reach=request.half)])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):
         fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)

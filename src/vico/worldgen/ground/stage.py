@@ -42,7 +42,6 @@ from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.thinning import thinned
 from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
-from vico.worldgen.ground.wires import contact_wires
 from vico.worldgen.ground.yards import gardens_of
 
 _UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
@@ -141,7 +140,6 @@ def ground_from_osm(
         surfaces += _kerbs(plan, laid, streets, terrain, reach, look("kerb"))
         surfaces += _banks(under, waters, plan, laid, terrain, window)
         surfaces += _tactile(streets, terrain, window, look("tactile"))
-    surfaces += contact_wires(site, terrain, standing, reach)
     surfaces += flights.surfaces()
     surfaces += bridges.surfaces(site, terrain, streets, window)
     quads = road_markings(
