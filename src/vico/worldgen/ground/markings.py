@@ -21,7 +21,7 @@ from vico.worldgen.facts.streets import LANE_WIDTH, Crossing, Street, StreetPoly
 from vico.worldgen.ground.crossing_paint import crossing_paint
 from vico.worldgen.ground.strokes import broken, divided, ribbon
 
-_LEAST_SOLID = 3.0  # metres of a solid line between two junctions that are worth painting
+_LEAST_SOLID = 6.0  # metres of a solid line between two junctions that are worth painting
 _GAUGE = 1.435
 _PAINT = (232, 232, 228)
 _YELLOW = (226, 184, 70)
