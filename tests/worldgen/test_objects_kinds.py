@@ -70,7 +70,8 @@ def test_thirty_three_amenities_have_models() -> None:
         ({"highway": "street_lamp", "lamp_mount": "wall_mounted"}, None),
         ({"highway": "elevator", "level": "-1;0"}, "elevator"),
         ({"highway": "elevator", "level": "-2;-1"}, None),
-        ({"emergency": "fire_hydrant", "fire_hydrant:type": "underground"}, None),
+        ({"emergency": "fire_hydrant", "fire_hydrant:type": "underground"}, "hydrant_lid"),
+        ({"emergency": "fire_hydrant", "fire_hydrant:type": "wall"}, None),
         ({"traffic_sign": "FI:361[30]"}, "sign_speed"),
         ({"amenity": "restaurant"}, None),
     ],
@@ -154,7 +155,7 @@ def test_the_page_s_examples_are_read(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_tree_is_known_by_a_name_in_a_users_language(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own(tmp_path, monkeypatch, trees_ja='[names]\n"桜" = "prunus"\n')
-    assert wish(**{"species:ja": "桜"})[0] == "tree_blossom"
+    assert wish(**{"species:ja": "桜"})[0] == "tree_fruit"
 
 
 @given(st.text(max_size=30))
@@ -165,8 +166,8 @@ def test_no_sign_code_breaks_anything(code: str) -> None:
 
 def test_post_boxes_look_as_in_their_country() -> None:
     tags = {"amenity": "post_box"}
-    places = {"uk": LocalFrame(51.5, -0.1), "us": LocalFrame(40.7, -74.0), "": LocalFrame(60.2, 24.9)}
-    assert [region(frame) for frame in places.values()] == list(places)
+    places = {"uk": (51.5, -0.1), "us": (40.7, -74.0), "fi": (60.2, 24.9)}
+    assert [region(OsmData(LocalFrame(*place), 50.0, 0.0, [], [], [], [])) for place in places.values()] == list(places)
     assert len({thing_of(tags, where=where) for where in places}) == 3
 
 

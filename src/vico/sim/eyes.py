@@ -47,6 +47,8 @@ _OF_KIND = {
     **dict.fromkeys(("hedge", "shrub", "plant"), "tree"),
     **dict.fromkeys(("street_lamp", "bollard", "flagpole", "mast", "utility_pole", "pillar", "column"), "pole"),
     "umbrella": "object",
+    "backdrop": "unknown",
+    "wire": "pole",
     **dict.fromkeys(("traffic_signals", "sign", "bus_stop", "board"), "sign"),
 }
 

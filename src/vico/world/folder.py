@@ -215,6 +215,8 @@ class World:
             model.ENTITY_ROAD: {"kind": "road", "name": "road"},
             model.ENTITY_WATER: {"kind": "water", "name": "water"},
             model.ENTITY_GREEN: {"kind": "green", "name": "green"},
+            model.ENTITY_BACKDROP: {"kind": "backdrop", "name": "backdrop"},
+            model.ENTITY_WIRE: {"kind": "wire", "name": "contact wire"},
         }
         for b in self.buildings:
             found[b.entity] = {"kind": "building", "name": b.name or b.id}

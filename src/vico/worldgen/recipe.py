@@ -19,7 +19,7 @@ from vico.io.files import sha256_of
 from vico.world.detected import FILE
 from vico.world.folder import World, write_records
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface
+from vico.world.mesh import Surface, joined
 from vico.world.model import Building, Dropped, Entrance, Place
 from vico.world.objects import Objects
 from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
@@ -30,12 +30,14 @@ from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.facts.outlines.merging import merged_buildings
 from vico.worldgen.facts.outlines.plans import BuildingPlans
 from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.ground.backdrop import backdrop_of
 from vico.worldgen.ground.bridges.stage import bridges_of
 from vico.worldgen.ground.grading import graded
 from vico.worldgen.ground.stage import ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.ground.walkable import walkable_from_site
+from vico.worldgen.ground.wires import contact_wires
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
 from vico.worldgen.objects.detections.matching import things_from_detections
@@ -153,7 +155,10 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     write.indoors(indoors, undrawn)
     objects = write.objects(outdoors, indoors)
 
-    ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids)
+    trees = outdoors.position[outdoors.kind == "tree", :2]
+    ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids, trees=trees)
+    around = run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)
+    ground = joined([*ground, *around, *run("wires", contact_wires, site, height, solids, reach=request.half)])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):
         fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)

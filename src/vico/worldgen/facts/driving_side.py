@@ -68,17 +68,20 @@ def drives_left(lat: float, lon: float) -> bool:
     return bool(_LEFT.contains(shapely.Point(lon, lat)))
 
 
-def keeps_left(osm: OsmData) -> bool:
-    """Whether traffic keeps left in a window.
-
-    The country that most addresses of the map name decides; where none names one, where the window lies.
-    """
+def country_named(osm: OsmData) -> str | None:
+    """Return the country that most addresses of a map name, ISO 3166-1; None where none names one."""
     named = Counter(
         tags["addr:country"].strip().upper()
         for tags in (*(node.tags for node in osm.nodes), *(area.tags for area in osm.areas))
         if len(tags.get("addr:country", "").strip()) == 2
     )
-    if named:
-        most = max(named.items(), key=lambda item: (item[1], item[0]))[0]
-        return most in LEFT_COUNTRIES
-    return drives_left(osm.frame.lat, osm.frame.lon)
+    return max(named.items(), key=lambda item: (item[1], item[0]))[0] if named else None
+
+
+def keeps_left(osm: OsmData) -> bool:
+    """Whether traffic keeps left in a window.
+
+    The country that most addresses of the map name decides; where none names one, where the window lies.
+    """
+    country = country_named(osm)
+    return drives_left(osm.frame.lat, osm.frame.lon) if country is None else country in LEFT_COUNTRIES

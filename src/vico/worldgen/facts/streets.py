@@ -124,7 +124,7 @@ class Crossing:
     painted
         Whether it is marked.
     marking
-        How: zebra, lines, dashes, ladder or dots.
+        How: zebra, lines, dashes, ladder, dots, broken_lines or studs.
     signals
         Whether lights stop the traffic there.
     """

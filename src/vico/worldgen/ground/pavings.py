@@ -2,31 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.errors import SchemaError
 from vico.seeds import rng
 from vico.world.mesh import Material
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER
+from vico.worldgen.facts.street_habits import Paving
 from vico.worldgen.texture_canvas import Canvas, periodic_noise
 
 Rgb = tuple[int, int, int]
 Picture = NDArray[np.uint8]
+_NOTHING: Mapping[str, Paving] = {}
 
 
 @dataclass(frozen=True)
 class GroundStyle:
-    """How a kind of ground looks: material, metres a texture covers, tint, entity, strength of its large patches."""
+    """How a kind of ground looks.
+
+    Attributes
+    ----------
+    material, tile, tint
+        What covers it, metres that the texture covers, and the colour it is multiplied by.
+    entity
+        What it is.
+    patches
+        Strength of its large patches.
+    bearing
+        Radians from east by which the texture is turned: stones lie along the streets.
+    """
 
     material: str
     tile: float
     tint: Rgb
     entity: int
     patches: float = 0.05
+    bearing: float = 0.0
+
+    def uv(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Texture coordinates of points, metres, shape ``(n, 2)``."""
+        c, s = np.cos(self.bearing), np.sin(self.bearing)
+        return np.stack([c * xy[:, 0] + s * xy[:, 1], c * xy[:, 1] - s * xy[:, 0]], axis=1) / self.tile
 
 
 _ASPHALT = GroundStyle("ground_asphalt", 12.0, (255, 255, 255), ENTITY_ROAD, 0.08)
@@ -74,18 +95,41 @@ _COVERS: dict[str, tuple[str, float, Rgb]] = {
 }
 
 
-def look_of(kind: str) -> GroundStyle:
-    """How a kind of `ground_partition` looks, its paving included."""
+_ON_FOOT = ("sidewalk", "pedestrian", "yard", "path", "tactile", "kerb")
+
+
+def look_of(kind: str, usual: Mapping[str, Paving] = _NOTHING, bearing: float = 0.0) -> GroundStyle:
+    """How a kind of `ground_partition` looks, its paving included.
+
+    Parameters
+    ----------
+    kind
+        As ``sidewalk`` or ``sidewalk:stones``.
+    usual
+        Pavings of the place that differ from ours, by kind of ground or of paving.
+    bearing
+        Direction in which stones are laid, radians from east.
+
+    Raises
+    ------
+    SchemaError
+        If a paving's material is none of ours.
+    """
     base, _, paving = kind.partition(":")
     look = LOOKS[base]
-    if not paving:
+    if base in _ON_FOOT or base == "carriageway":
+        look = replace(look, bearing=bearing)
+    own = usual.get(paving or base) if base in _ON_FOOT else None
+    if own is not None:
+        if own.material not in _PAINTERS:
+            raise SchemaError(f"paving of {kind}: no material {own.material!r}; there are {', '.join(_PAINTERS)}")
+        return replace(look, material=own.material, tile=own.tile, tint=own.tint)
+    if not paving or (base == "cycleway" and paving == "asphalt"):
         return look
     material, tile, tint = _COVERS[paving]
-    if base == "cycleway" and paving == "asphalt":
-        return look
     if base == "sidewalk" and paving == "asphalt":
         tint = (255, 252, 248)
-    return GroundStyle(material, tile, tint, look.entity, look.patches)
+    return replace(look, material=material, tile=tile, tint=tint)
 
 
 def patches(xy: NDArray[np.float64], strength: float, seed: int = 7) -> NDArray[np.float64]:
@@ -159,6 +203,41 @@ def _slabs(random: np.random.Generator) -> Picture:
     _courses(canvas, 8, 8, 0.028, 0.84, bond=0.5)
     canvas.noise(3, 6)
     canvas.grain(4)
+    return canvas.texture()
+
+
+def _flags(random: np.random.Generator) -> Picture:
+    """Poured concrete, scored into squares, four a side, with spots of trodden gum."""
+    canvas = Canvas(512, 512, (186, 184, 177), random)
+    _courses(canvas, 4, 4, 0.03, 0.74, bond=0.0)
+    canvas.noise(3, 5)
+    canvas.noise(3, 23)
+    canvas.grain(4)
+    for _ in range(60):
+        x, y = random.uniform(4, 506, 2)
+        canvas.shade(x, y, x + 2, y + 2, 0.86)
+    return canvas.texture()
+
+
+def _tiles(random: np.random.Generator) -> Picture:
+    """Square slabs of concrete, sixteen a side, joint over joint."""
+    canvas = Canvas(512, 512, (180, 178, 173), random)
+    _courses(canvas, 16, 16, 0.03, 0.86, bond=0.0)
+    canvas.noise(3, 6)
+    canvas.grain(4)
+    return canvas.texture()
+
+
+def _mosaic(random: np.random.Generator) -> Picture:
+    """Small stones of natural rock, fitted together by hand: every one of its own tone and a little out of line."""
+    canvas = Canvas(512, 512, (128, 128, 129), random)
+    side = 512 / 40
+    for r in range(40):
+        for c in range(40):
+            x, y = c * side + random.uniform(-1.5, 1.5), r * side + random.uniform(-1.5, 1.5)
+            canvas.shade(x + 1, y + 1, x + side - 1, y + side - 1, 1.22 + 0.12 * float(random.standard_normal()))
+    canvas.noise(4, 5)
+    canvas.grain(5)
     return canvas.texture()
 
 
@@ -304,6 +383,9 @@ def _stone_blocks(random: np.random.Generator) -> Picture:
 _PAINTERS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "ground_asphalt": _asphalt,
     "ground_slabs": _slabs,
+    "ground_flags": _flags,
+    "ground_tiles": _tiles,
+    "ground_mosaic": _mosaic,
     "ground_setts": _setts,
     "ground_bricks": _bricks,
     "ground_concrete": _concrete,

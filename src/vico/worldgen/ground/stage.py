@@ -6,7 +6,7 @@ up. Where two kinds meet at different heights an upright face closes the step: k
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,8 @@ from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas
 from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.streets import Crossing, StreetPolygons
+from vico.worldgen.facts.street_habits import street_habits
+from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.facts.tags import on_the_ground
 from vico.worldgen.ground.bridges.decks import spans_over_water
 from vico.worldgen.ground.bridges.stage import Bridges
@@ -33,11 +34,15 @@ from vico.worldgen.ground.contours import region_above
 from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Grid, Heights, curtain, triangulated
 from vico.worldgen.ground.grading import is_level, open_water, piped_waters
 from vico.worldgen.ground.kerbs import RAMP, Water, lowered_kerbs
-from vico.worldgen.ground.markings import Quads, pitch_lines, road_markings
+from vico.worldgen.ground.markings import Quads, road_markings
 from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
+from vico.worldgen.ground.pitches import pitch_lines
 from vico.worldgen.ground.stairs import Flights
+from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.thinning import thinned
+from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
+from vico.worldgen.ground.yards import gardens_of
 
 _UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
 _UNDER_STAIRS = 0.3
@@ -46,9 +51,11 @@ _STEEP = 1.08  # slope from which bare ground is held by a wall
 _SLOPING = 0.17  # ... and from which a yard is not paved
 _SLOPE_CELL = 2.0
 _NARROW = 0.8  # metres, half the width of the narrowest lawn on a hillside
+_TACTILE = 0.012  # of ribbed slabs
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _AT_EDGE = 0.06  # metres within which two outlines are the same edge
 _OVERHANG = 6.0  # metres beside the ways of bridges where water that is hidden goes on
+_NO_TREES = np.zeros((0, 2))
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
 _PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 
@@ -61,6 +68,7 @@ def ground_from_osm(
     flights: Flights,
     *,
     standing: Sequence[BaseGeometry] = (),
+    trees: NDArray[np.float64] = _NO_TREES,
     apron: float = 40.0,
 ) -> list[Surface]:
     """Make the ground's surfaces.
@@ -80,6 +88,8 @@ def ground_from_osm(
     standing
         Footprints of the buildings as they were built, where they stand on the ground: nobody sees what lies well
         within them, and it is not drawn.
+    trees
+        Where trees stand, metres, shape ``(n, 2)``: those on paving have pits.
     apron
         How far the ground is drawn beyond the square, metres, so that its edge is not in sight from within streets.
 
@@ -91,12 +101,19 @@ def ground_from_osm(
     osm = site.osm
     reach = osm.half + apron
     window = shapely.box(-reach, -reach, reach, reach)
+    habits = street_habits(osm)
+    bearing = street_bearing(streets)
+
+    def look(kind: str) -> GroundStyle:
+        return look_of(kind, habits.pavings, bearing)
+
     pieces, holes = ground_partition(site, streets, window), overlay.union_all(bridges.cuts)
     if bridges.cuts:
         pieces = {name: _without(shapes, holes) for name, shapes in pieces.items()}
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
-    laid = _laid(pieces, terrain, waters, reach, hidden=_hidden(osm, standing), stairs=flights.area)
+    hidden, gardens = _hidden(osm, standing), gardens_of(osm, reach)
+    laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, gardens=gardens)
     wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [
         shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
@@ -120,21 +137,22 @@ def ground_from_osm(
     dry = overlay.difference(dry, holes) if bridges.cuts else dry
     surfaces += _underlay(dry, terrain, reach)
     if terrain.steps is not None:
-        surfaces += _kerbs(plan, laid, streets, terrain, reach)
+        surfaces += _kerbs(plan, laid, streets, terrain, reach, look("kerb"))
         surfaces += _banks(under, waters, plan, laid, terrain, window)
-        surfaces += _tactile(streets, terrain, window)
+        surfaces += _tactile(streets, terrain, window, look("tactile"))
     surfaces += flights.surfaces()
     surfaces += bridges.surfaces(site, terrain, streets, window)
     quads = road_markings(
         streets,
         window,
-        yellow=osm.frame.lon < -30.0,
+        habits=habits.markings,
         tracks=_tracks(site),
         longest=None if level else 3.0,
         left_driving=site.left_driving,
         stepped=flights.area,
     )
     quads += _fields(osm, window)
+    quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), gardens)}, bearing)
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return joined(surfaces)
@@ -168,12 +186,15 @@ def _laid(
     *,
     hidden: BaseGeometry,
     stairs: BaseGeometry,
+    look: Callable[[str], GroundStyle],
+    gardens: BaseGeometry,
 ) -> list[_Piece]:
     """Lay the pieces of the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
     steep, sloping = _slopes(terrain, reach)
     laid: list[_Piece] = []
     walls: list[Polygon] = []
     hills: list[Polygon] = []
+    lawns: list[Polygon] = []
     for name, shapes in pieces.items():
         base = name.partition(":")[0]
         if base in ("yard", "field"):
@@ -188,13 +209,17 @@ def _laid(
             wide = [shape for shape in _within(shapes, sloping) if not overlay.buffer(shape, -_NARROW).is_empty]
             hills += wide
             shapes = _without(shapes, shapely.MultiPolygon(wide))
+        if name == "yard" and not gardens.is_empty:
+            lawns = _within(shapes, gardens)
+            shapes = _without(shapes, gardens)
         if name == "steps":
             lower = _within(shapes, stairs)
             shapes = _without(shapes, stairs)
-            laid.append(_Piece(lower, look_of(name), lambda xy: terrain.upper(xy) - _UNDER_STAIRS))
+            laid.append(_Piece(lower, look(name), lambda xy: terrain.upper(xy) - _UNDER_STAIRS))
         street = base == "carriageway"
         natural = not street and base not in _PAVED
-        laid.append(_Piece(shapes, look_of(name), terrain.lower if street else terrain.upper, street, natural=natural))
+        laid.append(_Piece(shapes, look(name), terrain.lower if street else terrain.upper, street, natural=natural))
+    laid.append(_Piece(lawns, LOOKS["garden"], terrain.upper, natural=True))
     laid.append(_Piece(hills, LOOKS["field"], terrain.upper, natural=True))
     laid.append(_Piece(walls, LOOKS["wall"], terrain.upper, natural=True))
     laid += [_Piece([water.polygon], LOOKS["water"], water.level, water=k) for k, water in enumerate(waters)]
@@ -312,7 +337,7 @@ def _surface(
         faces,
         colour=coloured(look, flat),
         entity=look.entity,
-        uv=(flat if uv is None else uv) / look.tile,
+        uv=look.uv(flat) if uv is None else uv / look.tile,
         normals=normals,
         material=ground_material(look.material),
     )
@@ -345,12 +370,17 @@ def _used(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[
 
 
 def _kerbs(
-    plan: PlanMesh, laid: Sequence[_Piece], streets: StreetPolygons, terrain: HeightField, reach: float
+    plan: PlanMesh,
+    laid: Sequence[_Piece],
+    streets: StreetPolygons,
+    terrain: HeightField,
+    reach: float,
+    look: GroundStyle,
 ) -> list[Surface]:
     """Make the faces of kerb stones: between the very corners of what lies on both sides."""
     numbers = np.array([k for k, piece in enumerate(laid) if piece.carriageway], np.int64)
     lines = border_chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
-    return hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
+    return hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), look)
 
 
 def _under_bridges(site: SiteFacts, wet: BaseGeometry, window: Polygon) -> list[Polygon]:
@@ -406,35 +436,13 @@ def _banks(
     return found
 
 
-def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:
+def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon, look: GroundStyle) -> list[Surface]:
     """Ribbed slabs on the pavement before painted crossings."""
-    pavement = overlay.union_all([streets.sidewalk, streets.pedestrian])
-    shapely.prepare(pavement)
-    quads: list[NDArray[np.float64]] = []
-    for crossing in streets.crossings:
-        if crossing.painted:
-            with expendable(crossing.id):
-                quads += _slabs_at(crossing, pavement)
-    if not quads:
+    shapes = tactile_fields(streets, window)
+    flat, faces = triangulated(shapes)
+    if not len(faces):
         return []
-    corners = np.stack(quads)
-    inside = (np.abs(corners) < window.bounds[2]).all(axis=(1, 2))
-    group = Quads(corners[inside], (255, 255, 255), low=False)
-    return [_painted(group, terrain, lift=0.012, look=LOOKS["tactile"])]
-
-
-def _slabs_at(crossing: Crossing, pavement: BaseGeometry) -> list[NDArray[np.float64]]:
-    a, b = np.array(crossing.start), np.array(crossing.end)
-    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
-    across = np.array([-along[1], along[0]]) * min(crossing.width, 3.0) / 2
-    found = []
-    for end, out in ((a, -along), (b, along)):
-        near, far = end + out * 0.25, end + out * 0.85
-        if shapely.contains_xy(pavement, *((near + far) / 2)):
-            quad = np.array([near - across, near + across, far + across, far - across])
-            turned = float(np.cross(np.r_[quad[1] - quad[0], 0], np.r_[quad[2] - quad[0], 0])[2]) < 0
-            found.append(quad[::-1] if turned else quad)
-    return found
+    return [_surface(flat, terrain.upper(flat) + _TACTILE, terrain_normals(terrain, flat), faces, look)]
 
 
 def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -446,7 +454,7 @@ def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), np.float64)
 
 
-def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: GroundStyle | None = None) -> Surface:
+def _painted(quads: Quads, terrain: HeightField, *, lift: float) -> Surface:
     """Paint and rails: quads a little above the ground."""
     corners = quads.corners.reshape(-1, 2)
     triangles = quad_triangles(4 * np.arange(len(quads.corners)), by_halves=True)
@@ -457,6 +465,5 @@ def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: GroundSty
         colour=quads.colour,
         entity=ENTITY_ROAD if quads.low else ENTITY_GROUND,
         normals=terrain_normals(terrain, corners),
-        uv=None if look is None else corners / look.tile,
-        material=Material("paint") if look is None else ground_material(look.material),
+        material=Material("paint"),
     )

@@ -6,17 +6,15 @@ import re
 
 import numpy as np
 
-from vico.geo.frame import LocalFrame
-from vico.geo.osm import Tags
+from vico.geo.osm import OsmData, Tags
+from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.objects import catalogue
 from vico.worldgen.objects.wishes import number
 
 
-def region(frame: LocalFrame) -> str:
-    """Where the look of post boxes differs: ``uk``, ``us`` or ``""``."""
-    if 49.8 < frame.lat < 61.0 and -11.0 < frame.lon < 1.9:
-        return "uk"
-    return "us" if frame.lon < -60.0 and 24.0 < frame.lat < 50.0 else ""
+def region(osm: OsmData) -> str:
+    """Where the look of street things differs: the family of the place's street habits, such as ``uk`` or ``us``."""
+    return street_habits(osm).family
 
 
 def sign_of(code: str) -> str | None:

@@ -33,7 +33,12 @@ _DARK = ("no", "disused")
 
 
 def lamp_wishes(
-    osm: OsmData, carriageway: BaseGeometry, solids: Sequence[BaseGeometry], known: NDArray[np.float64]
+    osm: OsmData,
+    carriageway: BaseGeometry,
+    solids: Sequence[BaseGeometry],
+    known: NDArray[np.float64],
+    *,
+    lamp: str | None = None,
 ) -> list[Wish]:
     """Wish for lamps along lit streets, on alternate sides, where none stand yet.
 
@@ -45,6 +50,8 @@ def lamp_wishes(
         Footprints of buildings: where the map is silent, streets beside them are lit.
     known
         Where lamps are mapped, metres, shape ``(n, 2)``.
+    lamp
+        Model of those along streets; ``street_lamp`` without.
     """
     shapely.prepare(carriageway)
     houses, taken = shapely.STRtree(list(solids)), [known.reshape(-1, 2)]
@@ -61,7 +68,7 @@ def lamp_wishes(
                 if spot is None or _distance(np.concatenate(taken), spot) < _APART:
                     continue
                 taken.append(spot[None])
-                name = "street_lamp" if way.tags["highway"] in _ROADS else "park_lamp"
+                name = lamp or "street_lamp" if way.tags["highway"] in _ROADS else "park_lamp"
                 found.append(Wish(f"w{way.id}.lamp{k}", name, spot, reach=_REACH))
     return found
 

@@ -9,14 +9,14 @@ from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.objects.barriers import gate_yaws
 from vico.worldgen.objects.catalogue import standing
 from vico.worldgen.objects.kinds import region, thing_of
-from vico.worldgen.objects.trees import climate, row_wishes, tree_wish
+from vico.worldgen.objects.trees import planting, row_wishes, tree_wish
 from vico.worldgen.objects.wishes import Wish, direction
 
 
 def mapped_wishes(osm: OsmData, height: HeightField, seed: int) -> list[Wish]:
     """Wish for everything that is mapped as a point or as a row of trees."""
-    zone = climate(osm.frame, height)
-    return [*_point_wishes(osm, seed, zone, region(osm.frame)), *row_wishes(osm, seed, zone)]
+    zone = planting(osm, height)
+    return [*_point_wishes(osm, seed, zone, region(osm)), *row_wishes(osm, seed, zone)]
 
 
 def _point_wishes(osm: OsmData, seed: int, zone: str, where: str) -> list[Wish]:

@@ -29,11 +29,11 @@ from vico.worldgen.facts.expendable import NamedShape, expendable, widened
 from vico.worldgen.objects.barriers import barrier_wishes
 from vico.worldgen.objects.catalogue import standing
 from vico.worldgen.objects.groups import group_wishes
-from vico.worldgen.objects.kinds import region
+from vico.worldgen.objects.kinds import region, thing_of
 from vico.worldgen.objects.lamps import lamp_wishes
 from vico.worldgen.objects.points import mapped_wishes
 from vico.worldgen.objects.site import Site
-from vico.worldgen.objects.trees import climate, planted_wishes
+from vico.worldgen.objects.trees import planted_wishes, planting
 from vico.worldgen.objects.wishes import Wish
 
 _LAMPS = ("street_lamp", "lamp")  # kinds
@@ -83,7 +83,7 @@ def objects_from_osm(
     half = osm.half
     models = street_models()
     site = Site(solids=solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
-    zone, where = climate(osm.frame, height), region(osm.frame)
+    zone, where = planting(osm, height), region(osm)
     mapped = mapped_wishes(osm, height, seed)
     lamps = np.array([wish.xy for wish in mapped if models[wish.prototype].kind in _LAMPS]).reshape(-1, 2)
     lots: list[tuple[list[Wish], bool]] = [
@@ -92,7 +92,7 @@ def objects_from_osm(
         (mapped, True),
         (group_wishes(osm, openings, half, seed, where=where), True),
         (planted_wishes(osm, carriageway, openings, half, seed, zone), False),
-        (lamp_wishes(osm, carriageway, solids, lamps), False),
+        (lamp_wishes(osm, carriageway, solids, lamps, lamp=thing_of({"highway": "street_lamp"}, where=where)), False),
     ]
     rows: list[dict[str, Any]] = []
     dropped: list[Dropped] = []
@@ -125,7 +125,7 @@ def _swept(lanes: LaneGraph | None) -> list[BaseGeometry]:
 def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str, Any]]) -> str | None:
     """Put a wish where it fits, near where it is mapped; the reason where it fits nowhere."""
     random = rng(seed, "object", wish.id)
-    if wish.prototype == "street_lamp" and wish.id.startswith("n") and _far(wish, site, 8.0):
+    if wish.prototype.startswith("street_lamp") and wish.id.startswith("n") and _far(wish, site, 8.0):
         model = street_models()["park_lamp"]  # over a footpath
     yaw = wish.yaw if wish.yaw is not None else _facing(wish, site, random)
     scale = _fitting_scale(wish, model, site)

@@ -16,6 +16,7 @@ from vico.geo.osm import OsmArea, OsmData, Tags
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
+from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.objects.catalogue import trees
 from vico.worldgen.objects.wishes import Wish, metres
 
@@ -42,6 +43,13 @@ def climate(frame: LocalFrame, height: HeightField) -> str:
         return "boreal"
     warm = (35.0 < frame.lat < 44.2 and -10.0 < frame.lon < 37.0) or (32 < frame.lat < 38.5 and -125 < frame.lon < -114)
     return "mediterranean" if warm or lat < 32.0 else "temperate"
+
+
+def planting(osm: OsmData, height: HeightField) -> str:
+    """Name the mix of plants of a place: that of its climate in its country where there is one, else its climate's."""
+    zone = climate(osm.frame, height)
+    own = f"{zone}_{street_habits(osm).family}"
+    return own if own in trees().mixes else zone
 
 
 def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: str, *, wild: bool = False) -> Wish:

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.facts.streets import Crossing, Street
 from vico.worldgen.facts.tags import number
 
@@ -24,10 +25,11 @@ def crossings_of(
     """Crossings drawn as ways, cut at the kerbs; then those that are points only, square to their street."""
     kinds = {node.id: node.tags for node in osm.nodes if node.tags.get("highway") == "crossing"}
     found: list[Crossing] = []
+    with_signals = street_habits(osm).markings.signal_crossing
     shapely.prepare(carriageway)
     for way in marked:
         node_tags = next((kinds[n] for n in way.nodes if n in kinds), {})
-        look = _marking({**node_tags, **way.tags}, "unmarked")
+        look = _marking({**node_tags, **way.tags}, "unmarked", with_signals)
         width = min(max(number(way.tags.get("width")) or _CROSSING_WIDTH, 2.0), 8.0)
         with expendable(f"w{way.id}"):
             for piece in shapely.get_parts(overlay.intersection(LineString(way.line), carriageway)):
@@ -52,7 +54,7 @@ def crossings_of(
         along = along / max(float(np.hypot(*along)), 1e-9)
         across = np.array([-along[1], along[0]]) * (street.width / 2)
         a, b = node.xy - across, node.xy + across
-        look = _marking(kinds[node.id], "zebra")
+        look = _marking(kinds[node.id], "zebra", with_signals)
         start, end = (float(a[0]), float(a[1])), (float(b[0]), float(b[1]))
         found.append(Crossing(start, end, _CROSSING_WIDTH, *look, id=f"n{node.id}"))
     return found
@@ -66,9 +68,10 @@ _MARKINGS = {
 }
 
 
-def _marking(tags: Mapping[str, str], usual: str) -> tuple[bool, str, bool]:
-    """Whether a crossing is painted, how, and whether it has signals."""
+def _marking(tags: Mapping[str, str], usual: str, with_signals: str) -> tuple[bool, str, bool]:
+    """Whether a crossing is painted, how (`with_signals` if it has some and the map is silent), and whether it has."""
     said, kind = tags.get("crossing:markings"), tags.get("crossing", usual)
     signals = kind == "traffic_signals" or tags.get("crossing:signals", "no") != "no"
     painted = said != "no" if said is not None else kind not in ("unmarked", "no", "informal")
-    return painted, _MARKINGS.get(said or "", "zebra"), signals
+    silent = said in (None, "yes") and tags.get("crossing_ref") != "zebra"
+    return painted, with_signals if signals and silent else _MARKINGS.get(said or "", "zebra"), signals
