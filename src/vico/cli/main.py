@@ -23,6 +23,7 @@ from tyro.extras import SubcommandApp
 from vico.cli import viewer_verbs
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.asset_verbs import assets
+from vico.cli.city_verbs import city
 from vico.cli.dataset_verbs import dataset
 from vico.cli.motion_verbs import motion
 from vico.cli.options import (
@@ -374,6 +375,7 @@ def warm_up() -> int:
 
 
 app.command(world, name="world", help="Make worlds and look into them.")
+app.command(city, name="city", help="Make cities of tiles.")
 app.command(community, name="community", help="People a world.")
 app.command(check, name="check", help="Check a world or a community.")
 app.command(assets, name="assets", help="Richer bodies, robots and things; things out of words.")

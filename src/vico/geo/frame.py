@@ -23,7 +23,9 @@ class LocalFrame:
     Attributes
     ----------
     lat, lon
-        The origin, degrees (WGS 84).
+        Where the projection is centred, degrees (WGS 84): the origin, unless it is shifted.
+    east, north
+        Metres from there to the origin, for windows that share one projection, as the tiles of a city do.
 
     Raises
     ------
@@ -33,6 +35,8 @@ class LocalFrame:
 
     lat: float
     lon: float
+    east: float = 0.0
+    north: float = 0.0
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.lat) and math.isfinite(self.lon)):
@@ -48,7 +52,10 @@ class LocalFrame:
     @property
     def proj4(self) -> str:
         """The projection as a PROJ string."""
-        return f"+proj=tmerc +lat_0={float(self.lat)!r} +lon_0={float(self.lon)!r} +k=1 +ellps=WGS84 +units=m +no_defs"
+        origin = f"+lat_0={float(self.lat)!r} +lon_0={float(self.lon)!r}"
+        if self.east or self.north:
+            origin += f" +x_0={-float(self.east)!r} +y_0={-float(self.north)!r}"
+        return f"+proj=tmerc {origin} +k=1 +ellps=WGS84 +units=m +no_defs"
 
     @cached_property
     def _transformer(self) -> Transformer:

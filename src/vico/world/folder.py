@@ -85,7 +85,7 @@ class World:
         self.manifest = manifest
         self.path = path
         self.half = manifest.half
-        self.frame = LocalFrame(manifest.origin.lat, manifest.origin.lon)
+        self.frame = LocalFrame(**manifest.origin.model_dump())
         self.derived: dict[object, object] = {}
         self._layers: dict[str, list[Surface]] = dict(parts.pop("layers", {}))
         known = {"height", "buildings", "places", "entrances", "rooms", "objects", "roads", "transit", "walkable"}

@@ -43,10 +43,17 @@ class Record(BaseModel):
 
 
 class Origin(Record):
-    """Where the frame's origin lies on Earth, degrees (WGS 84)."""
+    """Where the frame's projection is centred on Earth, degrees (WGS 84), and metres from there to its origin."""
 
     lat: Annotated[float, Field(ge=-90, le=90)]
     lon: Annotated[float, Field(ge=-180, le=180)]
+    east: float = 0.0
+    north: float = 0.0
+
+    @model_serializer(mode="wrap")
+    def _written(self, plain: SerializerFunctionWrapHandler) -> dict[str, float]:
+        """Only the tiles of a city are shifted; other worlds say nothing of it."""
+        return {key: value for key, value in plain(self).items() if value or key in ("lat", "lon")}
 
 
 class Source(Record):

@@ -16,7 +16,6 @@ from pathlib import Path
 import osmium
 
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.geo.frame import LocalFrame
 from vico.geo.osm import checked_extract
 from vico.io.files import read_json, write_json
 from vico.io.folders import FolderLock, check_replaceable, folder_errors, new_folder, remove
@@ -157,14 +156,20 @@ def rebuild_world(
     return _build(request, world.path or Path(path), BuildOptions(again=again, progress=progress))
 
 
+def build_requested(request: WorldRequest, out: Path) -> Manifest:
+    """Build what a request says, as a city does tile by tile, in place of what is at `out`."""
+    return _build(request, out, _DEFAULTS)
+
+
 def _build(request: WorldRequest, out: Path, options: BuildOptions) -> Manifest:
     """Run all stages into a neighbour folder of `out`, and put that in its place."""
     if request.sources.tiles or request.sources.photos:
         request.texturing.require_extras()
     folder = out.with_name(f"{out.name}.partial")
     with new_folder(out, force=True, work=folder):
-        stages = Stages(folder / STAGES, again=options.again, progress=options.progress)
-        evidence = gather(request.sources, LocalFrame(request.lat, request.lon), request.half, stages)
+        planned = None if request.place is None else request.place.own
+        stages = Stages(folder / STAGES, again=options.again, progress=options.progress, beside=planned)
+        evidence = gather(request.sources, request.frame, request.reach, stages, part=request.place is not None)
         _clear(folder)
         if not (folder / STAGES).exists() and (out / STAGES).is_dir():
             # What did not change need not be made.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shapely import Polygon
 
 from vico.assets.things.pack import read_things
 from vico.errors import EmptyInputError
@@ -30,12 +31,13 @@ from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.facts.outlines.merging import merged_buildings
 from vico.worldgen.facts.outlines.plans import BuildingPlans
 from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.backdrop import backdrop_of
 from vico.worldgen.ground.bridges.stage import bridges_of
 from vico.worldgen.ground.grading import graded
 from vico.worldgen.ground.stage import ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
-from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
+from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.ground.wires import contact_wires
 from vico.worldgen.indoor.layout_llm import furnish_drawn
@@ -55,7 +57,9 @@ from vico.worldgen.photos.texturing import (
 )
 from vico.worldgen.places.stage import places_from_osm
 from vico.worldgen.request import WorldRequest
-from vico.worldgen.stages import Stages
+from vico.worldgen.seams.heights import cropped
+from vico.worldgen.seams.join import parted, seamless
+from vico.worldgen.stages import Stages, kept_product
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
@@ -65,26 +69,59 @@ from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_places
 from vico.worldgen.writing import Layers, WorldParts, WorldWriter, faces, manifest_of
 
+#: Products of a tile's plan in which its neighbours have a say.
+SEAMS = ("streets", "grading")
 # Faces that photos cover less than this share of keep their facade.
 _LEAST_COVERED = 0.3
 
 
-def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages) -> World:
-    """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
-    read_tables()
-    if request.sources.installed_things:
-        read_things()  # refuses before anything is built if they are not installed
-    seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)
+@dataclass(frozen=True)
+class Plan:
+    """What is decided before anything is built: outlines of buildings, streets, and the ground graded to them.
 
+    Attributes
+    ----------
+    evidence
+        The sources, the map with what others know of buildings.
+    site, plans, streets, height
+        Facts of the map, buildings, streets, ground.
+    tiles
+        The photogrammetry mesh, on that ground.
+    """
+
+    evidence: Evidence
+    site: SiteFacts
+    plans: BuildingPlans
+    tiles: TileMesh | None
+    streets: StreetPolygons
+    height: HeightField
+
+
+def planned(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan:
+    """Run the stages that come before anything is built."""
+    read_tables()
+    run = stages.run
     evidence, known = _merged(evidence, stages)
     site = _left(_site(evidence.data, stages), stages)
-    plans = run("plans", building_plans, site.osm, seed=seed, **known)
-    bare, tiles = _terrain(evidence, plans, request.half, stages)
+    plans = run("plans", building_plans, site.osm, seed=request.seed, **known)
+    bare, tiles = _terrain(evidence, plans, request, stages)
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
     streets = run("streets", road_polygons, site, plans.standing())
     site = _left(site, stages)
     height = run("grading", graded, bare, site, streets)
-    site = _left(site, stages)
+    return Plan(evidence, _left(site, stages), plans, tiles, streets, height)
+
+
+def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages) -> World:
+    """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
+    if request.sources.installed_things:
+        read_things()  # refuses before anything is built if they are not installed
+    seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)
+
+    plan, beyond = _among_neighbours(planned(evidence, request, stages), request, stages)
+    evidence, site, plans, tiles, streets, height = (
+        plan.evidence, plan.site, plan.plans, plan.tiles, plan.streets, plan.height,
+    )  # fmt: skip
     bridges = run("bridges", bridges_of, site, height, streets)
     site = _left(site, stages)
     flights = run("stairs", flights_of, site, height, streets.steps)
@@ -96,7 +133,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         plans, fits = run("fit", plans_on_tiles, plans, tiles, height)
         stages.report("fit", fits.counts())
     built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=seed)
-    solids = stages.digested([*built.standing(height), *bridges.feet])
+    solids = stages.digested([*built.standing(height), *bridges.feet, *beyond])
 
     ways = run("ways", streets_from_osm, site, solids, bridges.open_ways)
     roads = run("roads", roads_from_osm, site, ways)
@@ -156,9 +193,14 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     objects = write.objects(outdoors, indoors)
 
     trees = outdoors.position[outdoors.kind == "tree", :2]
-    ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids, trees=trees)
-    around = run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)
-    ground = joined([*ground, *around, *run("wires", contact_wires, site, height, solids, reach=request.half)])
+    # A tile ends where the next one begins: nothing is drawn beyond it.
+    apron = {} if request.place is None else {"apron": 0.0}
+    ground = run(
+        "ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids, trees=trees, **apron
+    )
+    wires = run("wires", contact_wires, site, height, solids, reach=request.half)
+    around = [] if apron else run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)
+    ground = joined([*ground, *around, *wires])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):
         fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
@@ -187,6 +229,31 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         layers = replace(layers, walls=walls, roofs=roofs)
     write.meshes(layers, models)
     return parts.world(manifest, folder, layers)
+
+
+def _among_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> tuple[Plan, list[Polygon]]:
+    """Return the plan of a tile as its neighbours see it, and what stands just beyond it; others as they are."""
+    place = request.place
+    if place is None:
+        return plan, []
+    around = place.grid.around(place.tile)
+    found = {name: [kept_product(place.folder(one), name) for one in around] for name in SEAMS}
+    known = {name: [stages.given(*one) for one in products] for name, products in found.items()}
+    both = " ".join(digest for products in found.values() for _, digest in products)
+    streets = stages.given(known["streets"], f"streets {both}")
+    heights = stages.given(known["grading"], f"heights {both}")
+    joined = stages.run("seams", seamless, place.grid, place.tile, streets, heights, apron=APRON)
+    plans, beyond = parted(plan.plans, request.half)
+    osm = plan.site.osm
+    less = replace(osm, half=request.half, margin=osm.margin + osm.half - request.half)
+    site = stages.given(site_facts(less), f"{stages.digest(plan.site)} within {request.half}")
+    return replace(
+        plan,
+        site=site,
+        plans=stages.given(plans, f"{stages.digest(plan.plans)} within {request.half}"),
+        streets=stages.given(joined.streets, f"{stages.digest(joined)} streets"),
+        height=stages.given(joined.height, f"{stages.digest(joined)} height"),
+    ), beyond
 
 
 def _merged(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict[str, Any]]:
@@ -226,10 +293,15 @@ def _left(site: SiteFacts, stages: Stages) -> SiteFacts:
 
 
 def _terrain(
-    evidence: Evidence, plans: BuildingPlans, half: float, stages: Stages
+    evidence: Evidence, plans: BuildingPlans, request: WorldRequest, stages: Stages
 ) -> tuple[HeightField, TileMesh | None]:
     """Make the bare ground of whatever tells heights; the tile mesh, if there is one, is raised to stand on it."""
-    tiles = evidence.tiles
+    tiles, half, place = evidence.tiles, request.reach, request.place
+    if place is not None and evidence.samples is not None:
+        # Of the whole city at once: a fit to fewer samples is another one.
+        whole = stages.given(*kept_product(place.plans, "terrain"))
+        east, north = place.grid.centre(place.tile)
+        return stages.run("terrain", cropped, whole, half=half + APRON, east=east, north=north), None
     if tiles is None and evidence.samples is None:
         return stages.run("terrain", flat_terrain, half=half), None
     if tiles is None:

@@ -6,8 +6,11 @@ from collections.abc import Collection
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from vico.geo.frame import LocalFrame
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.photos.texturing import Texturing
+from vico.worldgen.seams.grid import HALO
+from vico.worldgen.seams.join import TilePlace
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress
 
@@ -60,6 +63,8 @@ class WorldRequest:
         Draws floor plans, if a language model is asked for them.
     previews
         Whether pictures are rendered.
+    place
+        Which tile of a city it is; None for a world by itself.
     """
 
     sources: Sources
@@ -70,6 +75,18 @@ class WorldRequest:
     texturing: Texturing
     author: LlmLayoutAuthor | None
     previews: bool
+    place: TilePlace | None = None
+
+    @property
+    def frame(self) -> LocalFrame:
+        """The world's frame."""
+        east, north = (0.0, 0.0) if self.place is None else self.place.grid.centre(self.place.tile)
+        return LocalFrame(self.lat, self.lon, east, north)
+
+    @property
+    def reach(self) -> float:
+        """Half the side of the square of which streets and ground are planned, metres."""
+        return self.half + (0.0 if self.place is None else HALO)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values, with absolute paths; of the author only whether there is one."""

@@ -20,7 +20,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vico.errors import SchemaError, StageError, VicoError, line_of, sentence_of
+from vico.errors import MissingFileError, SchemaError, StageError, VicoError, line_of, sentence_of
 from vico.geo.overlay import OverlayError
 from vico.io.data_files import VARIABLE
 from vico.version import __version__
@@ -76,6 +76,8 @@ class Stages:
         Names of stages to run even if their product is there.
     progress
         Called with a stage's name, how much of it is done, and how much there is.
+    beside
+        Another folder of products, which is read and never written.
 
     Attributes
     ----------
@@ -89,7 +91,14 @@ class Stages:
         Ids of all objects that stages left out while they made them (see `expendable`).
     """
 
-    def __init__(self, folder: Path | None, *, again: Collection[str] = (), progress: Progress | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path | None,
+        *,
+        again: Collection[str] = (),
+        progress: Progress | None = None,
+        beside: Path | None = None,
+    ) -> None:
         self.seconds: dict[str, float] = {}
         self.reports: list[StageReport] = []
         self.kept: list[str] = []
@@ -97,6 +106,7 @@ class Stages:
         self._folder = folder
         self._again = set(again)
         self._progress = progress
+        self._beside = beside
         self._digests: dict[int, tuple[Callable[[], Any], str]] = {}
 
     def given(self, value: T, digest: str) -> T:
@@ -193,8 +203,9 @@ class Stages:
         ]
         key = sha256("\n".join(parts).encode()).hexdigest()
         path = self._folder / f"{name}{SUFFIX}"
-        if name not in self._again and path.exists():
-            known = self._read(path, key)
+        others = [] if self._beside is None else [self._beside / f"{name}{SUFFIX}"]
+        for there in (path, *others) if name not in self._again else ():
+            known = self._read(there, key) if there.exists() else None
             if known is not None:
                 self.kept.append(name)
                 self._report_losses(name, known[0].dropped, known[0].tried)
@@ -213,6 +224,23 @@ class Stages:
             os.unlink(path)
             return None
         return (made, digest) if isinstance(made, _Kept) else None
+
+
+def kept_product(folder: Path, name: str) -> tuple[Any, str]:
+    """Return what a stage made in another build, and its digest.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If it is not there, or torn.
+    """
+    path = folder / f"{name}{SUFFIX}"
+    if not path.exists():
+        raise MissingFileError(f"{path}: no such file; plan the tiles of the city anew")
+    made, digest = read_product(path)
+    if not isinstance(made, _Kept):
+        raise SchemaError(f"{path}: is no product of a stage; plan the tiles of the city anew")
+    return made.value, digest
 
 
 @contextmanager

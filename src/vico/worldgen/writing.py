@@ -236,7 +236,7 @@ def manifest_of(
     return Manifest(
         producer=f"vico {__version__}",
         name=request.sources.osm.name.removesuffix(".pbf").removesuffix(".osm"),
-        origin=Origin(lat=frame.lat, lon=frame.lon),
+        origin=Origin(lat=frame.lat, lon=frame.lon, east=frame.east, north=frame.north),
         half=request.half,
         bbox=tuple(round(v, 7) for v in frame.bbox(request.half)),
         seed=request.seed,

@@ -1,0 +1,152 @@
+"""The build of a city: all tiles are planned, then built, then fitted to each other; each step in any order.
+
+What a tile plans depends on the map around it alone, what is built in it on the plans of its neighbours, and how its
+ground ends on what its neighbours to the west and south drew. So tiles are the same bytes in whatever order, by however
+many processes, and whatever was there before. A build that was stopped goes on: a tile's stages are kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from vico.errors import InputError
+from vico.geo.elevation import read_elevation
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import checked_extract
+from vico.io.files import write_json
+from vico.jobs import Answer, Service, Task, open_executor
+from vico.version import __version__
+from vico.world.city import City, CityManifest, CityTile, read_city
+from vico.world.model import Origin
+from vico.worldgen.city_request import CityRequest
+from vico.worldgen.ground.terrain import APRON, terrain_from_dem
+from vico.worldgen.seams.grid import HALO, Tile, grid_of, tile_name
+from vico.worldgen.sources import Sources
+from vico.worldgen.stages import Stages
+
+TILE = 400.0
+_CELL = 8.0
+_LEAST, _MOST, _LARGEST = 160.0, 1200.0, 20_000.0
+#: Called with a step's name, how many tiles are done, and how many there are.
+Progress = Callable[[str, int, int], None]
+
+
+def city_request(
+    sources: Sources, *, lat: float, lon: float, extent: float, out: Path, tile: float = TILE, seed: int = 0
+) -> CityRequest:
+    """Return what `build_city` is to build.
+
+    Parameters
+    ----------
+    sources
+        What to build from: a map, elevation files. Photographed cities and street photos are not read.
+    lat, lon
+        The centre, degrees.
+    extent
+        Side of the square to cover, metres; whole tiles are built.
+    out
+        Folder to make, or to go on in.
+    tile
+        Side of a tile, metres: a multiple of 8.
+    seed
+        Decides what the map leaves open.
+
+    Raises
+    ------
+    InputError
+        If sizes are out of range.
+    """
+    if not (_LEAST <= tile <= _MOST) or tile % _CELL:
+        raise InputError(f"tile: {tile:g} m; give a multiple of {_CELL:g} within {_LEAST:g}..{_MOST:g}")
+    if not (math.isfinite(extent) and 0 < extent <= _LARGEST):
+        raise InputError(f"size: {extent:g} m; give the side of the square to build, up to {_LARGEST:g}")
+    if seed < 0:
+        raise InputError(f"seed: {seed}; it must not be negative")
+    LocalFrame(lat, lon)  # refuses what is no place
+    return CityRequest(sources, lat, lon, grid_of(extent, tile), seed, Path(out).resolve())
+
+
+def build_city(
+    request: CityRequest, *, workers: int = 1, ray: str | None = None, progress: Progress | None = None
+) -> City:
+    """Build a city of tiles, or what of it is missing.
+
+    Parameters
+    ----------
+    request
+        Which city; see `city_request`.
+    workers, ray
+        How many processes side by side, or which Ray cluster; see `vico.jobs.open_executor`.
+    progress
+        Called as tiles are done.
+
+    Returns
+    -------
+    City
+        What could be built; its manifest says why other tiles could not.
+
+    Raises
+    ------
+    InputError
+        If no tile could be built.
+    VicoError
+        If the sources can't be used.
+    """
+    checked_extract(request.sources.osm)
+    request.plans.mkdir(parents=True, exist_ok=True)
+    _bare_ground(request)
+    failed: dict[str, str] = {}
+    left = list(request.grid)
+    workers = min(workers, len(left)) if ray is None else workers
+    found: dict[Tile, Any] = {}
+    with open_executor(workers=workers, ray=ray) as executor:
+        service = Service("vico.worldgen.city_tiles:builder", request.to_json())
+        for step in ("plan", "build", "fit"):
+            answers = _done(executor, service, left, step, progress)
+            failed |= {tile_name(one): answer.reason for one, answer in answers.items() if answer.content is None}
+            found = {one: answer.content for one, answer in answers.items() if answer.content is not None}
+            left = list(found)
+    if not left:
+        raise InputError(f"{request.out}: no tile could be built: {next(iter(failed.values()))}")
+    manifest = CityManifest(
+        producer=f"vico {__version__}",
+        origin=Origin(lat=request.lat, lon=request.lon),
+        size=request.grid.size,
+        first=request.grid.first,
+        last=request.grid.last,
+        seed=request.seed,
+        tiles=[CityTile(column=one[0], row=one[1], name=tile_name(one), **found[one]) for one in left],
+        failed=dict(sorted(failed.items())),
+    )
+    write_json(request.out / "city.json", manifest.model_dump(mode="json"))
+    return read_city(request.out)
+
+
+def _bare_ground(request: CityRequest) -> None:
+    """Fit the bare ground of the whole city, if anything tells its heights."""
+    if not request.sources.dem:
+        return
+    frame = LocalFrame(request.lat, request.lon)
+    half = (max(abs(k) for k in (*request.grid.first, *request.grid.last)) + 0.5) * request.grid.size + HALO
+    stages = Stages(request.plans)
+    samples = read_elevation(request.sources.dem, frame, half)
+    stages.given(samples, f"{samples.sha256} {frame} {half}")
+    stages.run("terrain", terrain_from_dem, samples, half=half, apron=APRON)
+
+
+def _done(
+    executor: Any, service: Service, tiles: Sequence[Tile], step: str, progress: Progress | None
+) -> dict[Tile, Answer]:
+    """Do a step to all tiles; return what came of each, in the order of the tiles."""
+    answers: dict[Tile, Answer] = {}
+
+    def done(index: int, answer: Answer) -> None:
+        answers[tiles[index]] = answer
+        if progress is not None:
+            progress(step, len(answers), len(tiles))
+
+    executor.run(service, [Task({"tile": list(tile), "step": step}) for tile in tiles], done=done)
+    return {tile: answers[tile] for tile in tiles}

@@ -1,0 +1,81 @@
+"""A tile's streets and ground, and those of its neighbours, made one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import shapely
+from shapely import Polygon
+
+from vico.world.heights import HeightField
+from vico.worldgen.facts.outlines.plans import BuildingPlans
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.seams.grid import Tile, TileGrid, tile_name
+from vico.worldgen.seams.heights import blended, cropped
+from vico.worldgen.seams.streets import adopted
+
+
+@dataclass(frozen=True)
+class TilePlace:
+    """Which tile of which city a world is.
+
+    Attributes
+    ----------
+    grid, tile
+        The grid, and the tile's column and row.
+    plans
+        Folder of the folders with what all tiles planned: streets and graded ground.
+    """
+
+    grid: TileGrid
+    tile: Tile
+    plans: Path
+
+    @property
+    def own(self) -> Path:
+        """Folder of what this tile planned."""
+        return self.folder(self.tile)
+
+    def folder(self, tile: Tile) -> Path:
+        """Return the folder of what a tile planned."""
+        return self.plans / tile_name(tile)
+
+
+@dataclass(frozen=True)
+class Seamless:
+    """What of a tile's plan its neighbours have a say in."""
+
+    streets: StreetPolygons
+    height: HeightField
+
+
+def seamless(
+    grid: TileGrid, tile: Tile, streets: list[StreetPolygons], heights: list[HeightField], *, apron: float
+) -> Seamless:
+    """Make a tile's streets and heights one with its neighbours'.
+
+    Parameters
+    ----------
+    grid, tile
+        Which tile.
+    streets, heights
+        Of the tile and its neighbours, in the order of `TileGrid.around`.
+    apron
+        How far the heights go on beyond the tile, metres.
+    """
+    around = grid.around(tile)
+    height = blended(dict(zip(around, heights, strict=True)), tile, grid)
+    return Seamless(
+        adopted(dict(zip(around, streets, strict=True)), tile, grid),
+        cropped(height, half=grid.size / 2 + apron),
+    )
+
+
+def parted(plans: BuildingPlans, half: float) -> tuple[BuildingPlans, list[Polygon]]:
+    """Return the buildings whose middle lies in a tile, and the footprints of what else stands around it."""
+    square = shapely.box(-half, -half, half, half)
+    own = [square.contains(plan.outline.centroid) for plan in plans.plans]
+    mine = BuildingPlans([plan for plan, kept in zip(plans.plans, own, strict=True) if kept], plans.dropped)
+    others = BuildingPlans([plan for plan, kept in zip(plans.plans, own, strict=True) if not kept], [])
+    return mine, [shape.shape for shape in others.standing()]

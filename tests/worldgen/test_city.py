@@ -1,0 +1,194 @@
+"""Cities of tiles: neighbours agree along their borders, whatever was built first."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.affinity import translate
+
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.geo.frame import LocalFrame
+from vico.world.borders import Side, border_findings, profile_of
+from vico.world.city import read_city
+from vico.world.heights import HeightField
+from vico.world.mesh import Material, Surface
+from vico.worldgen.city_build import build_city, city_request
+from vico.worldgen.city_request import CityRequest
+from vico.worldgen.city_tiles import plan
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.seams.border_fit import conformed
+from vico.worldgen.seams.grid import HALO, TileGrid, grid_of, tile_name
+from vico.worldgen.seams.heights import blended, cropped
+from vico.worldgen.seams.join import seamless
+from vico.worldgen.sources import Sources
+from vico.worldgen.stages import kept_product
+
+EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
+CENTRE = (60.1690, 24.9435)
+PAIR = TileGrid(160.0, (0, 0), (1, 0))
+
+
+@given(st.floats(1.0, 20_000.0), st.sampled_from([160.0, 400.0, 800.0]))
+def test_a_grid_covers_what_is_asked_for_with_as_few_tiles_as_can_be(extent: float, size: float) -> None:
+    grid = grid_of(extent, size)
+    side = grid.last[0] - grid.first[0] + 1
+    assert side % 2 == 1
+    assert len(list(grid)) == len(grid) == side * side
+    assert side * size >= extent
+    assert side == 1 or (side - 2) * size < extent
+
+
+def test_the_frame_of_a_tile_is_that_of_the_city_shifted() -> None:
+    city, tile = LocalFrame(*CENTRE), LocalFrame(*CENTRE, east=400.0, north=-800.0)
+    lat, lon = np.array([60.1701, 60.1612]), np.array([24.95, 24.9501])
+    shift = np.array([400.0, -800.0])
+    assert np.allclose(tile.to_enu(lat, lon) + shift, city.to_enu(lat, lon), atol=1e-9)
+    assert np.allclose(tile.to_geodetic(np.zeros(2)), city.to_geodetic(shift), atol=1e-12)
+
+
+def _field(rng: np.random.Generator, half: float) -> HeightField:
+    n = round(2 * half / 4.0) + 1
+    return HeightField(rng.normal(0.0, 3.0, (n, n)).astype(np.float32), half)
+
+
+@given(st.integers(0, 1000))
+def test_neighbours_compute_the_same_heights_and_keep_their_own_further_in(seed: int) -> None:
+    grid = TileGrid(160.0, (0, 0), (1, 1))
+    rng = np.random.default_rng(seed)
+    half = 80.0 + HALO + 60.0
+    fields = {tile: _field(rng, half) for tile in grid}
+    made = {tile: cropped(blended(fields, tile, grid), half=80.0 + 60.0) for tile in grid}
+    spots = rng.uniform(-60.0, 220.0, (500, 2)).round(3)
+    seen = []
+    for tile, field in made.items():
+        here = spots - grid.centre(tile)
+        inside = np.abs(here).max(axis=1) <= 140.0
+        z = np.full(len(spots), np.nan)
+        z[inside] = field.smooth(here[inside])
+        seen.append(z)
+    assert np.nanmax(np.nanmax(seen, axis=0) - np.nanmin(seen, axis=0)) < 1e-9
+    middle = rng.uniform(-40.0, 40.0, (50, 2))
+    assert np.allclose(made[0, 0].smooth(middle), fields[0, 0].smooth(middle), atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> CityRequest:
+    """Two tiles of Helsinki side by side, planned but not built."""
+    out = tmp_path_factory.mktemp("pair")
+    request = CityRequest(Sources(EXTRACT), *CENTRE, PAIR, 0, out)
+    for tile in PAIR:
+        plan(request, tile)
+    return request
+
+
+def test_streets_and_kerbs_of_two_tiles_are_the_same_at_their_border(planned: CityRequest) -> None:
+    around = list(PAIR)
+    streets, heights = (
+        [kept_product(planned.plans / tile_name(tile), name)[0] for tile in around] for name in ("streets", "grading")
+    )
+    west, east = (seamless(PAIR, tile, streets, heights, apron=60.0) for tile in around)
+    border = shapely.box(78.0, -80.0, 82.0, 80.0)
+
+    def near(polygons: StreetPolygons, kind: str, shift: float) -> shapely.Geometry:
+        return shapely.intersection(translate(getattr(polygons, kind), shift, 0.0), border)
+
+    kinds = ("carriageway", "sidewalk", "pedestrian", "sunken")
+    for kind in kinds:
+        here, there = near(west.streets, kind, 0.0), near(east.streets, kind, 160.0)
+        assert shapely.area(shapely.symmetric_difference(here, there)) < 1e-3, kind  # of a border 160 m long
+    assert sum(near(west.streets, kind, 0.0).area for kind in kinds) > 50.0  # the border does cross streets
+    along = np.arange(-80.0, 80.0, 0.1)
+    points = np.stack([np.full_like(along, 80.0), along], axis=1)
+    for side in ("lower", "upper", "smooth"):
+        here, there = (getattr(one.height, side)(points - [shift, 0.0]) for one, shift in ((west, 0.0), (east, 160.0)))
+        assert np.array_equal(here, there), side
+
+
+def _strip(ys: list[float], zs: list[float], *, east: bool, stuff: str = "ground") -> Surface:
+    """Ground along a border at x = 80 or -80 with corners at some heights there."""
+    x, inner = (80.0, 70.0) if east else (-80.0, -70.0)
+    n = len(ys)
+    points = np.array([*((x, y, z) for y, z in zip(ys, zs, strict=True)), *((inner, y, 0.0) for y in ys)])
+    faces = [face for k in range(n - 1) for face in ([k, k + 1, n + k], [k + 1, n + k + 1, n + k])]
+    up = np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+    return Surface.from_triangles(points, np.array(faces), normals=up, uv=points[:, :2], material=Material(stuff))
+
+
+def test_ground_meets_what_the_tile_before_it_drew() -> None:
+    first = profile_of([_strip([-80.0, -10.0, 4.0, 80.0], [0.0, 0.3, 0.1, 0.0], east=True)], Side(0, 80.0))
+    own = _strip([-80.0, -30.0, 4.05, 80.0], [0.0, 0.25, 0.2, 0.0], east=False)
+    fitted = conformed([own], Side(0, -80.0), first)[0]
+    met = profile_of([fitted], Side(0, -80.0))
+    for one, other in ((first, met), (met, first)):
+        t, z = np.r_[one.start, (one.start + one.end) / 2], np.r_[one.low, (one.low + one.high) / 2]
+        assert np.abs(other.heights(t, z, "ground") - z).max() < 1e-4
+    area = _area(own)
+    assert _area(fitted) == pytest.approx(area, rel=0.02)
+    assert np.allclose(np.linalg.norm(fitted.normals, axis=1), 1.0, atol=1e-5)
+
+
+def _area(surface: Surface) -> float:
+    corners = surface.positions[surface.triangles][:, :, :2].astype(np.float64)
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
+
+
+def test_a_kerb_stays_a_kerb() -> None:
+    """Ground of two heights on one spot meets the like of it."""
+    first = profile_of(
+        [
+            _strip([-80.0, 80.0], [0.0, 0.0], east=True, stuff="street"),
+            _strip([-80.0, 80.0], [0.12, 0.12], east=True, stuff="pavement"),
+        ],
+        Side(0, 80.0),
+    )
+    low = _strip([-80.0, 0.0, 80.0], [0.0, 0.01, 0.0], east=False, stuff="street")
+    high = _strip([-80.0, 0.0, 80.0], [0.12, 0.13, 0.12], east=False, stuff="pavement")
+    fitted = conformed([low, high], Side(0, -80.0), first)
+    assert [round(float(one.positions[1, 2]), 4) for one in fitted] == [0.0, 0.12]
+
+
+def test_bad_sizes_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    for options, said in (
+        ({"extent": 500.0, "tile": 100.0}, "multiple of 8 within 160"),
+        ({"extent": 500.0, "tile": 161.0}, "multiple of 8"),
+        ({"extent": float("nan")}, "size"),
+        ({"extent": -3.0}, "size"),
+        ({"extent": 500.0, "seed": -1}, "seed"),
+    ):
+        with pytest.raises(InputError, match=said):
+            city_request(Sources(EXTRACT), lat=60.0, lon=25.0, out=tmp_path / "city", **options)
+    with pytest.raises(MissingFileError, match=r"no\.pbf"):
+        build_city(city_request(Sources(tmp_path / "no.pbf"), lat=60.0, lon=25.0, extent=100.0, out=tmp_path / "city"))
+    with pytest.raises(MissingFileError, match="make one with vico city build"):
+        read_city(tmp_path)
+    (tmp_path / "city.json").write_text('{"schema_name": "vico.city", "version": 1}')
+    with pytest.raises(SchemaError, match="build the city anew"):
+        read_city(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path) -> None:
+    request = city_request(
+        Sources(EXTRACT), lat=CENTRE[0], lon=CENTRE[1], extent=480.0, tile=160.0, out=tmp_path / "city"
+    )
+    city = build_city(request, workers=2)
+    assert not city.manifest.failed
+    assert len(city.manifest.tiles) == 9
+    assert [found for border in city.borders() for found in border_findings(city, *border)] == []
+    digests = {tile.name: tile.digest for tile in city.manifest.tiles}
+    built = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}
+    shutil.rmtree(request.out / "tiles" / "0_0")
+    again = build_city(request)
+    assert {tile.name: tile.digest for tile in again.manifest.tiles} == digests
+    kept = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}
+    assert [name for name in digests if kept[name] != built[name]] == ["0_0"]
+    elsewhere = replace(request, out=tmp_path / "other")
+    assert {tile.name: tile.digest for tile in build_city(elsewhere).manifest.tiles} == digests
