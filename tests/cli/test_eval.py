@@ -79,6 +79,12 @@ def test_what_was_not_played_is_in_the_table_and_the_exit_code(
     assert capsys.readouterr().err.count("; kept") == 4
 
 
+def test_worlds_may_be_named_by_options_of_their_own(worlds: list[Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert vico(*words(worlds[:1], out, "--worlds", str(worlds[1]))) == 0
+    assert len(list((out / "episodes").iterdir())) == 16
+
+
 def test_resume_adds_to_what_is_there(worlds: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert vico(*words(worlds, out, methods=("good",))) == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import chain
 from pathlib import Path
 
 from vico.cli.city_options import CityBuildOptions
@@ -19,7 +20,7 @@ def build(options: CityBuildOptions) -> int:
 
     lat, lon = _degrees(options.center) if options.center else extract_centre(options.osm)
     request = city_request(
-        Sources(options.osm, dem=options.dem),
+        Sources(options.osm, dem=tuple(chain.from_iterable(options.dem))),
         lat=lat,
         lon=lon,
         extent=options.size,

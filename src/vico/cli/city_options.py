@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from vico.cli.options import RayAddress
+from vico.cli.options import Files, RayAddress
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class CityBuildOptions:
     out: Path
     center: str = ""
     size: float = 2000.0
-    dem: tuple[Path, ...] = ()
+    dem: Files = ()
     tile: float = 400.0
     seed: int = 0
     workers: int = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from vico.threads import workers as processors
 def build(options: DatasetOptions) -> int:
     """Make a dataset; 1 if some of its episodes could not be made."""
     request = request_of(options)
-    check_output(options.out, *options.world, *options.runs, force=options.force)
+    check_output(options.out, *chain(*options.world, *options.runs), force=options.force)
     with progress_bars() as report:
         built = build_dataset(
             request, options.out, force=options.force, report=lambda done, total: report("episodes", done, total)
@@ -52,8 +53,8 @@ def request_of(options: DatasetOptions) -> BuildRequest:
     foreign = ":" in options.method
     return BuildRequest(
         contents=Contents(options.to, outputs, options.size, options.agents, options.instruction, options.drop_below),
-        runs=options.runs,
-        worlds=options.world,
+        runs=tuple(chain(*options.runs)),
+        worlds=tuple(chain(*options.world)),
         category=options.challenge,
         method=options.method,
         setting=setting,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from vico.cli.options import RayAddress
+from vico.cli.options import Files, RayAddress
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class DatasetOptions:
 
     out: Path
     to: Literal["lerobot", "webdataset", "parquet"]
-    world: tuple[Path, ...] = ()
+    world: Files = ()
     challenge: Literal["carry", "delivery", "search", "pick_place"] = "delivery"
     method: str = "heuristic"
     episodes: int = 0
@@ -81,7 +81,7 @@ class DatasetOptions:
     subtasks: int = 6
     assistants: int = 1
     first_seed: int = 0
-    runs: tuple[Path, ...] = ()
+    runs: Files = ()
     agents: tuple[str, ...] = ()
     outputs: str = "rgb"
     size: int = 128

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -155,8 +156,9 @@ def judge(
         raise InputError(f"eval: needs a --method; there are {', '.join(sorted(challenge.methods))}")
     if options.against and options.against not in methods:
         raise InputError(f"eval: --against {options.against}, which is none of the methods; add --method")
-    worlds = {fetch_manifest(one) if is_url(one) else Path(one): one for one in options.worlds}
-    if len(worlds) < len(options.worlds):
+    given = list(chain(*options.worlds))
+    worlds = {fetch_manifest(one) if is_url(one) else Path(one): one for one in given}
+    if len(worlds) < len(given):
         raise InputError(f"{name}: a world is given twice; its episodes would count twice")
     jobs = jobs_for(
         name,
@@ -193,7 +195,9 @@ def judge(
 def _in_folder(challenge: Challenge, play: Play, options: EvaluationOptions) -> Iterator[tuple[Path, list[Outcome]]]:
     """Play the jobs, and write the results beside the episodes; give their folder and the outcomes."""
     out = Path(options.out)
-    check_output(out, *(Path(one) for one in options.worlds if not is_url(one)), force=options.force or options.resume)
+    check_output(
+        out, *(Path(one) for one in chain(*options.worlds) if not is_url(one)), force=options.force or options.resume
+    )
     partial_folder = out.with_name(f"{out.name}.partial")
     if options.resume:
         _take_up(out, partial_folder)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from vico.cli.options import RayAddress
+from vico.cli.options import RayAddress, Words
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class EvaluationOptions:
         Print the results as JSON.
     """
 
-    worlds: list[str]
+    worlds: Words
     out: str
     method: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="METHOD")] = ()
     against: str = ""

@@ -17,7 +17,8 @@ from vico.errors import InputError
 CommaSeparated = Annotated[str, tyro.conf.arg(metavar="A,B,...")]
 #: Of a Ray cluster; a bare ``--ray`` becomes ``--ray auto``.
 RayAddress = Annotated[str | None, tyro.conf.arg(metavar="[ADDRESS]")]
-#: Files after one option, or after the same option several times.
+# Several values after one option, or after the same one several times: nobody expects the last alone to count.
+Words = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="WORLD...")]
 Files = Annotated[tuple[tuple[Path, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE...")]
 _RAY_ADDRESS = re.compile(r"auto|local|ray://.+|[^/\s]+:\d+")
 
@@ -114,7 +115,7 @@ class WorldBuildOptions:
     tiles: str | None = None
     photos: str | None = None
     places: tuple[str, ...] = ()
-    gtfs: tuple[Path, ...] = ()
+    gtfs: Files = ()
     layouts: Path | None = None
     detections: Path | None = None
     things: Literal["procedural", "installed"] = "procedural"

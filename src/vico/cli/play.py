@@ -72,7 +72,7 @@ def _task(options: PlayOptions, category: Literal["carry", "delivery", "search"]
     if not 0 <= options.seed <= 10_000:
         raise InputError(f"play: --seed {options.seed}; tasks have seeds of 0 to 10000")
     common = EvaluationOptions(
-        worlds=[str(options.world)],
+        worlds=((str(options.world),),),
         out=str(options.out or Path("out/play-task")),
         method=("human",),
         seeds=1,

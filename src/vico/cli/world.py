@@ -69,7 +69,7 @@ def build_as_asked(options: WorldBuildOptions) -> int:
         tiles=options.tiles,
         photos=options.photos,
         places=options.places,
-        gtfs=options.gtfs,
+        gtfs=tuple(chain.from_iterable(options.gtfs)),
         layouts=options.layouts,
         detections=options.detections,
         installed_things=options.things == "installed",
