@@ -50,6 +50,7 @@ _LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
 _STEEP = 1.08  # slope from which bare ground is held by a wall
 _SLOPING = 0.17  # ... and from which a yard is not paved
 _SLOPE_CELL = 2.0
+_SLOPE_MARGIN = 16.0
 _NARROW = 0.8  # metres, half the width of the narrowest lawn on a hillside
 _TACTILE = 0.012  # of ribbed slabs
 _SLAB = 0.6  # thickness of a bridge's edge over water
@@ -231,6 +232,8 @@ def _slopes(terrain: HeightField, reach: float) -> tuple[BaseGeometry, BaseGeome
     none = shapely.MultiPolygon()
     if is_level(terrain):
         return none, none
+    # A little further than is drawn: what lies beyond decides how steep the edge is, and a tile's neighbour knows it.
+    reach = min(reach + _SLOPE_MARGIN, terrain.half)
     n = round(2 * reach / _SLOPE_CELL)
     cell = 2 * reach / n
     axis = (np.arange(n) + 0.5) * cell - reach
