@@ -169,7 +169,8 @@ def test_the_advanced_setting_names_three_times_as_many_regions_and_surfaces(
         assert surface.kind == region.surface.kind != "floor"
     for subtask in advanced.subtasks:
         centres = [region.centre for region in subtask.sources]
-        assert len(set(centres)) == len(centres)
+        # Shops of one house have one middle.
+        assert len({(region.place, region.centre) for region in subtask.sources}) == len(centres)
         if category == "delivery":
             assert subtask.destination is not None
             assert subtask.destination.centre not in centres
@@ -210,7 +211,7 @@ def test_carry_asks_for_six_people_who_are_out(helsinki: World, people: Communit
                 any(r.place == one.id or np.allclose(r.centre[:2], one.position[:2]) for one in day)
                 for r in subtask.sources
             ]
-            assert sum(told) >= 2
+            assert sum(told) >= min(2, len({one.id for one in day} - {who.home}))
 
 
 def renamed(people: Community, names: dict[str, str]) -> Community:
