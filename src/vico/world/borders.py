@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+from vico.geo import overlay
 from vico.world.city import City
 from vico.world.mesh import Surface
 
@@ -19,12 +21,15 @@ ON_LINE = 1e-3
 SAME = 2e-3
 """Metres along the border between points that are one."""
 
-ALIKE = 0.6
-"""Metres in height within which the same stuff on both sides is one piece of ground."""
+ALIKE = 0.4
+"""Metres in height within which the same stuff on both sides is one piece of ground: what lies under it is deeper."""
 
-_NEAR = 0.08  # the same of any stuff: less than a kerb
+NEAR = 0.08
+"""The same of any stuff: less than a kerb."""
+
 _AT_ALL = 0.3  # and where there is nothing nearer
 _MOST_STEP = 1e-3  # metres between heights of both sides
+_LEAST = 0.03  # metres along the border: narrower pieces of ground are slivers between two kinds
 _EVERY = 0.25  # metres between points at which fields are held against each other
 
 
@@ -88,7 +93,7 @@ class Profile:
         found = np.full(len(along), np.nan)
         row = np.arange(len(along))
         anything = np.ones(len(alike), np.bool_)
-        for chosen, reach in ((alike, _NEAR), (anything, _NEAR), (alike, ALIKE), (anything, _AT_ALL)):
+        for chosen, reach in ((alike, NEAR), (anything, NEAR), (alike, ALIKE), (anything, _AT_ALL)):
             far = np.where(chosen[None], off, np.inf)
             best = far.argmin(axis=1)
             fits = np.isnan(found) & (far[row, best] <= reach)
@@ -155,20 +160,42 @@ def border_findings(city: City, first: tuple[int, int], second: tuple[int, int],
             found.append(f"{name}: {what} heights differ by {step.max():.4f} m at {along[step.argmax()]:.2f} m")
     sides = Side(axis, half), Side(axis, -half)
     drawn = [profile_of(world.surfaces("ground"), side) for world, side in zip(worlds, sides, strict=True)]
+    houses = _houses(city, first, axis)
     for a, b in (drawn, drawn[::-1]):
-        found += [f"{name}: {sentence}" for sentence in _unmatched(a, b)]
+        found += [f"{name}: {sentence}" for sentence in _unmatched(a, b, houses)]
     return found
 
 
-def _unmatched(one: Profile, other: Profile) -> list[str]:
-    """Say where the edges of one side are not met by those of the other."""
+def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64]:
+    """Return where buildings stand across a tile's eastern or northern border, metres along it, shape ``(n, 2)``."""
+    half = city.manifest.size / 2
+    found: list[tuple[float, float]] = []
+    for dx, dy in ((dx, dy) for dx in (-1, 0, 1, 2) for dy in (-1, 0, 1, 2)):
+        tile = first[0] + dx, first[1] + dy
+        if tile not in city:
+            continue
+        at = half - city.manifest.size * (dx if axis == 0 else dy)
+        along = -city.manifest.size * (dy if axis == 0 else dx)
+        ends = [(at, along - half), (at, along + half)]
+        line = shapely.LineString(ends if axis == 0 else [end[::-1] for end in ends])
+        for building in city.world(tile).buildings:
+            for part in shapely.get_parts(overlay.intersection(line, shapely.Polygon(building.footprint[0]))):
+                met = shapely.get_coordinates(part)[:, 1 - axis] - along
+                if len(met):
+                    found.append((float(met.min()), float(met.max())))
+    return np.array(found).reshape(-1, 2)
+
+
+def _unmatched(one: Profile, other: Profile, houses: NDArray[np.float64]) -> list[str]:
+    """Say where the edges of one side are not met by those of the other; what lies under houses nobody sees."""
     found: list[str] = []
     for stuff in sorted(set(one.stuff)):
-        own = np.array([name == stuff for name in one.stuff], np.bool_)
+        own = np.array([name == stuff for name in one.stuff], np.bool_) & (one.end - one.start >= _LEAST)
         t = np.r_[one.start[own], one.end[own], (one.start + one.end)[own] / 2]
         z = np.r_[one.low[own], one.high[own], (one.low + one.high)[own] / 2]
         there = other.heights(t, z, stuff)
-        for k in np.flatnonzero(~(np.abs(there - z) <= _MOST_STEP)).tolist():
+        under = ((houses[:, 0] <= t[:, None]) & (t[:, None] <= houses[:, 1])).any(axis=1)
+        for k in np.flatnonzero(~(np.abs(there - z) <= _MOST_STEP) & ~under).tolist():
             what = "nothing meets" if np.isnan(there[k]) else f"{abs(there[k] - z[k]):.3f} m from"
             found.append(f"{what} {stuff} at {t[k]:.3f} m, {z[k]:.2f} m high")
     return found

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.world.borders import ALIKE, SAME, Profile, Side, edges_on, profile_of
+from vico.world.borders import ALIKE, NEAR, SAME, Profile, Side, edges_on, profile_of
 from vico.world.mesh import Surface
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,9 @@ def _conformed(surface: Surface, side: Side, first: Profile) -> Surface:
     # Where a kind of ground ends a little earlier or later than across the border, it ends there, too.
     theirs = first.ends(stuff)
     for at, height in profile_of([surface], side).ends(stuff).tolist() if len(theirs) else []:
-        off = np.where(np.abs(theirs[:, 1] - height) <= ALIKE, np.abs(theirs[:, 0] - at), np.inf)
+        off = np.abs(theirs[:, 0] - at) + np.where(np.abs(theirs[:, 1] - height) <= NEAR, 0.0, np.inf)
+        if not np.isfinite(off).any():
+            off = np.abs(theirs[:, 0] - at) + np.where(np.abs(theirs[:, 1] - height) <= ALIKE, 0.0, np.inf)
         best = int(off.argmin())
         if off[best] <= _SLIP:
             here = (np.abs(t - at) < SAME) & (np.abs(z - height) < SAME)
