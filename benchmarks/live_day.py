@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 from live import READER
-from reporting import machine, publish
+from reporting import machine, publish, split_options
 from soak import Piece, recorded_steps, resident_mb
 
 _PERIOD = 2.0  # s between readings
@@ -61,11 +61,7 @@ def session(command: list[str], out: Path, last: int) -> tuple[Piece, list[int]]
 
 def main() -> None:
     """Run it and report."""
-    arguments = sys.argv[1:]
-    given_to_live: list[str] = list(_USUAL)
-    if "--" in arguments:
-        cut = arguments.index("--")
-        arguments, given_to_live = arguments[:cut], arguments[cut + 1 :]
+    arguments, given_to_live = split_options(_USUAL)
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("world", type=Path)
     parser.add_argument("community", type=Path)

@@ -62,6 +62,15 @@ def vico(*arguments: str) -> Child:
     return Child(output, time.perf_counter() - began, peak)
 
 
+def split_options(usual: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return a script's own words, and those after ``--`` that it hands on; `usual` where there is no ``--``."""
+    words = sys.argv[1:]
+    if "--" not in words:
+        return words, list(usual)
+    cut = words.index("--")
+    return words[:cut], words[cut + 1 :]
+
+
 def row(name: str, values: Sequence[float], digits: int) -> str:
     """Format a line of a table: median, least and greatest of n measurements."""
     low, high, middle = min(values), max(values), statistics.median(values)

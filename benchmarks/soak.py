@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from reporting import machine, publish
+from reporting import machine, publish, split_options
 
 from vico.sim.recording.run import Run, read_run
 
@@ -144,11 +144,7 @@ def report(run: Run, pieces: list[Piece]) -> list[str]:
 
 
 def main() -> None:
-    arguments = sys.argv[1:]
-    given_to_run: list[str] = list(_USUAL)
-    if "--" in arguments:
-        cut = arguments.index("--")
-        arguments, given_to_run = arguments[:cut], arguments[cut + 1 :]
+    arguments, given_to_run = split_options(_USUAL)
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("world", type=Path)
     parser.add_argument("community", type=Path)

@@ -170,12 +170,13 @@ def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64
     """Return where buildings stand across a tile's eastern or northern border, metres along it, shape ``(n, 2)``."""
     half = city.manifest.size / 2
     found: list[tuple[float, float]] = []
-    for dx, dy in ((dx, dy) for dx in (-1, 0, 1, 2) for dy in (-1, 0, 1, 2)):
+    # Houses may stand beyond the tile of their middle: of both tiles, and of those beside them.
+    for across, aside in ((across, aside) for across in (0, 1) for aside in (-1, 0, 1)):
+        dx, dy = (across, aside) if axis == 0 else (aside, across)
         tile = first[0] + dx, first[1] + dy
         if tile not in city:
             continue
-        at = half - city.manifest.size * (dx if axis == 0 else dy)
-        along = -city.manifest.size * (dy if axis == 0 else dx)
+        at, along = half - city.manifest.size * across, -city.manifest.size * aside
         ends = [(at, along - half), (at, along + half)]
         line = shapely.LineString(ends if axis == 0 else [end[::-1] for end in ends])
         for building in city.world(tile).buildings:

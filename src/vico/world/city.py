@@ -19,7 +19,6 @@ from vico.io.files import read_json
 from vico.world.folder import World, read_world
 from vico.world.model import Origin, Record
 
-SCHEMA = "vico.city"
 VERSION = 1
 
 
