@@ -16,7 +16,7 @@ import { Happenings } from "./happenings.js";
 
 /** Levels of care, the plainest first: pixels' share, reach of whole tiles, of full bodies, of things (metres). */
 const CARE = [
-  { pixels: 0.4, tiles: 12, bodies: 8, things: 14, far: 70 },
+  { pixels: 0.36, tiles: 12, bodies: 8, things: 14, far: 70 },
   { pixels: 0.5, tiles: 25, bodies: 12, things: 20, far: 110 },
   { pixels: 0.65, tiles: 50, bodies: 18, things: 28, far: 200 },
   { pixels: 0.8, tiles: 100, bodies: 28, things: 40, far: 380 },
