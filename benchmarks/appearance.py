@@ -44,8 +44,9 @@ from vico.geo.street_images.model import heading_of, looking
 from vico.render import Cameras, Scene, render
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK
+from vico.world.world import World
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.daylight import sun_in, without_sun

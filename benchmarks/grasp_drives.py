@@ -20,7 +20,7 @@ from vico.challenges.pick_place.task import fitting_kinds
 from vico.challenges.robot.bodies import team_of
 from vico.envs import Simulation, make
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 #: What carries: the manipulator's jaw, or the carrier's deck.
 SORTS = ("in the jaw", "on the deck")

@@ -22,8 +22,9 @@ from robot_field import HALF, field
 from vico.assets.shapes import box
 from vico.sim.bodies import Bodies
 from vico.sim.robots import RobotPopulation
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.heights import HeightField, Steps
+from vico.world.world import World
 
 STEP = 0.1
 NOBODY = Bodies.none()

@@ -27,9 +27,9 @@ from vico.rules import STAIRS_SPEED
 from vico.seeds import rng
 from vico.sim.animation import clip_index, ground_under_feet, pose, stride_length, style_of
 from vico.sim.animation.stride import pace_of_step
-from vico.world.folder import World
 from vico.world.model import FLIGHT_STEPS, LANDING
 from vico.world.stairs import DEEPEST
+from vico.world.world import World
 
 _LENGTH, _SPEED, _RATE, _KERB = 5.0, 1.2, 50.0, 0.07
 _SOON = round(0.2 * _RATE)  # frames

@@ -26,7 +26,8 @@ from reporting import machine, publish, row, vico
 
 from vico.io.files import read_json
 from vico.seeds import rng
-from vico.world.folder import read_world, stage_seconds
+from vico.world.folder import read_world
+from vico.world.stored import stage_seconds
 
 WAYS = {
     "one process": ("--workers", "1"),

@@ -17,7 +17,8 @@ from vico.community import Community, read_community
 from vico.community.model import ItemType, Resident, ScheduleItem
 from vico.rules import walk_speed
 from vico.seeds import rng
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 MODES = ("walk", "bus", "tram", "bike")
 

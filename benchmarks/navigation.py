@@ -41,9 +41,10 @@ from vico.runner.loop import Runner
 from vico.seeds import rng
 from vico.sim.simulation import Simulation
 from vico.sim.state import RADIUS
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.model import Container, Place
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 _CELL = 0.1
 _KEPT = 300  # steps

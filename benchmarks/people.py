@@ -28,7 +28,8 @@ from vico.community.place_index import PlaceIndex
 from vico.community.social_network import NetworkMeasures, network_measures
 from vico.community.work import check_beds
 from vico.errors import EmptyInputError
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,9 @@ from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.physics import engine_names
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.robots import RobotPopulation, RobotScene
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK
+from vico.world.world import World
 
 _AVATARS, _APART = 50, 5.0
 # Metres a second that each kind is told to go with.

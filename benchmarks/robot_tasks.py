@@ -14,7 +14,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 KINDS = ("husky", "manipulator", "go2", "drone", "h1")
 HUSKY, MANIPULATOR, GO2, DRONE, H1 = range(5)

@@ -21,7 +21,8 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 AGENTS = 10
 

@@ -23,8 +23,9 @@ from vico.community.model import Community
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 _WARM = 5
 

@@ -32,8 +32,9 @@ from vico.geo.street_images.model import StreetImage, looking, pinhole
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.mesh import Surface
+from vico.world.world import World
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap

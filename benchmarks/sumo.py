@@ -29,8 +29,9 @@ from vico.sim.simulation import Simulation
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.records import TOP_SPEED
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.lanes import LaneGraph
+from vico.world.world import World
 from vico.worldgen.streets.netconvert import netconvert_binary
 
 _STANDS = 0.1  # m/s, below which a vehicle counts as standing: SUMO's `halting`

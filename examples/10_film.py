@@ -40,9 +40,10 @@ from vico.sim.recording import read_run
 from vico.sim.simulation import Simulation
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, film_frames
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.world import World
 
 RATE = 25
 ROBOTS = ("manipulator", "husky", "go2", "h1", "drone")

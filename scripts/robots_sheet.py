@@ -19,8 +19,9 @@ from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.scene import SceneRenderer
 from vico.sim.simulation import Simulation
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK
+from vico.world.world import World
 
 WIDTH, HEIGHT = 448, 300
 KINDS = ("husky", "manipulator", "go2", "drone", "h1")

@@ -15,8 +15,8 @@ from vico.challenges.assistant.causes import Chronicle
 from vico.challenges.assistant.judge import Judge
 from vico.challenges.assistant.model import Category, Person, Region, Start, Subtask, Surface, Task, TaskObject
 from vico.runner.loop import Step
-from vico.world.folder import World
 from vico.world.model import Point3
+from vico.world.world import World
 
 #: In the shop and in the café, on the green, and far from all of it.
 IN_SHOP: Point3 = (7.0, 12.5, toy_city.FLOOR)

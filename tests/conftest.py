@@ -19,7 +19,8 @@ from command_line import vico
 from shared_folders import Shared, SharedFolders
 from vico.community import build_community, write_community
 from vico.io.compiled import compiled_folder
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
 

@@ -25,8 +25,9 @@ from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.environment import weather_kinds
 from vico.sim.simulation import Simulation
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 _AGAIN = 20  # steps before the end from which a run is gone through twice
 _NOWHERE = 90  # steps within which a resident who is on the way gets somewhere

@@ -9,12 +9,12 @@ from vico.assets.shapes import box
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.config import PHYSICS_ENGINES
 from vico.sim.physics import DEFAULT_ENGINE, engine_names
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Manifest, Origin
 from vico.world.objects import Objects
 from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
+from vico.world.world import World
 
 HALF = 40.0
 #: Physics engines: MuJoCo, which comes with the package, and those whose package is installed, which take minutes.

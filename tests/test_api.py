@@ -12,7 +12,7 @@ import pytest
 import toy_city
 import vico
 from vico.errors import InputError
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def test_importing_vico_loads_no_room() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from vico.community import build_community, write_community
 from vico.io.files import read_json
-from vico.world.folder import World
+from vico.world.world import World
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -20,7 +20,8 @@ from vico.errors import InputError
 from vico.llm import Budget, Connection, LanguageModel, user
 from vico.runner.faults import Fault
 from vico.seeds import rng
-from vico.world.folder import manifest_bytes, read_world
+from vico.world.folder import read_world
+from vico.world.records import manifest_bytes
 
 NAME = "toy_challenge:TOY"
 SKILL = {"good": 0.9, "fair": 0.5, "bad": 0.1}

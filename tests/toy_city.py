@@ -17,7 +17,6 @@ from vico.community.model import (
     ScheduleItem,
     WorldIdentity,
 )
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import ENTITY_GROUND, Building, Category, Container, Entrance, Manifest, Origin, Place, Room
@@ -25,6 +24,7 @@ from vico.world.objects import Objects
 from vico.world.street_model import Roads
 from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, OPEN, SIDEWALK, WalkableMap
+from vico.world.world import World
 
 HALF = 40.0
 #: The house covers x -10..10, y 5..17; doors on its south side. Rooms lie 6 m below it.

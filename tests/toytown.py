@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Manifest, Origin, Place
 from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap
+from vico.world.world import World
 
 HALF = 120.0
 

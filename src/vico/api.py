@@ -23,8 +23,8 @@ from vico.render import Cameras, render
 from vico.render.world_scene import scene_of
 from vico.world.check import WorldFinding
 from vico.world.check import check_world as _check_world
-from vico.world.folder import World
 from vico.world.folder import read_world as _read_world
+from vico.world.world import World
 from vico.worldgen import pipeline
 from vico.worldgen.packaged import map_for, packaged_extract
 from vico.worldgen.previews.viewpoints import viewpoints

@@ -13,8 +13,8 @@ from vico.agents.travel import Traveller
 from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 ME = "resident_2"
 FAIR = {"rain": 0.0, "snow": 0.0, "wind": 3.0, "temperature": 18.0, "wet": 0.0, "snow_cover": 0.0, "ice": 0.0}

@@ -16,8 +16,8 @@ from vico.community.model import Community
 from vico.io.plain_data import encode
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 
 class Counting:

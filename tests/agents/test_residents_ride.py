@@ -18,8 +18,8 @@ from vico.rules import walk_speed
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.sim.timetable import EARLIEST
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 Way = tuple[ScheduleItem, ScheduleItem, ScheduleItem]
 

@@ -14,8 +14,8 @@ from vico.rules import BUS_FARE
 from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 EIGHT = 8 * 3600
 ME = "assistant_0"

@@ -24,7 +24,7 @@ from assistant_by_hand import (
     task,
 )
 from vico.challenges.assistant.causes import CAUSES
-from vico.world.folder import World
+from vico.world.world import World
 
 RED = "red helmet"
 WALK = {"type": "move_forward", "distance": 2.0}

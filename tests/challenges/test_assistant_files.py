@@ -13,7 +13,7 @@ import toy_city
 from assistant_by_hand import CAFE_TABLE, CLEO, OUTDOORS, SHOP, subtask, task
 from vico.challenges.assistant.model import Category, Task, read_task, write_task
 from vico.errors import SchemaError
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture(scope="module")

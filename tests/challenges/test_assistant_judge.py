@@ -18,7 +18,7 @@ from assistant_by_hand import (
     subtask,
     task,
 )
-from vico.world.folder import World
+from vico.world.world import World
 
 RED, BLUE = "red helmet", "blue helmet"
 

@@ -10,7 +10,7 @@ from vico.challenges.commute import COMMUTE
 from vico.challenges.commute.causes import CAUSES
 from vico.challenges.records import EpisodeRecord, Job
 from vico.errors import InputError
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def job_of(world: World, method: str, **setting: float) -> Job:

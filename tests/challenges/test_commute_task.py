@@ -16,7 +16,7 @@ from vico.challenges.commute.generate import generate_commute
 from vico.challenges.commute.model import read_task, write_task
 from vico.clock import clock_of
 from vico.errors import EmptyInputError, InputError, SchemaError
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def test_the_same_world_and_seed_give_the_same_bytes(helsinki_city: World, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from vico.runner.faults import Fault
 from vico.runner.foreign import Terms
 from vico.sim.recording import read_run
 from vico.viewer.repeat import RepeatedRun
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from vico.community.model import Community, ItemType
 from vico.errors import InputError, SourceError
 from vico.io.files import read_json
 from vico.sim.recording import read_run
-from vico.world.folder import World
+from vico.world.world import World
 
 EVENING = 20 * 3600.0
 NOON = 12 * 3600.0

@@ -17,7 +17,7 @@ from vico.challenges.learning.make import make_point_goal, make_robot_point_goal
 from vico.challenges.learning.point_goal import ways_to
 from vico.envs.registry import TASKS
 from vico.errors import EmptyInputError, InputError
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Pictures of extents that have no bounds, and vectors that are no shares, are what they are.
 quiet = pytest.mark.filterwarnings("ignore::UserWarning")

@@ -15,7 +15,7 @@ from vico.challenges.assistant.choose_llm import llm_chooser
 from vico.challenges.assistant.generate import generate_task
 from vico.community.model import Community
 from vico.llm import Budget
-from vico.world.folder import World
+from vico.world.world import World
 
 WHO = toy_city.community().residents[0]
 NAMES = [f"Place {k}" for k in range(9)]

@@ -32,7 +32,7 @@ from vico.clock import seconds_of_day
 from vico.community import build_community
 from vico.community.model import Community
 from vico.errors import EmptyInputError
-from vico.world.folder import World
+from vico.world.world import World
 
 Made = dict[tuple[Category, bool], Task]
 

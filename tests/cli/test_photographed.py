@@ -16,7 +16,8 @@ from photogrammetry.aerial import Photogrammetry, photogrammetry
 from photogrammetry.tileset import write_tileset
 from vico.geo.street_images.model import looking, pinhole
 from vico.seeds import rng
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 from vico.worldgen.photos.streetview.renders import photographer_of
 from vico.worldgen.previews.viewpoints import viewpoints
 

@@ -4,7 +4,7 @@ import pytest
 
 from toytown import make_world
 from vico.community import Community, build_community
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture(scope="session")

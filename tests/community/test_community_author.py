@@ -19,8 +19,8 @@ from vico.community.catalogue import names as known_names
 from vico.community.model import ItemType
 from vico.community.place_index import PlaceIndex
 from vico.errors import EmptyInputError, InputError
-from vico.world.folder import World
 from vico.world.model import Category
+from vico.world.world import World
 
 _ALWAYS = ("accommodation", "open", "transit")
 

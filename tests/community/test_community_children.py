@@ -12,7 +12,7 @@ from vico.community import Community, Resident, check_community, procedural_auth
 from vico.community.childhood import ALONE_FROM, GROWN_UP
 from vico.community.model import RelationKind
 from vico.rules import walk_speed
-from vico.world.folder import World
+from vico.world.world import World
 
 _SCHOOLS = (
     ("Lime Street School", "office", "school", None),

@@ -14,7 +14,7 @@ from vico.community import Community, build_community, check_community, date_of,
 from vico.community.hours import open_spans
 from vico.community.model import ActivityTag, ItemType, Resident, ScheduleItem
 from vico.errors import InputError
-from vico.world.folder import World
+from vico.world.world import World
 
 _SATURDAY, _SUNDAY = date(2025, 6, 7), date(2025, 6, 8)
 _WORK = (ActivityTag.WORK, ActivityTag.STUDY)

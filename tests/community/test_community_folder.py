@@ -11,7 +11,7 @@ from toytown import make_world
 from vico.community import Community, digest_of, read_community, read_manifest, write_community
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
 from vico.io.files import sha256_of
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture

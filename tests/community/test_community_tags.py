@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vico.community import ActivityTag, Community, check_community, read_community, with_tags, write_community
 from vico.community.model import ItemType
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def silent(community: Community) -> Community:

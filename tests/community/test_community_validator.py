@@ -9,7 +9,7 @@ import pytest
 
 from toytown import make_world
 from vico.community import Community, Relation, Resident, ScheduleItem, check_community
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def with_resident(community: Community, index: int, **change: Any) -> Community:

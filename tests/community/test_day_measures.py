@@ -16,7 +16,7 @@ from vico.community.model import ActivityTag, Resident
 from vico.community.place_index import PlaceIndex
 from vico.community.staff import staff_capacity
 from vico.errors import EmptyInputError
-from vico.world.folder import World
+from vico.world.world import World
 
 Measured = list[tuple[Resident, dict[str, float]]]
 

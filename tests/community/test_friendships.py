@@ -7,7 +7,7 @@ import pytest
 
 from vico.community import Community, RelationKind, build_community
 from vico.community.social_network import measures_of, network_measures
-from vico.world.folder import World
+from vico.world.world import World
 
 _CLOSE = [RelationKind.FRIEND]
 

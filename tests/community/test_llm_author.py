@@ -26,7 +26,7 @@ from vico.community.findings import CommunityFinding
 from vico.community.llm import LlmCommunityAuthor
 from vico.errors import InputError, SchemaError
 from vico.llm import Budget, Connection, Endpoint, LanguageModel
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def author_of(base: str, *, workers: int = 4, only: bool = False, **options: object) -> LlmCommunityAuthor:

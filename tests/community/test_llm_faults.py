@@ -18,7 +18,7 @@ from vico.community import Community, build_community, check_community
 from vico.community.authorship import Origin
 from vico.community.llm import LlmCommunityAuthor
 from vico.llm import Connection, Endpoint, LanguageModel
-from vico.world.folder import World
+from vico.world.world import World
 
 RESIDENTS = 8
 # The person at whom everything in these tests goes wrong.

@@ -9,7 +9,7 @@ from vico.community.homelife import CHAT
 from vico.community.llm.fitting import MIDNIGHT, DayFitter, Stay, minute_of, overlaid, stays_of
 from vico.community.model import ItemType
 from vico.community.place_index import PlaceIndex
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,13 @@ from vico.community.model import Mode
 from vico.community.ride_times import RideTimes
 from vico.community.walks import Walk, Walks
 from vico.rules import BUS_DWELL, BUS_FARE
-from vico.world.folder import World
 from vico.world.model import Point2
 from vico.world.routing import Router
 from vico.world.transit_model import BikeStation, Line, Stop, TramLine, TramStop, Transit
 from vico.world.trips import Trips
 from vico.world.trips.ways import find_way
 from vico.world.walkable import BLOCKED, OPEN, WalkableMap
+from vico.world.world import World
 
 EIGHT = 8 * 3600
 DOORS: tuple[Point2, Point2] = ((-181.0, -180.0), (177.0, 175.0))

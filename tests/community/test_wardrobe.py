@@ -10,7 +10,7 @@ import pytest
 from vico.community import Resident, build_community
 from vico.community.clothes import clothes_of, trade_clothes
 from vico.community.model import ResidentAppearance
-from vico.world.folder import World
+from vico.world.world import World
 
 # What makes one unit of difference: years, metres, shares, and a channel of a colour.
 _SCALES = {"age": 15.0, "height": 0.08, "build": 0.25, "muscle": 0.3, "gender": 1.0}

@@ -23,7 +23,7 @@ from vico.runner.loop import Hook, Step
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
 from vico.sim.actions.check import parse
 from vico.sim.recording import read_run
-from vico.world.folder import World
+from vico.world.world import World
 
 POSE = (12.5, -40.25, 3.0, 2.1)
 FORM = ActionForm()

@@ -22,7 +22,7 @@ from photogrammetry.tileset import leaf_cells
 from vico.errors import InputError
 from vico.geo.tiles3d.mesh import TileMesh
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 _STEEP = 0.55  # normals with a smaller z are walls
 _SECTORS = 8

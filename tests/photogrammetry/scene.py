@@ -11,8 +11,8 @@ from PIL import Image
 
 from vico.assets.vehicles import vehicle_prototypes
 from vico.seeds import rng
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 from vico.worldgen.facts.sight import Hits, Sight
 
 GROUND, BUILDING, THING = 0, 1, 2

@@ -15,7 +15,7 @@ from vico.errors import InputError
 from vico.sim.base import SimulationBase
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def test_simulations_of_a_world_share_what_never_changes() -> None:

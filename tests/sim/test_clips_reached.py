@@ -15,7 +15,7 @@ from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
 from vico.sim.traffic.records import STOP
 from vico.sim.traffic.walking_gaits import PedestrianGaits
-from vico.world.folder import World
+from vico.world.world import World
 
 
 class _Watched:

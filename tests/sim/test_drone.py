@@ -16,8 +16,8 @@ from vico.sim.robots.airspace import CEILING, OVER, Airspace
 from vico.sim.robots.rotors import FlightPhase
 from vico.sim.robots.wind import air_at, gusts_of
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.world import World
 
 #: A house: middle, extents; its flat roof is 4.5 m high, as walls of `field` are.
 HOUSE = (12.0, 0.0, 6.0, 12.0)

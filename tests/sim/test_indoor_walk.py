@@ -15,9 +15,9 @@ import toy_city
 from vico.agents.schedule import ScheduleFollower
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.model import Category, Room
 from vico.world.public import PublicMap
+from vico.world.world import World
 from vico.worldgen.indoor.stage import furnish
 
 CELL = 0.1

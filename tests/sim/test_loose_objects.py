@@ -10,7 +10,7 @@ from vico.assets.shapes import box
 from vico.sim.config import SimConfig
 from vico.sim.physics.loose import ENTER, LEAVE
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 CRATE = (0.4, 0.4, 0.3)
 

@@ -7,7 +7,7 @@ from typing import Any
 import toy_city
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 HOURS = "Mo-Fr 09:00-17:00; Sa,Su off"
 

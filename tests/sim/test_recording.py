@@ -25,10 +25,10 @@ from vico.sim.recording import PosedPeople, read_run
 from vico.sim.recording.action_text import LONGEST_ACTION, action_text
 from vico.sim.recording.schema import SEGMENT_STEPS
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.lane_reader import read_lanes
 from vico.world.public import PublicMap
 from vico.world.transit_model import BikeStation, Transit
+from vico.world.world import World
 
 STEPS = 100
 EVERY = 40

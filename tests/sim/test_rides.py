@@ -17,8 +17,8 @@ from vico.sim.overlaps import overlapping
 from vico.sim.simulation import Simulation
 from vico.sim.state import RADIUS, Posture, Vehicle
 from vico.sim.transit import BIKE_ASTRAY, BIKE_RATE, FARE
-from vico.world.folder import World
 from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.world import World
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from vico.sim.environment.agenda import EventEffects
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.ways import way_to
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.walkable import ROADWAY
+from vico.world.world import World
 
 CLOSED = ((8.0, 0.0, 4.0),)
 

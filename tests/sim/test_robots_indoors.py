@@ -15,8 +15,8 @@ from vico.sim.overlaps import overlaps_of
 from vico.sim.robots import decisions
 from vico.sim.robots.rooms import fits_doors
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.model import LIFT, Doorway, Room
+from vico.world.world import World
 
 GO2, HUSKY, DRONE = "robot_0", "robot_1", "robot_2"
 NAMES = {"go2": GO2, "husky": HUSKY, "drone": DRONE}

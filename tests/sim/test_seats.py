@@ -23,9 +23,9 @@ from vico.sim.scene import SceneRenderer
 from vico.sim.seats import Seats
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
-from vico.world.folder import World
 from vico.world.objects import Objects
 from vico.world.public import PublicMap
+from vico.world.world import World
 from vico.worldgen.indoor.stage import furnish
 
 FLOOR = toy_city.FLOOR

@@ -15,9 +15,9 @@ from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.records import STOP, TALK
 from vico.sim.traffic.standing_spots import with_spots
 from vico.sim.transit import TransitSystem, plan_buses
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.walkable import OPEN, WalkableMap
+from vico.world.world import World
 
 # 08:01:40: a bus with room, and a tram, come to stops within the time of the test, and so do their riders.
 SECOND = 8 * 3600.0 + 100.0

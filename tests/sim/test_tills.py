@@ -14,7 +14,7 @@ from vico.sim.config import SimConfig
 from vico.sim.moves import place_in_room
 from vico.sim.simulation import Simulation
 from vico.sim.tills import PRICE, SERVICE, SPACING
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def shop() -> World:

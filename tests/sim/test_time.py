@@ -13,7 +13,7 @@ from vico.errors import InputError
 from vico.sim.config import SimConfig
 from vico.sim.periods import ControlPeriods, ticks_of
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 MORNING = SimConfig(start=8 * 3600 - 20, assistants=1, observe=())
 ROBOTS = replace(MORNING, robots=("husky", "go2"))

@@ -24,11 +24,11 @@ from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.system import TransitSystem
 from vico.sim.transit.tram_network import TramNetwork
 from vico.sim.transit.tram_zones import zones_of
-from vico.world.folder import World
 from vico.world.public import PublicMap
 from vico.world.rails import TRAM_LENGTH, Track
 from vico.world.transit_model import TramLine, TramStop
 from vico.world.walkways import CORNER, CROSSING, SIDEWALK
+from vico.world.world import World
 from vico.worldgen.streets.netconvert import empty_network
 
 EIGHT = 8 * 3600

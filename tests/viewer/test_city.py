@@ -18,8 +18,8 @@ from vico.viewer.city.pack import Blob, packed
 from vico.viewer.city.robots import write_robots
 from vico.viewer.city.textures import PLAIN, SHAPES, TextureLayers
 from vico.viewer.city.tiles import PICTURE, Grid, far_tiles, ground_picture
-from vico.world.folder import World
 from vico.world.mesh import Material, Surface
+from vico.world.world import World
 
 _PAGE = Path(__file__).parents[2] / "src" / "vico" / "viewer" / "page"
 

@@ -17,7 +17,7 @@ from vico.viewer.demo_film import HEIGHT, RATE, SECONDS, WIDTH, write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.map_picture import MapPicture
 from vico.viewer.recording import Recording
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture(scope="module")

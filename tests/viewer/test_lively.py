@@ -8,8 +8,8 @@ import pytest
 import toy_city
 from vico.errors import InputError
 from vico.viewer.lively import lively_spot
-from vico.world.folder import World
 from vico.world.walkable import SIDEWALK
+from vico.world.world import World
 
 
 def test_who_is_played_starts_on_a_sidewalk_with_doors_ahead_and_a_long_view(helsinki: World) -> None:

@@ -16,7 +16,7 @@ from vico.sim.recording import read_run
 from vico.viewer.from_run import recording_of
 from vico.viewer.recording import RecordedEvent, Recording
 from vico.viewer.replay import UNIT, page_data, write_replay
-from vico.world.folder import World
+from vico.world.world import World
 
 HIDDEN = -32768
 

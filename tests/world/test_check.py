@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from vico.world.check import check_world
-from vico.world.folder import World, read_world, write_records
+from vico.world.folder import read_world
 from vico.world.objects import write_objects
+from vico.world.records import write_records
+from vico.world.world import World
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import trimesh
 
 from vico.errors import InputError, OutputExistsError
 from vico.world.exports import FORMATS, export_world
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def test_trimesh_reads_the_gltf_with_every_object_where_it_stands(helsinki: World, tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vico.errors import SchemaError
-from vico.world.folder import read_terrain, write_terrain
 from vico.world.heights import EDGE_RANGE, HeightField, Steps
+from vico.world.records import read_terrain, write_terrain
 
 HALF = 20.0
 

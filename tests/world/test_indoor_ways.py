@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from vico.world.folder import World
 from vico.world.indoor_ways import DOOR, IndoorWays, walk_within
 from vico.world.model import LANDING, Doorway, Point3, Room
+from vico.world.world import World
 
 
 def room(name: str, centre: Point3, size: Point3, doors: list[Doorway], rise: float = 0.0) -> Room:

@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from vico.errors import MissingFileError, SchemaError
-from vico.world.folder import LAYERS, World, kept_world, read_records, read_world, seal
+from vico.world.folder import kept_world, read_world
 from vico.world.model import VERSION, Place
+from vico.world.records import read_records
+from vico.world.stored import seal
+from vico.world.world import LAYERS, World
 
 
 @pytest.fixture

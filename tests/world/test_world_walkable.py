@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vico.errors import InputError
-from vico.world.folder import World
 from vico.world.walkable import BLOCKED, BODY, OPEN, ROADWAY, SIDEWALK, WalkableMap, fill_polygon, stroke
+from vico.world.world import World
 
 
 def test_no_free_cell_comes_nearer_to_a_wall_than_a_body_needs(helsinki: World) -> None:

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vico.errors import InputError
-from vico.world.folder import World
 from vico.world.glb import read_glb, write_glb
 from vico.world.mesh import Material, Surface
+from vico.world.world import World
 from vico.worldgen.photos.atlas import Atlas, Chart, coverage, repacked, texel_centres, textured, unwrap
 
 FACES = np.array([(0, 1, 2), (0, 2, 3)])

@@ -16,10 +16,13 @@ from shapely.affinity import translate
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.world.borders import Side, border_findings, profile_of
+from vico.world.check import check_streets
 from vico.world.city import read_city
+from vico.world.city_world import CityWorld
+from vico.world.folder import read_world
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
-from vico.worldgen.city_build import build_city, city_request
+from vico.worldgen.city_build import build_city, city_request, divide_map
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
 from vico.worldgen.facts.streets import StreetPolygons
@@ -83,6 +86,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> CityRequest:
     """Two tiles of Helsinki side by side, planned but not built."""
     out = tmp_path_factory.mktemp("pair")
     request = CityRequest(Sources(EXTRACT), *CENTRE, PAIR, 0, out)
+    divide_map(request)
     for tile in PAIR:
         plan(request, tile)
     return request
@@ -174,6 +178,37 @@ def test_bad_sizes_are_refused_in_a_sentence(tmp_path: Path) -> None:
         read_city(tmp_path)
 
 
+def _check_whole(path: Path) -> None:
+    """Check that a city opens as one world: everything once, streets and ways across borders."""
+    world = read_world(path)
+    assert isinstance(world, CityWorld)
+    assert check_streets(world) == []
+    for name in ("buildings", "places", "entrances", "rooms", "parking"):
+        ids = [one.id for one in getattr(world, name)]
+        assert len(set(ids)) == len(ids), name
+    assert len(set(world.objects.id.tolist())) == len(world.objects)
+    doors = {entrance.id for entrance in world.entrances}
+    assert all(place.entrance in doors for place in world.places if place.entrance)
+    # Streets end at the city's edge and nowhere else.
+    lanes, half = world.lanes, world.half
+    ends = [k for k in range(len(lanes)) if not len(lanes.following(k)) and not lanes.buses_only[k]]
+    at_border = [k for k in ends if (np.abs(np.abs(lanes.line(k)[-1]) - 80.0) < 3.0).any()]
+    assert len(at_border) <= 2
+    assert np.abs(lanes.points).max() > half - 5.0
+    spots = np.random.default_rng(0).uniform(-half, half, (500, 2))
+    for column, row in ((-1, 0), (0, 0), (1, 1)):
+        centre = np.array([column, row]) * 160.0
+        here = spots[np.abs(spots - centre).max(axis=1) < 79.0]
+        tile = world.city.world((column, row))
+        assert np.allclose(world.height(here), tile.height(here - centre), atol=1e-4)
+        assert np.array_equal(world.walkable.class_at(here), tile.walkable.class_at(here - centre))
+    rng = np.random.default_rng(1)
+    a, b = (world.walkable.random_point(rng, near=(k, k), radius=60.0) for k in (-170.0, 170.0))
+    way = world.router.path(a, b)
+    assert way is not None
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).sum() < 2.0 * np.linalg.norm(b - a)
+
+
 @pytest.mark.slow
 def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path) -> None:
     request = city_request(
@@ -185,6 +220,7 @@ def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path) -> N
     findings = [found for border in city.borders() for found in border_findings(city, *border)]
     assert [found for found in findings if "heights differ" in found] == []
     assert len(findings) <= 8  # where a kind of ground is there on one side alone; docs/cities.md
+    _check_whole(request.out)
     digests = {tile.name: tile.digest for tile in city.manifest.tiles}
     built = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}
     shutil.rmtree(request.out / "tiles" / "0_0")

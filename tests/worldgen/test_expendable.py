@@ -12,8 +12,9 @@ import shapely
 from vico.errors import InputError
 from vico.geo.overlay import OverlayError
 from vico.world.check import check_world
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.model import Dropped
+from vico.world.world import World
 from vico.worldgen.buildings import drafts
 from vico.worldgen.facts.expendable import NamedShape, expendable, listening, united, widened
 from vico.worldgen.pipeline import build_world

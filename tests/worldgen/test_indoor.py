@@ -13,8 +13,8 @@ from vico.assets.models.movable import movable_kinds
 from vico.io.data_files import PACKAGED
 from vico.rules import REACH
 from vico.world.check.indoors import walkable_inside
-from vico.world.folder import World
 from vico.world.model import FIRST_FURNITURE, Category, Entrance
+from vico.world.world import World
 from vico.worldgen.facts.expendable import listening
 from vico.worldgen.indoor import catalogue, stage
 from vico.worldgen.indoor.catalogue import use_of

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from vico.errors import InputError, MissingFileError, SchemaError, VicoError
 from vico.world.check.indoors import walkable_inside
-from vico.world.folder import World
 from vico.world.model import Category
+from vico.world.world import World
 from vico.worldgen.indoor.layout_library import (
     Layout,
     LayoutRequest,

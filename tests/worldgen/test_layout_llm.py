@@ -15,8 +15,8 @@ from llm_server import Script, model_server, refuses, says
 from vico.errors import SourceError
 from vico.llm import Budget, Connection, Endpoint, LanguageModel, Sampling
 from vico.world.check.indoors import walkable_inside
-from vico.world.folder import World
 from vico.world.model import Place
+from vico.world.world import World
 from vico.worldgen.indoor.catalogue import use_of
 from vico.worldgen.indoor.layout_library import Layout, findings_of
 from vico.worldgen.indoor.layout_llm import EXAMPLE, LlmLayoutAuthor, furnish_drawn

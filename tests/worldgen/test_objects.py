@@ -10,9 +10,9 @@ from vico.assets.models.plants import plant_models
 from vico.assets.models.street import street_models
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode, OsmWay
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
+from vico.world.world import World
 from vico.worldgen.objects.stage import objects_from_osm
 
 NOTHING = shapely.Polygon()

@@ -9,7 +9,8 @@ import pytest
 
 from vico.errors import SchemaError
 from vico.world.check import check_world
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
 

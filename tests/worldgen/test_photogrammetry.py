@@ -19,8 +19,9 @@ from vico.geo.overlay import OverlayError
 from vico.geo.tiles3d.mesh import TileMesh
 from vico.geo.tiles3d.reader import read_tileset
 from vico.seeds import rng
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.heights import HeightField
+from vico.world.world import World
 from vico.worldgen.buildings.fitting import moves, nudging
 from vico.worldgen.buildings.fitting.nudging import fit_to_tiles, plans_on_tiles, settled
 from vico.worldgen.buildings.solids import leaky, seat_of, solid_meshes

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from vico.errors import EmptyInputError, InputError, MissingFileError, OutputExistsError
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 from vico.worldgen import recipe
 from vico.worldgen.pipeline import build_world, extract_centre
 from vico.worldgen.request import BuildOptions

@@ -4,10 +4,10 @@ import math
 
 import shapely
 
-from vico.world.folder import World
 from vico.world.model import Category
 from vico.world.routing import Router
 from vico.world.walkable import ROADWAY
+from vico.world.world import World
 
 
 def test_all_seven_categories_but_what_the_window_lacks_occur(helsinki: World) -> None:

@@ -14,8 +14,8 @@ from conftest import EXTRACT
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
 from vico.geo.places.model import FoundPlace
-from vico.world.folder import World
 from vico.world.model import Category, Dropped, Entrance, Place
+from vico.world.world import World
 from vico.worldgen.facts.named_places import NamedPlace, named_places
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.places.found import compared, likeness

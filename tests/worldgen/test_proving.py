@@ -16,7 +16,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import OverlayError
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated
-from vico.world.folder import World
+from vico.world.world import World
 from vico.worldgen.buildings import details, drafts, proving, stage
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
 from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan

@@ -21,8 +21,9 @@ from random_windows import painted_once
 from vico.geo.frame import LocalFrame
 from vico.world.check import check_world
 from vico.world.check.world import check_dropped
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.model import FAILED, TRIED, Dropped, StageReport
+from vico.world.world import World
 from vico.worldgen import recipe
 from vico.worldgen.facades import fronts
 from vico.worldgen.indoor import stage as indoor

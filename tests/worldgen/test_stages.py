@@ -12,8 +12,9 @@ import pytest
 
 from command_line import vico
 from vico.errors import InputError, MissingFileError
-from vico.world.folder import World, read_world
-from vico.worldgen import recipe
+from vico.world.folder import read_world
+from vico.world.world import World
+from vico.worldgen import recipe, shaping
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.many import read_place_table
 from vico.worldgen.pipeline import build_world, rebuild_world
@@ -79,13 +80,13 @@ def test_a_stopped_build_goes_on_and_gives_the_same_world(
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    real = recipe.buildings_from_plans
+    real = shaping.buildings_from_plans
 
     def counted(*inputs: object, **options: object) -> object:
         ran.append("buildings")
         return real(*inputs, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(recipe, "buildings_from_plans", counted)
+    monkeypatch.setattr(shaping, "buildings_from_plans", counted)
     with monkeypatch.context() as patch:
         patch.setattr(recipe, "furnish", stop)
         with pytest.raises(KeyboardInterrupt):
@@ -102,13 +103,14 @@ def test_one_stage_runs_alone_and_changes_nothing_else(
     shutil.copytree(corner_path, tmp_path / "w", symlinks=True)
     ran: list[str] = []
     for name in ("buildings_from_plans", "objects_from_osm", "ground_from_osm", "furnish"):
-        real = getattr(recipe, name)
+        room = shaping if hasattr(shaping, name) else recipe
+        real = getattr(room, name)
 
         def counted(*inputs: object, name: str = name, real: object = real, **options: object) -> object:
             ran.append(name)
             return real(*inputs, **options)  # type: ignore[operator]
 
-        monkeypatch.setattr(recipe, name, counted)
+        monkeypatch.setattr(room, name, counted)
     again = rebuild_world(tmp_path / "w", ["objects"])
     assert ran == ["objects_from_osm"]
     assert again.files == corner.manifest.files

@@ -9,8 +9,9 @@ import pytest
 from command_line import vico
 from vico.community import build_community, write_community
 from vico.world.check import check_world
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.model import Category
+from vico.world.world import World
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
 

@@ -16,8 +16,8 @@ from vico.challenges.assistant.regions import Neighbourhood
 from vico.challenges.ways import Ways
 from vico.community.model import Community, Resident
 from vico.errors import InputError
-from vico.world.folder import World
 from vico.world.walkable import OPEN, SIDEWALK
+from vico.world.world import World
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from vico.challenges.task_files import PlacedTask
 from vico.community.model import Community
 from vico.errors import InputError
 from vico.runner.foreign import Terms
-from vico.world.folder import World
+from vico.world.world import World
 
 Category = TypeVar("Category", bound=str)
 Task = TypeVar("Task", bound=PlacedTask)

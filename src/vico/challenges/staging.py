@@ -24,7 +24,8 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedOnce, recorded_in
-from vico.world.folder import World, kept_world
+from vico.world.folder import kept_world
+from vico.world.world import World
 
 
 @lru_cache(maxsize=2)

@@ -14,8 +14,8 @@ from vico.community.folder import digest_of
 from vico.community.model import Community
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
-from vico.world.folder import World
 from vico.world.model import Record
+from vico.world.world import World
 
 Model = TypeVar("Model", bound=BaseModel)
 

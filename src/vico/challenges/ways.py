@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.assets.robots.ground import narrow_ground
-from vico.world.folder import World
+from vico.world.world import World
 
 # The ground is looked at so far to either side of a point, metres.
 _ASIDE = 0.5

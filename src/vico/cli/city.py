@@ -7,9 +7,10 @@ from itertools import chain
 from pathlib import Path
 
 from vico.cli.city_options import CityBuildOptions
-from vico.cli.output import print_json, print_table, progress_bars
+from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.errors import InputError
 from vico.world.city import read_city
+from vico.world.city_world import CityWorld
 
 
 def build(options: CityBuildOptions) -> int:
@@ -69,7 +70,7 @@ def info(path: Path, *, json: bool = False) -> int:
 def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
     """Check a city; 1 if anything is wrong."""
     from vico.world.borders import border_findings
-    from vico.world.check import check_world
+    from vico.world.check import check_streets, check_world
 
     city = read_city(path)
     findings: list[str] = []
@@ -79,9 +80,12 @@ def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
             findings += border_findings(city, first, second, axis)
             report("borders", k, len(borders))
         for k, tile in enumerate(city.manifest.tiles if tiles else [], 1):
-            found = check_world(city.world((tile.column, tile.row)))
+            found = check_world(city.world((tile.column, tile.row)), part=True)
             findings += [f"{tile.name}: {one.where}: {one.what}" for one in found]
             report("tiles", k, len(city.manifest.tiles))
+        if tiles:
+            findings += [f"{one.where}: {one.what}" for one in check_streets(CityWorld(city))]
+            report("streets", 1, 1)
     findings += [f"{name}: not built: {reason}" for name, reason in city.manifest.failed.items()]
     if json:
         print_json({"ok": not findings, "borders": len(borders), "findings": findings})
@@ -90,3 +94,16 @@ def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
             print(finding)
         print(f"{path}: {len(findings)} findings" if findings else f"{path}: {len(borders)} borders, all is well")
     return 1 if findings else 0
+
+
+def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool = False, json: bool = False) -> int:
+    """Write a city in another format."""
+    from vico.world.exports import export_city
+
+    check_output(out, path, force=force)
+    counts = export_city(read_city(path), to, out, rooms=rooms, force=force)
+    if json:
+        print_json({"format": to, "out": str(out), **counts})
+    else:
+        print(f"{out}: {to}, " + ", ".join(f"{number:,} {name}" for name, number in counts.items()))
+    return 0

@@ -1,4 +1,4 @@
-"""`vico city build`, `info`, `check`."""
+"""`vico city build`, `info`, `check`, `export`."""
 
 from __future__ import annotations
 
@@ -58,3 +58,24 @@ def city_check(path: Positional[Path], borders: bool = False, json: bool = False
     from vico.cli import city as verb
 
     return verb.check(path, tiles=not borders, json=json)
+
+
+@city.command(name="export")
+def city_export(
+    path: Positional[Path], to: str, out: Path, rooms: bool = False, force: bool = False, json: bool = False
+) -> int:
+    """Write a city in another format: streets and places as one, meshes tile by tile.
+
+    Example: vico city export city --to gltf --out city_gltf
+
+    Args:
+        path: City folder.
+        to: gltf, usd, mjcf, geojson or xodr.
+        out: Folder to make; refused if it exists, unless --force.
+        rooms: With what lies indoors.
+        force: Replace what is in the output folder.
+        json: Print JSON.
+    """
+    from vico.cli import city as verb
+
+    return verb.export(path, to, out=out, rooms=rooms, force=force, json=json)

@@ -23,7 +23,8 @@ from vico.community import (
 from vico.community.authorship import Origin
 from vico.community.llm import LlmCommunityAuthor
 from vico.errors import InputError
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 # The longest answer that a model may give, tokens: the day of a busy person has about two thousand.
 _LONGEST_ANSWER = 4096

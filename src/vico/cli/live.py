@@ -13,7 +13,7 @@ from vico.cli.options import RunOptions
 from vico.errors import InputError
 from vico.runner.control import FASTEST, Control
 from vico.viewer.server import require_server
-from vico.world.folder import World
+from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.viewer.live import LiveViewer

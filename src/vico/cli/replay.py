@@ -16,7 +16,8 @@ from vico.sim.recording import read_run
 from vico.viewer.demo_film import write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.replay import write_replay
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 from vico.worldgen.previews.viewpoints import Overhead
 
 

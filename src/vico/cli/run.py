@@ -39,8 +39,9 @@ from vico.sim.recording.checkpoints import checkpoint_steps
 from vico.sim.recording.manifest import read_manifest
 from vico.sim.simulation import Simulation
 from vico.threads import use_workers, workers
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.viewer.live import LiveViewer

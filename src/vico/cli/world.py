@@ -14,7 +14,9 @@ from typing import Any
 from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
-from vico.world.folder import World, read_world, stage_seconds
+from vico.world.folder import read_world
+from vico.world.stored import stage_seconds
+from vico.world.world import World
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.many import PlaceRow
 from vico.worldgen.photos.texturing import Texturing

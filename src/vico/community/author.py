@@ -33,8 +33,8 @@ from vico.community.work import assign_homes, assign_work, check_beds, employers
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.version import __version__
-from vico.world.folder import World
 from vico.world.model import Category
+from vico.world.world import World
 
 #: For so many days, at most, schedules are written.
 MOST_DAYS = 14

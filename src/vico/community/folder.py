@@ -27,8 +27,8 @@ from vico.community.tags import with_tags
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
 from vico.io.files import read_json, write_bytes, write_json
 from vico.io.folders import check_replaceable, new_folder
-from vico.world.folder import World
 from vico.world.model import Record
+from vico.world.world import World
 
 R = TypeVar("R", bound=Record)
 

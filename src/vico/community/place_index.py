@@ -16,10 +16,10 @@ from vico.community.usual_hours import usual_spans
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
 from vico.rules import BED_WIDTH, WALK_SPEED
-from vico.world.folder import World
 from vico.world.indoor_ways import IndoorWays
 from vico.world.model import Category, Place, Point2
 from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.world import World
 
 #: Accommodation in which people stay for a while, not for good.
 GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment", "chalet", "alpine_hut"})

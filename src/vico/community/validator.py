@@ -23,8 +23,8 @@ from vico.community.tags import TAGS_OF_TYPE
 from vico.community.validator_households import households_of
 from vico.community.work import STUDY_KINDS
 from vico.rules import walk_speed
-from vico.world.folder import World
 from vico.world.model import Category, Place
+from vico.world.world import World
 
 CASH = (100, 1000)
 

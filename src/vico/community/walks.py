@@ -9,9 +9,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from vico.world.folder import World
 from vico.world.model import Point2
 from vico.world.routing import Router
+from vico.world.world import World
 
 # A point that so many walks began or ended at is worth learning the costs to; so many points are, 4 bytes a cell each.
 _OFTEN, _MOST_LEARNED = 12, 64

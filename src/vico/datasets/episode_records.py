@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vico.datasets.demonstrations import Demonstration
 from vico.datasets.statistics import colour_counts, depth_moments, vector_statistics
 from vico.sim.recording import Run
-from vico.world.folder import World
+from vico.world.world import World
 
 
 class Tally:

@@ -23,7 +23,8 @@ from vico.datasets.tasks import EpisodeFacts
 from vico.errors import EmptyInputError
 from vico.rules import ActionStatus
 from vico.version import __version__
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 #: Name of the challenge; what `--world` says of the level field.
 CHALLENGE, FIELD = "pick_place", "field"

@@ -15,7 +15,7 @@ from vico.datasets.worker import world_of_run
 from vico.errors import MissingExtraError
 from vico.io.files import new_file
 from vico.sim.recording import Run, read_run
-from vico.world.folder import World
+from vico.world.world import World
 
 Report = Callable[[int, int], None]
 

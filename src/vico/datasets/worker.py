@@ -32,7 +32,8 @@ from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
 from vico.sim.recording import Run, read_run
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 Tell = Callable[[Mapping[str, Any]], None]
 _KINDS = {"residents": "resident", "assistants": "assistant", "robots": "robot"}

@@ -22,8 +22,9 @@ from vico.seeds import rng
 from vico.sim.actions import AgentFault
 from vico.sim.events import Event
 from vico.sim.simulation import Simulation, StepResult
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 Setup = Callable[[Simulation], None]
 #: Folders, or what was read from them.

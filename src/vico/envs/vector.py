@@ -25,7 +25,7 @@ from vico.envs.shared import SharedArrays, Sharing
 from vico.envs.spec import EnvOptions
 from vico.envs.workers import Call, Workers
 from vico.errors import InputError
-from vico.world.folder import World
+from vico.world.world import World
 
 #: What `CommunityEnv.reset` and `CommunityEnv.step` return.
 Reset = tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]

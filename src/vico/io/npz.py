@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -39,3 +39,10 @@ def read_npz(source: bytes | BinaryIO, names: Iterable[str] | None = None) -> di
         with archive:
             wanted = archive.files if names is None else [name for name in names if name in archive.files]
             return {name: archive[name] for name in wanted}
+
+
+def npz_bytes(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return the bytes of an archive of arrays, compressed."""
+    sink = io.BytesIO()
+    np.savez_compressed(sink, **arrays)  # type: ignore[arg-type]
+    return sink.getvalue()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from vico.assets.vehicle_parts import Cabin
-    from vico.world.folder import World
+    from vico.world.world import World
 
 # Beginnings of the names of materials with windows in them.
 _UPPER, _GROUND = ("wall_", "dormer"), ("ground_", "doors")

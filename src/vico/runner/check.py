@@ -22,7 +22,7 @@ from vico.runner.loading import AgentSeat
 from vico.runner.watch import UnfairError
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 NAME = "assistant_0"
 

@@ -10,8 +10,8 @@ from vico.errors import InputError
 from vico.runner.given import own_map
 from vico.runner.isolated import MEMORY, IsolatedAgent
 from vico.runner.loading import AgentSeat, load, make_agent
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 #: Seconds agents from elsewhere have for an action unless a run says otherwise.
 DEADLINE = 60.0

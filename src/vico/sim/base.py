@@ -31,10 +31,10 @@ from vico.sim.traffic.standing_spots import with_spots
 from vico.sim.traffic.stopping_places import with_stopping_places
 from vico.sim.transit import BusPlan, plan_buses
 from vico.sim.transit.tram_network import TramNetwork
-from vico.world.folder import World
 from vico.world.model import Entrance
 from vico.world.objects import Objects
 from vico.world.routing import Router
+from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.community.model import Community

@@ -24,8 +24,8 @@ from vico.render.records import OPENING
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import Drawn
 from vico.sim.simulation_state import SimulationState
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 _CORNER = 0.1  # metres between a hall and the outside of its house
 

@@ -19,8 +19,8 @@ from vico.sim.environment import Environment, Occurrence
 from vico.sim.environment.event_spots import Spot, spots_of
 from vico.sim.footprints import Rectangle, gaps, records_of
 from vico.sim.state import FIRST_THING
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 #: Entities of an event's things: so many numbers for each event.
 THINGS_EACH = 100

@@ -13,7 +13,7 @@ from vico.render.sensors.batch import USUAL_OUTPUTS, shape_of
 from vico.render.sensors.lens import Lens
 from vico.sim.config import SimConfig
 from vico.sim.simulation_state import SimulationState
-from vico.world.folder import World
+from vico.world.world import World
 
 #: What `semantic` pictures tell apart; a pixel's value is the place in this list.
 CLASSES = (

@@ -10,8 +10,8 @@ from vico.community.hours import MINUTES, Span, is_within, open_spans
 from vico.community.usual_hours import usual_spans
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
-from vico.world.folder import World
 from vico.world.model import Category, Place
+from vico.world.world import World
 
 # Rooms that nobody in particular switches the light of.
 _SHARED = ("stairs", "lift", "corridor")

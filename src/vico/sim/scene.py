@@ -42,9 +42,9 @@ from vico.sim.room_lamps import RoomLamps
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.sim.window_lights import WindowLights
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0

@@ -32,8 +32,8 @@ from vico.sim.simulation_state import SimulationState
 from vico.sim.snapshot import arrays_of, copied, identity, read_snapshot, state_hash, write_snapshot
 from vico.sim.substeps import advance_ticks
 from vico.sim.timetable import Punctuality
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.assets.people import Appearance

@@ -32,10 +32,10 @@ from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.signals import SignalsShown
 from vico.sim.traffic.walking_gaits import PedestrianGaits
 from vico.sim.transit import TransitSystem
-from vico.world.folder import World
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
 from vico.world.model import Entrance, Place
+from vico.world.world import World
 
 # A thing that lies so near to the middle of a seat leaves no room to sit, metres.
 _ON_SEAT = 0.25

@@ -18,7 +18,7 @@ from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC, FIRST_TRAM
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.placed import placed_traffic
 from vico.sim.transit import BusPlan, TransitSystem
-from vico.world.folder import World
+from vico.world.world import World
 
 # Robots start where there is this much free ground, and this far from everybody, metres.
 _ROBOT_ROOM = 1.0

@@ -14,8 +14,8 @@ from vico.seeds import rng
 from vico.sim.room_lamps import HOME, RoomLamps
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
-from vico.world.folder import World
 from vico.world.model import Category, Place
+from vico.world.world import World
 
 # Share of the homes that nobody of the community lives in that are lit, by the hour.
 _HOURS = (0.0, 1.5, 5.0, 7.0, 9.0, 15.0, 17.0, 21.0, 22.5, 24.0)

@@ -15,7 +15,7 @@ from vico.render.film import write_film
 from vico.threads import in_order
 from vico.viewer.map_picture import MapPicture
 from vico.viewer.recording import Recording
-from vico.world.folder import World
+from vico.world.world import World
 
 WIDTH, HEIGHT = 1280, 720
 RATE = 16

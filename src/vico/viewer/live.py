@@ -19,7 +19,7 @@ from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.source import Source
 from vico.viewer.sources.tables import LiveTables
 from vico.viewer.sources.views import RecordedViews, Seen, picture_of, seen_by
-from vico.world.folder import World
+from vico.world.world import World
 
 # Seconds that pictures and plans are waited for: a first picture needs the scene to be made.
 _PICTURE_WITHIN, _PLAN_WITHIN = 60.0, 5.0

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
-from vico.world.folder import World
 from vico.world.model import Place
 from vico.world.walkable import BLOCKED, OPEN, SIDEWALK, WalkableMap
+from vico.world.world import World
 
 # Doors count from here to there, metres, the nearer the more, within so much of the way one looks, radians.
 _NEAREST, _FARTHEST, _FADES, _SIDE = 6.0, 80.0, 40.0, 0.6

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 
-from vico.world.folder import World
 from vico.world.walkable import CROSSING, OPEN, ROADWAY, SIDEWALK
+from vico.world.world import World
 
 _PAPER = (244, 242, 238)
 _SURFACES = {OPEN: (232, 234, 226), SIDEWALK: (236, 228, 214), CROSSING: (250, 240, 214), ROADWAY: (255, 255, 255)}

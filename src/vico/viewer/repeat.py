@@ -18,7 +18,8 @@ from vico.sim.recording import Run
 from vico.sim.recording.setup import repeat_setup
 from vico.sim.simulation import Simulation
 from vico.sim.simulation_state import SimulationState
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 T = TypeVar("T")
 

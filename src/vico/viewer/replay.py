@@ -17,7 +17,7 @@ from PIL import Image
 from vico.io.files import write_bytes
 from vico.threads import in_order
 from vico.viewer.recording import Recording
-from vico.world.folder import World
+from vico.world.world import World
 
 UNIT = 0.02  # metres a track unit, at best: 16 bits reach 655 m; wider runs have larger units
 _HIDDEN = -32768

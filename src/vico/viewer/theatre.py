@@ -21,7 +21,7 @@ from vico.runner.loop import Hook
 from vico.sim.recorder import Recorder
 from vico.viewer.live import LiveViewer
 from vico.viewer.play import PlayedAgent
-from vico.world.folder import World
+from vico.world.world import World
 
 #: What a person may do to a run in which they are judged.
 ALLOWED = ("pause", "resume", "bookmark", "bookmarks", "stop")

@@ -2,8 +2,9 @@
 
 ::
 
-    city.json        what the city is: where, which tiles, what they were made of
+    city.json        what the city is: where, which tiles, what they were made of; written last
     tiles/C_R/       the world of the tile in column C and row R, east and north of the middle one
+    whole/           what the city has as a whole: ground, streets, where people walk (`vico.world.city_files`)
     .plans/          what tiles planned: streets and ground, as their neighbours need them; no part of the city
 """
 
@@ -16,10 +17,15 @@ from pydantic import Field, ValidationError
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.files import read_json
-from vico.world.folder import World, read_world
-from vico.world.model import Origin, Record
+from vico.world.model import Origin, Record, StageReport
+from vico.world.stored import read_stored
+from vico.world.world import World
 
-VERSION = 1
+VERSION = 2
+#: Name of a city's manifest.
+CITY = "city.json"
+#: Folder of the folders of the tiles' worlds.
+TILES = "tiles"
 
 
 class CityTile(Record):
@@ -48,10 +54,14 @@ class CityManifest(Record):
         Those that are built, row by row from the south-west.
     failed
         Why others are not, by name.
+    reports
+        What the streets of the city as a whole have, and what was left out.
+    files
+        SHA-256 of what the city has as a whole, by path.
     """
 
     schema_name: Literal["vico.city"] = "vico.city"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     producer: str
     origin: Origin
     size: Annotated[float, Field(gt=0)]
@@ -60,6 +70,8 @@ class CityManifest(Record):
     seed: int
     tiles: list[CityTile]
     failed: dict[str, str] = Field(default_factory=dict)
+    reports: list[StageReport] = Field(default_factory=list)
+    files: dict[str, str] = Field(default_factory=dict)
 
 
 class City:
@@ -81,6 +93,11 @@ class City:
     def __contains__(self, tile: object) -> bool:
         return tile in self._tiles
 
+    @property
+    def half(self) -> float:
+        """Half the side of the square around the middle of the tile (0, 0) that holds all tiles, metres."""
+        return (max(abs(k) for k in (*self.manifest.first, *self.manifest.last)) + 0.5) * self.manifest.size
+
     def borders(self) -> list[tuple[tuple[int, int], tuple[int, int], int]]:
         """Return all pairs of tiles side by side, and along which axis the second follows: 0 east, 1 north."""
         found = []
@@ -101,7 +118,7 @@ class City:
         known = self._tiles.get(tile)
         if known is None:
             raise MissingFileError(f"{self.path}: has no tile {tile[0]}_{tile[1]}; vico city info lists its tiles")
-        return read_world(self.path / "tiles" / known.name)
+        return read_stored(self.path / TILES / known.name)
 
 
 def read_city(path: Path) -> City:
@@ -114,7 +131,7 @@ def read_city(path: Path) -> City:
     SchemaError
         If its manifest is damaged, or of another version.
     """
-    file = Path(path) / "city.json"
+    file = Path(path) / CITY
     if not file.exists():
         raise MissingFileError(f"{path}: holds no city.json, so it is no city; make one with vico city build")
     content = read_json(file)

@@ -8,7 +8,7 @@ the ground is cut open down to its floor.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -60,6 +60,19 @@ class Decks:
         sizes = np.array([rest for _, *rest in strips], np.float64).reshape(-1, 3)
         points = np.concatenate([np.zeros((0, 3)), *(np.asarray(points, np.float64) for points, *_ in strips)])
         return cls(first, points, *(np.ascontiguousarray(column) for column in sizes.T))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Decks]) -> Decks:
+        """Return all strips of several lots, in order."""
+        starts = np.cumsum([0, *(len(part.points) for part in parts)])
+        first = [part.first[:-1] + start for part, start in zip(parts, starts, strict=False)]
+        sizes = (np.concatenate([getattr(part, name) for part in parts]) for name in ("half_width", "pavement", "rise"))
+        points = np.concatenate([part.points for part in parts])
+        return cls(np.concatenate([*first, starts[-1:]]).astype(np.int64), points, *sizes)
+
+    def moved(self, east: float, north: float) -> Decks:
+        """Return them moved by some metres."""
+        return replace(self, points=self.points + np.array([east, north, 0.0]))
 
     @cached_property
     def box(self) -> Floats:

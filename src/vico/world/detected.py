@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from vico.world.folder import World, read_records
 from vico.world.model import Point2, Record
+from vico.world.records import read_records
+from vico.world.world import World
 
 FILE = "detections.json"
 

@@ -17,6 +17,7 @@ from defusedxml.ElementTree import ParseError, iterparse
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
+from vico.world.disjoint import DisjointSets
 from vico.world.lanes import Floats, Ints, LaneGraph
 from vico.world.signals import SignalProgram, Signals, signal_program
 from vico.world.walkways import Walkways, walkways_of
@@ -231,7 +232,7 @@ def _zones(
     `CLUSTER_GAP` are one cluster, and that street is part of it.
     """
     controlled = _controlled_junctions(driven, inside, pairs, junctions, crossed)
-    clusters = _DisjointSets(junctions)
+    clusters = DisjointSets(junctions)
     comes = {b: int(inside[a]) for a, b in pairs if inside[a] >= 0}
     goes = {a: int(inside[b]) for a, b in pairs if inside[b] >= 0}
     bridges: list[tuple[int, int]] = []
@@ -283,24 +284,6 @@ def _have_conflict(driven: list[_Lane], members: list[int], enters: dict[int, se
         for k, a in enumerate(members)
         for m, b in enumerate(members[k + 1 :])
     )
-
-
-class _DisjointSets:
-    """Numbers in sets that can be joined; the least number stands for its set."""
-
-    def __init__(self, count: int) -> None:
-        self._parent = list(range(count))
-
-    def root(self, j: int) -> int:
-        parent = self._parent
-        while parent[j] != j:
-            parent[j] = parent[parent[j]]
-            j = parent[j]
-        return j
-
-    def join(self, a: int, b: int) -> None:
-        a, b = self.root(a), self.root(b)
-        self._parent[max(a, b)] = min(a, b)
 
 
 def _walks(lanes: list[_Lane], links: list[dict[str, str]], junctions: dict[str, int]) -> Walkways:

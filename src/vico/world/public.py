@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Category, Point3, Ring
 from vico.world.routing import Router
@@ -16,6 +15,7 @@ from vico.world.streets import PublicStreet, StreetIndex, named_streets
 from vico.world.transit_model import BikeStation, Line, Stop, TramLine, TramStop, Transit
 from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap
+from vico.world.world import World
 
 
 @dataclass(frozen=True)

@@ -33,11 +33,28 @@ WEIGHTS = {SIDEWALK: 100, CROSSING: 110, OPEN: 120, ROADWAY: 400}
 _BERTH = 0.6
 # So are roadways, beside which a kerb's edge is: cells that touch them cost a quarter more, too.
 _NEIGHBOURS = np.ones((3, 3), np.bool_)
-_SNAP = 6.0  # metres a start or goal may lie off what can be walked on
+SNAP = 6.0
+"""Metres a start or goal may lie off what can be walked on."""
 
 # Costs from landmarks are worth their making (a search of the whole map each) to who searches this often.
 _LANDMARKS = 6
 _WORTH_LANDMARKS = 40
+
+
+def walking_costs(
+    surfaces: NDArray[np.uint8], clearance: NDArray[np.float32], connected: NDArray[np.bool_]
+) -> NDArray[np.int32]:
+    """Return what a cell's width of walking costs in each cell of a map, hundredths; 0 where nobody walks."""
+    table = np.zeros(5, np.int32)
+    for surface, weight in WEIGHTS.items():
+        table[surface] = weight
+    cost = table[surfaces]
+    cost[clearance < _BERTH] = cost[clearance < _BERTH] * 5 // 4
+    beside = ndimage.binary_dilation(surfaces == ROADWAY, _NEIGHBOURS)
+    beside &= np.isin(surfaces, (SIDEWALK, OPEN))
+    cost[beside] = cost[beside] * 5 // 4
+    cost[~connected] = 0
+    return np.ascontiguousarray(cost, np.int32)
 
 
 class Router:
@@ -54,19 +71,10 @@ class Router:
 
     def __init__(self, walkable: WalkableMap) -> None:
         self.walkable = walkable
-        table = np.zeros(5, np.int32)
-        for surface, weight in WEIGHTS.items():
-            table[surface] = weight
-        cost = table[walkable.cls]
         self._clearance = np.ascontiguousarray(walkable.clearance)
-        cost[self._clearance < _BERTH] = cost[self._clearance < _BERTH] * 5 // 4
-        beside = ndimage.binary_dilation(walkable.cls == ROADWAY, _NEIGHBOURS)
-        beside &= np.isin(walkable.cls, (SIDEWALK, OPEN))
-        cost[beside] = cost[beside] * 5 // 4
-        cost[~walkable.connected] = 0
-        self._cost = np.ascontiguousarray(cost, np.int32)
+        self._cost = walking_costs(walkable.cls, self._clearance, walkable.connected)
         self._free = self._cost > 0
-        cells = cost.size
+        cells = self._cost.size
         self._work = SearchMemory(np.zeros(cells, CELL), np.empty(RING, np.int32))
         self._generation = 0
         self._searches = 0
@@ -74,7 +82,7 @@ class Router:
         self._learned: dict[int, NDArray[np.int32]] = {}
         self._lock = Lock()
         self._nothing = np.zeros((0, 0), np.bool_)
-        self._shut = np.zeros(cost.shape, np.bool_)
+        self._shut = np.zeros(self._cost.shape, np.bool_)
         self._narrow: dict[float, NDArray[np.bool_]] = {}
 
     def learn_landmarks(self) -> None:
@@ -91,7 +99,7 @@ class Router:
         same walks. 4 bytes a cell are kept.
         """
         with self._lock:
-            cell = self._nearest_cell(np.asarray(point, np.float64)[:2], self._free, _SNAP)
+            cell = self._nearest_cell(np.asarray(point, np.float64)[:2], self._free, SNAP)
             if cell >= 0 and cell not in self._learned:
                 self._run(self._cost, cell, -1, self._landmarks)
                 self._learned[cell] = np.where(self._is_final, self._work.cells["g"], NEVER).astype(np.int32)
@@ -159,12 +167,24 @@ class Router:
     ) -> NDArray[np.float64] | None:
         """Find a walk where `cost` is above 0; `shut` are the cells in which it is 0 for this walk only."""
         free = self._free if cost is self._cost else cost > 0
-        first, last = self._nearest_cell(a, free, _SNAP), self._nearest_cell(b, free, _SNAP)
+        first, last = self._nearest_cell(a, free, SNAP), self._nearest_cell(b, free, SNAP)
         costs = None if first < 0 or last < 0 else self._costs_from(first, last, cost, closing=shut is not None)
         if costs is None:
             return None
         cells = backtrack(cost, costs, first, last)
-        g = costs[0][cells].astype(np.int64)
+        return self._pulled(a, b, first, last, (cells, costs[0][cells].astype(np.int64)), shut)
+
+    def _pulled(
+        self,
+        a: NDArray[np.float64],
+        b: NDArray[np.float64],
+        first: int,
+        last: int,
+        walk: tuple[NDArray[np.int64], NDArray[np.int64]],
+        shut: NDArray[np.bool_] | None,
+    ) -> NDArray[np.float64]:
+        """Pull a walk straight, given as cells and the costs up to each; let it begin and end where it was asked."""
+        cells, g = walk
         n = self.walkable.n
         points = np.column_stack([cells % n, cells // n]) + 0.5
         checks = shut is not None
@@ -229,7 +249,7 @@ class Router:
         """Cost of the walk from every cell to `goal`, in metres of sidewalk; float32, shape ``(n, n)``; inf: no way."""
         cost = self._cost if blocked is None else np.where(blocked, np.int32(0), self._cost)
         free = self._free if blocked is None else cost > 0
-        first = self._nearest_cell(np.asarray(goal, np.float64)[:2], free, _SNAP)
+        first = self._nearest_cell(np.asarray(goal, np.float64)[:2], free, SNAP)
         shape = self._cost.shape
         if first < 0:
             return np.full(shape, np.inf, np.float32)

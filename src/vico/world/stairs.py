@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -42,6 +42,15 @@ class Stairs:
 
     def __len__(self) -> int:
         return len(self.level)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Stairs]) -> Stairs:
+        """Return all treads of several lots, in order."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
+
+    def moved(self, east: float, north: float) -> Stairs:
+        """Return them moved by some metres."""
+        return replace(self, corners=self.corners + np.array([east, north]))
 
     def stand_on(self, points: Floats, ground: Floats) -> None:
         """Replace heights of the ground (`ground`, metres) by those of the treads at points, ``(n, 3)``, if any."""

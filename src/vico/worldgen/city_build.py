@@ -9,23 +9,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from vico.errors import InputError
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import checked_extract
-from vico.io.files import write_json
+from vico.geo.osm import OsmData, checked_extract, read_osm
+from vico.geo.osm_parts import OsmParts
+from vico.io.files import read_json, sha256_of, write_json
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.version import __version__
-from vico.world.city import City, CityManifest, CityTile, read_city
+from vico.world.city import CITY, TILES, City, CityManifest, CityTile, read_city
+from vico.world.city_files import WHOLE
 from vico.world.model import Origin
+from vico.worldgen.city_report import write_city_report
 from vico.worldgen.city_request import CityRequest
+from vico.worldgen.city_streets import make_streets
+from vico.worldgen.city_tiles import GATES
 from vico.worldgen.ground.terrain import APRON, terrain_from_dem
 from vico.worldgen.seams.grid import HALO, Tile, grid_of, tile_name
+from vico.worldgen.seams.join import MAP
+from vico.worldgen.seams.walking import write_gates, write_walking
 from vico.worldgen.sources import Sources
-from vico.worldgen.stages import Stages
+from vico.worldgen.stages import SUFFIX, Stages, keep_product, kept_product
 
 TILE = 400.0
 _CELL = 8.0
@@ -95,22 +103,41 @@ def build_city(
     VicoError
         If the sources can't be used.
     """
-    checked_extract(request.sources.osm)
     request.plans.mkdir(parents=True, exist_ok=True)
+    data = divide_map(request)
     _bare_ground(request)
     failed: dict[str, str] = {}
-    left = list(request.grid)
-    workers = min(workers, len(left)) if ray is None else workers
     found: dict[Tile, Any] = {}
+    workers = min(workers, len(request.grid)) if ray is None else workers
     with open_executor(workers=workers, ray=ray) as executor:
         service = Service("vico.worldgen.city_tiles:builder", request.to_json())
-        for step in ("plan", "build", "fit"):
-            answers = _done(executor, service, left, step, progress)
-            failed |= {tile_name(one): answer.reason for one, answer in answers.items() if answer.content is None}
+
+        def done(step: str, tiles: Sequence[Tile]) -> list[Tile]:
+            """Do a step to tiles, and return those that it went well with."""
+            nonlocal found
+            answers = _done(executor, service, tiles, step, progress)
+            refused = {one: answer.reason for one, answer in answers.items() if answer.content is None}
             found = {one: answer.content for one, answer in answers.items() if answer.content is not None}
-            left = list(found)
+            refused |= {one: content["failed"] for one, content in found.items() if "failed" in content}
+            failed.update({tile_name(one): reason for one, reason in refused.items()})
+            return [one for one in tiles if one not in refused]
+
+        left = done("shape", done("plan", list(request.grid)))
+        if left:
+            _tell(progress, "streets", 0)
+            reports = make_streets(request, data)
+            _tell(progress, "streets", 1)
+        del data
+        left = done("fit", done("build", left))
+        if left:
+            tiles = dict(found)
+            maps = {one: request.out / TILES / tile_name(one) / "walkable.npz" for one in left}
+            write_walking(request.out / WHOLE, request.grid, maps)
+            done("gates", left)
     if not left:
         raise InputError(f"{request.out}: no tile could be built: {next(iter(failed.values()))}")
+    whole = request.out / WHOLE
+    write_gates(whole, [kept_product(request.plans / tile_name(one), GATES)[0] for one in left])
     manifest = CityManifest(
         producer=f"vico {__version__}",
         origin=Origin(lat=request.lat, lon=request.lon),
@@ -118,11 +145,38 @@ def build_city(
         first=request.grid.first,
         last=request.grid.last,
         seed=request.seed,
-        tiles=[CityTile(column=one[0], row=one[1], name=tile_name(one), **found[one]) for one in left],
+        tiles=[CityTile(column=one[0], row=one[1], name=tile_name(one), **tiles[one]) for one in left],
         failed=dict(sorted(failed.items())),
+        reports=reports,
+        files={f"{WHOLE}/{path.name}": sha256_of(path) for path in sorted(whole.iterdir())},
     )
-    write_json(request.out / "city.json", manifest.model_dump(mode="json"))
-    return read_city(request.out)
+    write_json(request.out / CITY, manifest.model_dump(mode="json"))
+    city = read_city(request.out)
+    write_city_report(city)
+    return city
+
+
+def _tell(progress: Progress | None, step: str, done: int) -> None:
+    if progress is not None:
+        progress(step, done, 1)
+
+
+def divide_map(request: CityRequest) -> OsmData:
+    """Read the map once, keep for each tile what of it lies there, and return that of the city."""
+    frame, reach = LocalFrame(request.lat, request.lon), request.grid.half + HALO
+    whole = read_osm(checked_extract(request.sources.osm), frame, reach, need_buildings=False)
+    known, key = request.plans / "map.json", {"map": whole.sha256, "reach": reach, "frame": str(frame)}
+    kept = [request.plans / tile_name(tile) / f"{MAP}{SUFFIX}" for tile in request.grid]
+    if not (known.exists() and read_json(known) == key and all(path.exists() for path in kept)):
+        known.unlink(missing_ok=True)
+        parts = OsmParts(whole)
+        half = request.grid.size / 2 + HALO
+        for tile in request.grid:
+            east, north = request.grid.centre(tile)
+            part = parts.within(half=half, margin=whole.margin, east=east, north=north)
+            keep_product(request.plans / tile_name(tile), MAP, replace(part, sha256="", timestamp=None))
+        write_json(known, key)
+    return replace(whole, half=request.grid.half, margin=whole.margin + HALO)
 
 
 def _bare_ground(request: CityRequest) -> None:
@@ -130,7 +184,7 @@ def _bare_ground(request: CityRequest) -> None:
     if not request.sources.dem:
         return
     frame = LocalFrame(request.lat, request.lon)
-    half = (max(abs(k) for k in (*request.grid.first, *request.grid.last)) + 0.5) * request.grid.size + HALO
+    half = request.grid.half + HALO
     stages = Stages(request.plans)
     samples = read_elevation(request.sources.dem, frame, half)
     stages.given(samples, f"{samples.sha256} {frame} {half}")

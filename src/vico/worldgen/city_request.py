@@ -12,7 +12,7 @@ from vico.worldgen.seams.grid import Tile, TileGrid
 from vico.worldgen.seams.join import TilePlace
 from vico.worldgen.sources import Sources
 
-PLANS, TILES = ".plans", "tiles"
+PLANS = ".plans"
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,13 @@ class CityRequest:
         """Folder of what tiles planned."""
         return self.out / PLANS
 
+    def place(self, tile: Tile) -> TilePlace:
+        """Return which tile of the city a world is."""
+        return TilePlace(self.grid, tile, self.plans)
+
     def tile(self, tile: Tile) -> WorldRequest:
         """Return what is asked of one tile's world."""
-        place = TilePlace(self.grid, tile, self.plans)
+        place = self.place(tile)
         half = self.grid.size / 2
         return WorldRequest(self.sources, self.lat, self.lon, half, self.seed, Texturing(), None, False, place)
 

@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from vico.errors import VicoError, sentence_of
+from vico.io.arrays import mapped_array
 from vico.io.files import read_json, sha256_of, write_json
 from vico.world.borders import Side, profile_of
-from vico.world.folder import read_world, seal, stage_seconds
+from vico.world.city import TILES
+from vico.world.city_files import COST, WHOLE
+from vico.world.city_routing import tile_gates
 from vico.world.glb import write_glb
 from vico.world.mesh import Surface, joined
-from vico.worldgen.city_request import TILES, CityRequest
-from vico.worldgen.evidence import gather
+from vico.world.stored import read_stored, seal, stage_seconds
+from vico.worldgen.city_request import CityRequest
+from vico.worldgen.city_streets import LEVELS, SHAPE
+from vico.worldgen.evidence import Evidence, gather
 from vico.worldgen.pipeline import STAGES, build_requested
-from vico.worldgen.recipe import SEAMS, planned
+from vico.worldgen.product import digest_of, read_head
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import Tile, tile_name
-from vico.worldgen.stages import SUFFIX, Stages, code_digest, kept_product
+from vico.worldgen.seams.join import CUT, MAP, map_of
+from vico.worldgen.seams.mosaic import TileShape
+from vico.worldgen.seams.walking import around, square_of
+from vico.worldgen.shaping import SEAMS, planned, shaped
+from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
 
-_MAP, _BUILT = "map.json", "built.json"
+#: Product with a tile's gates.
+GATES = "gates"
 
 
 def builder(options: Mapping[str, Any], _: object) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
@@ -35,59 +49,92 @@ def builder(options: Mapping[str, Any], _: object) -> Callable[[Mapping[str, Any
 
 
 def plan(request: CityRequest, tile: Tile) -> dict[str, Any]:
-    """Plan a tile's streets and ground."""
-    asked = request.tile(tile)
+    """Plan a tile's streets and ground; bare ground where that fails, for its neighbours need one."""
     folder = request.plans / tile_name(tile)
-    folder.mkdir(parents=True, exist_ok=True)
-    stages = Stages(folder)
-    evidence = gather(asked.sources, asked.frame, asked.reach, stages, part=True)
-    planned(evidence, asked, stages)
-    write_json(folder / _MAP, {"digest": stages.digest(evidence.data)})
+    terrain = request.plans / f"terrain{SUFFIX}"
+    made_of = [_head(folder, MAP), read_head(terrain)[1] if terrain.exists() else ""]
+    return _unless_kept(request, tile, "plan", made_of, lambda: _plan(request, tile))
+
+
+def _plan(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    stages, evidence = _evidence(request, tile)
+    try:
+        planned(evidence, request.tile(tile), stages)
+    except VicoError as error:
+        none = replace(evidence.data, nodes=[], ways=[], areas=[], relations=[])
+        planned(replace(evidence, data=stages.given(none, digest_of(none))), request.tile(tile), stages)
+        return {"failed": sentence_of(error)}
+    return {}
+
+
+def _evidence(request: CityRequest, tile: Tile) -> tuple[Stages, Evidence]:
+    """Return what keeps a tile's plan, and the sources there."""
+    asked, place = request.tile(tile), request.place(tile)
+    stages = Stages(place.own)
+    return stages, gather(asked.sources, asked.frame, asked.reach, stages, part=map_of(place))
+
+
+def shape(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Make what stands in a tile, for the city's streets."""
+    return _unless_kept(request, tile, "shape", _plans(request, tile), lambda: _shape(request, tile))
+
+
+def _shape(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    stages, evidence = _evidence(request, tile)
+    asked = request.tile(tile)
+    made = shaped(planned(evidence, asked, stages), asked, stages)
+    own = [*made.built.standing(made.plan.height), *made.bridges.feet]
+    found = TileShape(own, made.bridges.open_ways, made.plan.streets)
+    folder = request.plans / tile_name(tile)
+    keep_product(folder, SHAPE, found)
+    keep_product(folder, LEVELS, made.levels)
     return {}
 
 
 def build(request: CityRequest, tile: Tile) -> dict[str, Any]:
     """Build a tile's world; its ground ends at its borders."""
-    out = request.out / TILES / tile_name(tile)
-    known, key = request.plans / tile_name(tile) / _BUILT, _key(request, tile)
-    if not ((out / "world.json").exists() and known.exists() and read_json(known) == {"key": key}):
-        known.unlink(missing_ok=True)
+    folder, out = request.plans / tile_name(tile), request.out / TILES / tile_name(tile)
+    if not (out / "world.json").exists():
+        _forget(request, tile, "build")
+    made_of = [*_plans(request, tile), _head(folder, CUT)]
+
+    def made() -> dict[str, Any]:
         build_requested(request.tile(tile), out)
-        write_json(known, {"key": key})
-    return {}
+        return {}
+
+    return _unless_kept(request, tile, "build", made_of, made)
 
 
-def _key(request: CityRequest, tile: Tile) -> str:
-    """Return what decides a tile's world: code, map, request, and what it and its neighbours planned."""
-    plans = [request.plans / tile_name(one) / f"{name}{SUFFIX}" for one in request.grid.around(tile) for name in SEAMS]
-    content = request.to_json()
-    parts = [
-        code_digest(),
-        tile_name(tile),
-        str([content[name] for name in ("lat", "lon", "seed")]),
-        str(request.grid.size),
-        read_json(request.plans / tile_name(tile) / _MAP)["digest"],
-        *(sha256_of(path) for path in plans),
-    ]
-    return sha256("\n".join(parts).encode()).hexdigest()
+def _plans(request: CityRequest, tile: Tile) -> list[str]:
+    """Return digests of a tile's map, and of what it and its neighbours planned."""
+    around = [request.plans / tile_name(one) for one in request.grid.around(tile)]
+    return [_head(request.plans / tile_name(tile), MAP), *(_head(folder, name) for folder in around for name in SEAMS)]
 
 
 def fit(request: CityRequest, tile: Tile) -> dict[str, Any]:
     """Make a tile's ground meet that of the tiles before it, and return what the tile came to."""
     out = request.out / TILES / tile_name(tile)
-    world = read_world(out)
-    half = request.grid.size / 2
+    before = {axis: (tile[0] - (axis == 0), tile[1] - (axis == 1)) for axis in (0, 1)}
+    there = {axis: request.out / TILES / tile_name(one) for axis, one in before.items()}
+    there = {axis: folder for axis, folder in there.items() if (folder / STAGES / f"ground{SUFFIX}").exists()}
+    made_of = [_head(folder / STAGES, name) for folder in (out, *there.values()) for name in ("ground", "wires")]
+    known = _known(request, tile, "fit")
+    if known is not None and read_stored(out).digest != known["found"]["digest"]:
+        _forget(request, tile, "fit")  # it was built anew
+    return _unless_kept(request, tile, "fit", [*map(str, there), *made_of], lambda: _fit(request, out, there))
+
+
+def _fit(request: CityRequest, out: Path, there: Mapping[int, Path]) -> dict[str, Any]:
+    world, half = read_stored(out), request.grid.size / 2
     ground = _drawn(out)
-    for axis, before in ((0, (tile[0] - 1, tile[1])), (1, (tile[0], tile[1] - 1))):
-        there = request.out / TILES / tile_name(before)
-        if (there / STAGES / "ground.stage").exists():
-            ground = conformed(ground, Side(axis, -half), profile_of(_drawn(there), Side(axis, half)))
+    for axis, folder in there.items():
+        ground = conformed(ground, Side(axis, -half), profile_of(_drawn(folder), Side(axis, half)))
     mesh = out / "meshes" / "ground.glb"
     wires: list[Surface] = kept_product(out / STAGES, "wires")[0]
     write_glb(mesh, {"ground": joined([*ground, *wires])})
     if sha256_of(mesh) != world.manifest.files["meshes/ground.glb"]:
-        seal(out, world.manifest, seconds=stage_seconds(world))
-    done = read_world(out)
+        seal(out, world.manifest, seconds=stage_seconds(world), without=("roads.xodr",))
+    done = read_stored(out)
     return {
         "digest": done.digest,
         "buildings": done.manifest.counts["buildings"],
@@ -101,4 +148,57 @@ def _drawn(tile: Path) -> list[Surface]:
     return ground
 
 
-STEPS: dict[str, Callable[[CityRequest, Tile], dict[str, Any]]] = {"plan": plan, "build": build, "fit": fit}
+def gates(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Find where one walks from a tile into others, and what ways between these places cost."""
+    cost = mapped_array(request.out / WHOLE / COST)
+    square = square_of(tile, request.grid, len(cost) // (2 * request.grid.reach + 1))
+    wide = around(square, 1)[0]
+    made_of = [str(square), sha256(np.ascontiguousarray(cost[wide]).tobytes()).hexdigest()]
+
+    def made() -> dict[str, Any]:
+        keep_product(request.plans / tile_name(tile), GATES, tile_gates(cost, square))
+        return {}
+
+    return _unless_kept(request, tile, "gates", made_of, made)
+
+
+def _head(folder: Path, name: str) -> str:
+    """Return the digest of a product."""
+    return read_head(folder / f"{name}{SUFFIX}")[1]
+
+
+def _known(request: CityRequest, tile: Tile, step: str) -> dict[str, Any] | None:
+    """Return what is kept of a step that was done: its key, and what it found."""
+    path = request.plans / tile_name(tile) / f"{step}.json"
+    content: dict[str, Any] | None = read_json(path) if path.exists() else None
+    return content
+
+
+def _forget(request: CityRequest, tile: Tile, step: str) -> None:
+    (request.plans / tile_name(tile) / f"{step}.json").unlink(missing_ok=True)
+
+
+def _unless_kept(
+    request: CityRequest, tile: Tile, step: str, made_of: Sequence[str], made: Callable[[], dict[str, Any]]
+) -> dict[str, Any]:
+    """Do a step, or return what it found when it was done with the same code, request and inputs."""
+    content = request.to_json()
+    asked = [tile_name(tile), *(str(content[name]) for name in ("lat", "lon", "seed")), str(request.grid.size)]
+    key = sha256("\n".join([code_digest(), *asked, *made_of]).encode()).hexdigest()
+    known = _known(request, tile, step)
+    if known is not None and known["key"] == key:
+        found: dict[str, Any] = known["found"]
+        return found
+    _forget(request, tile, step)
+    found = made()
+    write_json(request.plans / tile_name(tile) / f"{step}.json", {"key": key, "found": found})
+    return found
+
+
+STEPS: dict[str, Callable[[CityRequest, Tile], dict[str, Any]]] = {
+    "plan": plan,
+    "shape": shape,
+    "build": build,
+    "fit": fit,
+    "gates": gates,
+}

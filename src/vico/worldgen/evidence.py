@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from vico.errors import EmptyInputError, InputError
+from vico.errors import InputError
 from vico.geo.buildings.files import checked_files, read_buildings
 from vico.geo.buildings.model import FoundBuildings
 from vico.geo.detections.model import Detections
@@ -80,14 +80,16 @@ class Evidence:
     detections: Detections | None = None
 
 
-def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages, *, part: bool = False) -> Evidence:
+def gather(
+    sources: Sources, frame: LocalFrame, half: float, stages: Stages, *, part: tuple[OsmData, str] | None = None
+) -> Evidence:
     """Read every source, and report what could not be read.
 
     Parameters
     ----------
     part
-        Whether this is a part of a larger place: then nothing need be there, and the map is known by what of it lies
-        here, so that a change elsewhere changes nothing.
+        What of the map lies here, and its digest, if this is a part of a larger place: then nothing need be there, and
+        a change elsewhere changes nothing.
 
     Raises
     ------
@@ -97,8 +99,11 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages, *, 
     where = f"{frame} {half}"
     precedence = _precedence(sources)
     with stages.timed("map"):
-        data = _part_of_map(sources.osm, frame, half) if part else read_osm(sources.osm, frame, half)
-        stages.given(data, digest_of(data) if part else f"{data.sha256} {where}")
+        if part is None:
+            data = read_osm(sources.osm, frame, half)
+            stages.given(data, f"{data.sha256} {where}")
+        else:
+            data = stages.given(*part)
         finest = precedence is None or precedence.terrain == "finest"
         samples = read_elevation(sources.dem, frame, half, finest_first=finest) if sources.dem else None
         if samples is not None:
@@ -127,7 +132,7 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages, *, 
             licence="ODbL-1.0",
             attribution="© OpenStreetMap contributors",
             timestamp=data.timestamp,
-            sha256=None if part else data.sha256 or sha256_of(sources.osm),
+            sha256=data.sha256 or sha256_of(sources.osm) if part is None else None,
         )
     ]
     if samples is not None:
@@ -173,15 +178,6 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages, *, 
         with stages.timed("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
-
-
-def _part_of_map(osm: Path, frame: LocalFrame, half: float) -> OsmData:
-    """Read what the map has here, be it nothing; of the file as a whole nothing is told."""
-    try:
-        data = read_osm(osm, frame, half, need_buildings=False)
-    except EmptyInputError:
-        return OsmData(frame, half, 60.0, [], [], [], [])
-    return replace(data, sha256="", timestamp=None)
 
 
 def _precedence(sources: Sources) -> Precedence | None:

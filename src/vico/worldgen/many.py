@@ -13,8 +13,9 @@ from vico.errors import MissingFileError, SchemaError, VicoError
 from vico.io.stores import FolderStore, Store, store_at
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.jobs.shared import check_seen, seen_by_all
-from vico.world.folder import read_world, stage_seconds
+from vico.world.folder import read_world
 from vico.world.remote import fetch_manifest
+from vico.world.stored import stage_seconds
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.sources import SERVICES, Sources
 

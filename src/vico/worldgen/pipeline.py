@@ -19,14 +19,16 @@ from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.osm import checked_extract
 from vico.io.files import read_json, write_json
 from vico.io.folders import FolderLock, check_replaceable, folder_errors, new_folder, remove
-from vico.world.folder import read_world, seal
+from vico.world.folder import read_world
 from vico.world.model import Manifest
+from vico.world.stored import seal
 from vico.worldgen.evidence import gather
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.previews.stage import write_previews
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
 from vico.worldgen.request import BuildOptions, WorldRequest
+from vico.worldgen.seams.join import map_of
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress, Stages
 
@@ -167,9 +169,9 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions) -> Manifest:
         request.texturing.require_extras()
     folder = out.with_name(f"{out.name}.partial")
     with new_folder(out, force=True, work=folder):
-        planned = None if request.place is None else request.place.own
+        planned, part = (None, None) if request.place is None else (request.place.own, map_of(request.place))
         stages = Stages(folder / STAGES, again=options.again, progress=options.progress, beside=planned)
-        evidence = gather(request.sources, request.frame, request.reach, stages, part=request.place is not None)
+        evidence = gather(request.sources, request.frame, request.reach, stages, part=part)
         _clear(folder)
         if not (folder / STAGES).exists() and (out / STAGES).is_dir():
             # What did not change need not be made.
@@ -183,7 +185,9 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions) -> Manifest:
         stages.sweep()
         if not options.keep_stages:
             shutil.rmtree(folder / STAGES)
-        manifest = seal(folder, world.manifest.model_copy(update={"stages": stages.reports}), seconds=stages.seconds)
+        made = world.manifest.model_copy(update={"stages": stages.reports})
+        # A tile's streets are its city's; only that has them as OpenDRIVE.
+        manifest = seal(folder, made, seconds=stages.seconds, without=() if part is None else ("roads.xodr",))
         write_report(read_world(folder))
     return manifest
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from vico.io.files import write_bytes
-from vico.world.folder import World, stage_seconds
 from vico.world.model import Dropped, StageReport
+from vico.world.stored import stage_seconds
+from vico.world.world import World
 
 _SHOWN_IDS = 200
-_STYLE = """
+#: Style sheet of our reports.
+STYLE = """
 :root { color-scheme: light dark; --ink: #22252a; --soft: #63676e; --line: #d9dade; --paper: #fbfaf7; --bar: #0072b2; }
 @media (prefers-color-scheme: dark) {
   :root { --ink: #e8e6e1; --soft: #a2a5aa; --line: #3b3e44; --paper: #1b1d20; --bar: #56b4e9; }
@@ -45,7 +47,7 @@ def report_page(world: World) -> str:
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
         "<meta name=viewport content='width=device-width, initial-scale=1'>",
-        f"<title>{escape(manifest.name)}: a world</title><style>{_STYLE}</style>",
+        f"<title>{escape(manifest.name)}: a world</title><style>{STYLE}</style>",
         f"<h1>{escape(manifest.name)}</h1>",
         f"<p class=lead>{side:.0f} m × {side:.0f} m around {origin.lat:.5f}, {origin.lon:.5f}; seed {manifest.seed}; "
         f"{escape(manifest.producer)}; built in {sum(seconds.values()):.1f} s</p>",
@@ -59,9 +61,9 @@ def report_page(world: World) -> str:
             for v in views
         )
         parts.append(f"<h2>In its streets</h2><div class=views>{pictures}</div>")
-    parts.append("<h2>What is there</h2>" + _figures(manifest.counts))
+    parts.append("<h2>What is there</h2>" + figures(manifest.counts))
     parts.append("<h2>Places by type</h2>" + _bars(manifest.places_by_type.items(), unit=""))
-    parts.append("<h2>What was left out or mended, and why</h2>" + _left_out(manifest.stages))
+    parts.append("<h2>What was left out or mended, and why</h2>" + left_out(manifest.stages))
     parts.append("<h2>Stage by stage</h2>" + _stage_table(manifest.stages))
     parts.append("<h2>Seconds a stage</h2>" + _bars(seconds.items(), unit=" s"))
     rows = [
@@ -89,7 +91,8 @@ def _words(name: str) -> str:
     return escape(name.replace("_", " "))
 
 
-def _figures(counts: dict[str, int]) -> str:
+def figures(counts: Mapping[str, float]) -> str:
+    """Return numbers with what they count, HTML."""
     cells = "".join(f"<div><b>{number:,}</b><span>{_words(name)}</span></div>" for name, number in counts.items())
     return f"<div class=figures>{cells}</div>"
 
@@ -105,7 +108,8 @@ def _bars(values: Iterable[tuple[str, float]], *, unit: str) -> str:
     return f"<table>{rows}</table>"
 
 
-def _left_out(stages: Sequence[StageReport]) -> str:
+def left_out(stages: Sequence[StageReport]) -> str:
+    """Return what stages left out, by reason, HTML."""
     parts = []
     for stage in stages:
         reasons: dict[str, list[Dropped]] = defaultdict(list)

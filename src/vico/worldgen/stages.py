@@ -226,6 +226,12 @@ class Stages:
         return (made, digest) if isinstance(made, _Kept) else None
 
 
+def keep_product(folder: Path, name: str, value: Any) -> str:
+    """Keep something as what a stage made, for `kept_product` in another build; return its digest."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return write_product(folder / f"{name}{SUFFIX}", _Kept(value, [], 0), key="")
+
+
 def kept_product(folder: Path, name: str) -> tuple[Any, str]:
     """Return what a stage made in another build, and its digest.
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from vico.io.files import sha256_of, write_bytes
 from vico.version import __version__
-from vico.world.folder import World, write_record, write_records, write_terrain
 from vico.world.glb import write_glb
 from vico.world.heights import HeightField
 from vico.world.lane_reader import read_lanes
@@ -19,9 +18,11 @@ from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
 from vico.world.model import Building, Dropped, Entrance, Manifest, Origin, Place, Room, Source
 from vico.world.objects import Objects, write_objects
+from vico.world.records import write_record, write_records, write_terrain
 from vico.world.street_model import ParkingSpot, Road, Roads
 from vico.world.transit_model import Transit
 from vico.world.walkable import WalkableMap, write_walkable
+from vico.world.world import World
 from vico.worldgen.buildings.stage import BuildingsResult
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.indoor.stage import Indoors
@@ -114,7 +115,8 @@ class WorldWriter:
         write_record(self.folder / "roads.json", roads)
         net = self.folder / "roads.net.xml"
         write_bytes(net, network.net_xml)
-        write_bytes(self.folder / "roads.xodr", network.xodr)
+        if network.xodr is not None:
+            write_bytes(self.folder / "roads.xodr", network.xodr)
         lanes = self._stages.given(read_lanes(net), sha256_of(net))
         self._stages.report(
             "roads",

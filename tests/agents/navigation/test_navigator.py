@@ -15,11 +15,11 @@ from vico.io.plain_data import decode, encode
 from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Category
 from vico.world.public import PublicMap
 from vico.world.walkable import OPEN, WalkableMap
+from vico.world.world import World
 from vico.worldgen.indoor.stage import furnish
 
 ME = "assistant_0"

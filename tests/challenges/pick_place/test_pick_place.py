@@ -15,8 +15,8 @@ from vico.challenges.pick_place.episode import PERIOD, ROBOT, Verdict, _judged, 
 from vico.challenges.pick_place.field import TABLE
 from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, draw_task, fitting_kinds
 from vico.errors import EmptyInputError, InputError
-from vico.world.folder import World
 from vico.world.walkable import BLOCKED
+from vico.world.world import World
 
 TASKS = [draw_task(seed) for seed in range(60)]
 

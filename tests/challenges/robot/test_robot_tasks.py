@@ -29,7 +29,7 @@ from vico.challenges.task_files import write_task_file
 from vico.challenges.ways import Ways
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @pytest.fixture(scope="module")

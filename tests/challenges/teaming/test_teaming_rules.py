@@ -20,7 +20,7 @@ from vico.challenges.teaming.generate import generate_teaming_task
 from vico.challenges.teaming.judge import TeamingJudge
 from vico.challenges.teaming.looking import Look
 from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask
-from vico.world.folder import World
+from vico.world.world import World
 
 FAR = np.array([500.0, 500.0, 0.0])
 

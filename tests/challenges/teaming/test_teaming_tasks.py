@@ -16,7 +16,7 @@ from vico.challenges.teaming.generate import generate_teaming_task
 from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask, read_teaming_task
 from vico.errors import SchemaError
 from vico.io.files import write_json
-from vico.world.folder import World
+from vico.world.world import World
 
 MODELS = {"accompany": [{"h1"}], "guide": [{"go2"}], "spot": [{"drone"}, {"go2", "husky"}]}
 

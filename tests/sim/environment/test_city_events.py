@@ -22,9 +22,9 @@ from vico.sim.hearing import noise_at
 from vico.sim.recorder import Recorder
 from vico.sim.recording import read_run
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.world import World
 
 CLOSED = {"events": [{"kind": "closure", "place": "Hat Shop", "begin": "08:00", "end": "09:00", "name": "stocktaking"}]}
 

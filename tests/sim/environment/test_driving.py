@@ -16,8 +16,8 @@ from vico.sim.overlaps import overlapping
 from vico.sim.simulation import Simulation
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.transit import TransitSystem, plan_buses
-from vico.world.folder import World
 from vico.world.heights import HeightField
+from vico.world.world import World
 
 #: Stopping distance from 50 km/h by the handbook's friction, metres: v^2 / (2 g friction).
 HANDBOOK = {"clear": (11.0, 15.0), "rain": (15.0, 22.0), "snow": (33.0, 50.0), "freezing_rain": (80.0, 105.0)}

@@ -14,8 +14,8 @@ from vico.sim.hands_scene import hands_of_pedestrians
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.records import CROWD
-from vico.world.folder import World
 from vico.world.walkways import SIDEWALK
+from vico.world.world import World
 
 NOWHERE = Bodies.none()
 

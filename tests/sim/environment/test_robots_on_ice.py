@@ -12,7 +12,7 @@ from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, Environment, EventSites, Sky
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.simulation import Simulation
-from vico.world.folder import World
+from vico.world.world import World
 
 
 def grip_in(kind: str) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots.model import RobotModel
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Metres a robot leaves to walls on its way.
 WALL_GAP = 0.12

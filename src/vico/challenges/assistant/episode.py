@@ -34,8 +34,9 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedOnce, recorded_in
-from vico.world.folder import World, kept_world
+from vico.world.folder import kept_world
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 # In a window of 800 m; smaller ones have as many for their size, so that the cars find room.
 CARS, PEDESTRIANS = 30, 30

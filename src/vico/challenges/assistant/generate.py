@@ -29,7 +29,7 @@ from vico.community.folder import digest_of
 from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @dataclass

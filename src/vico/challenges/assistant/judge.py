@@ -18,7 +18,7 @@ from vico.challenges.assistant.rules import (
 )
 from vico.challenges.assistant.thresholds import FOLLOW_DISTANCE, thresholds
 from vico.runner.loop import Hook, Step
-from vico.world.folder import World
+from vico.world.world import World
 
 
 @dataclass

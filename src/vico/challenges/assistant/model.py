@@ -10,8 +10,8 @@ from pydantic import Field, ValidationError, model_validator
 from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
-from vico.world.folder import World
 from vico.world.model import Point2, Point3, Record
+from vico.world.world import World
 
 SCHEMA = "vico.task"
 VERSION = 2

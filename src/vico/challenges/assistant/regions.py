@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from vico.challenges.assistant.model import Region, Surface
 from vico.challenges.assistant.thresholds import CANDIDATES
 from vico.community.model import Resident
-from vico.world.folder import World
 from vico.world.model import Place
 from vico.world.routing import Router
 from vico.world.walkable import OPEN, SIDEWALK
+from vico.world.world import World
 
 # Nearer to the start than this is no errand, metres of walk.
 _LEAST_WALK = 15.0

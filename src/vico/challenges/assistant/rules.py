@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from vico.challenges.assistant.model import Region
 from vico.challenges.assistant.thresholds import Thresholds
-from vico.world.folder import World
+from vico.world.world import World
 
 
 class StateView(Protocol):

@@ -16,9 +16,9 @@ from vico.challenges.assistant.thresholds import APART, CARRY_REACH, REACH, SOUR
 from vico.clock import clock_of, seconds_of_day
 from vico.community.model import Community, Resident, ScheduleItem
 from vico.errors import EmptyInputError
-from vico.world.folder import World
 from vico.world.model import Place
 from vico.world.routing import Router
+from vico.world.world import World
 
 # Hours at which errands are asked for, and half hours at which somebody may want help with carrying.
 _HOURS = tuple(range(9, 18))

@@ -13,9 +13,9 @@ from vico.challenges.assistant.beside import Lying, spot_beside
 from vico.challenges.assistant.model import Region, TaskObject
 from vico.challenges.assistant.thresholds import OFF_MIDDLE
 from vico.errors import EmptyInputError
-from vico.world.folder import World
 from vico.world.model import Container, Point3, Room
 from vico.world.walkable import OPEN, SIDEWALK
+from vico.world.world import World
 
 _TRIES = 100
 

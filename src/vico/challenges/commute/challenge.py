@@ -13,7 +13,8 @@ from vico.challenges.commute.play import play_day
 from vico.challenges.commute.rules import HOURS
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.errors import InputError
-from vico.world.folder import World, kept_world
+from vico.world.folder import kept_world
+from vico.world.world import World
 
 CATEGORY = "commute"
 

@@ -28,8 +28,8 @@ from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError, InputError
 from vico.rules import WALK_SPEED
 from vico.seeds import rng
-from vico.world.folder import World
 from vico.world.model import Category, Place
+from vico.world.world import World
 
 #: People a community has, and how many days in a row are of one community.
 RESIDENTS, DAYS_A_COMMUNITY = 15, 2

@@ -13,8 +13,8 @@ from vico.challenges.commute.rules import EARLIEST, LATEST_END, LEAST_LEG, LEAST
 from vico.clock import clock_of
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
-from vico.world.folder import World
 from vico.world.model import Point2, Record
+from vico.world.world import World
 
 SCHEMA = "vico.commute"
 VERSION = 1

@@ -25,9 +25,9 @@ from vico.runner.isolated import IsolatedAgent
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import recorded_in
-from vico.world.folder import World
 from vico.world.public import PublicMap
 from vico.world.transit_model import Stop, TramStop
+from vico.world.world import World
 
 AGENT = "assistant_0"
 

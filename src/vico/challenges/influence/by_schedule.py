@@ -15,7 +15,7 @@ from vico.agents.influence.days import DayPlan, day_plan
 from vico.challenges.influence.day import Day
 from vico.clock import clock_of
 from vico.rules import WALK_SPEED
-from vico.world.folder import World
+from vico.world.world import World
 
 # Seconds: one thinks again after so long where there is nobody to see; it takes so long to find somebody at a place,
 # and so long to say something and be answered; who is to come is late by so much.

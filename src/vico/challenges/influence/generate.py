@@ -9,7 +9,7 @@ from vico.community import build_community
 from vico.community.model import Community
 from vico.errors import EmptyInputError
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 # Main agents are grown up.
 _GROWN_UP = 18

@@ -34,7 +34,8 @@ from vico.runner.faults import Fault, FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import recorded_in
-from vico.world.folder import World, kept_world
+from vico.world.folder import kept_world
+from vico.world.world import World
 
 NAME = "influence"
 CATEGORY = "day"

@@ -26,7 +26,7 @@ from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
 from vico.envs.arrays.surroundings import PEOPLE, THINGS, surroundings_of
 from vico.errors import InputError
 from vico.runner.loop import Step
-from vico.world.folder import World
+from vico.world.world import World
 
 AGENT = "assistant_0"
 #: Subtasks of an episode, and regions that one of them names as sources: more are not told in numbers.

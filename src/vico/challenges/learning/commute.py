@@ -28,7 +28,7 @@ from vico.envs import CommunityEnv, StepResult, make
 from vico.errors import InputError
 from vico.rules import BUS_DWELL
 from vico.runner.loop import Step
-from vico.world.folder import World
+from vico.world.world import World
 
 #: What a day's last place, a place in time, and one too late are worth.
 IN_TIME, LATE = 1.0, 0.5

@@ -24,7 +24,7 @@ from vico.challenges.influence.generate import community_of, generate_influence
 from vico.challenges.influence.model import RESIDENTS, InfluenceSettings
 from vico.community.model import Community
 from vico.errors import InputError, VicoError
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Members of a community beside the two main agents.
 MEMBERS = RESIDENTS - 2

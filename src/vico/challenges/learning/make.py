@@ -19,7 +19,8 @@ from vico.challenges.robot.model import Category as RobotCategory
 from vico.community import build_community
 from vico.community.model import Community
 from vico.envs.vector import VectorAgentEnv, makers
-from vico.world.folder import World, kept_world
+from vico.world.folder import kept_world
+from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.challenges.learning.robot_team import RobotTeamEnv

@@ -17,8 +17,8 @@ from vico.envs import CommunityEnv, Simulation, StepResult, make
 from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
-from vico.world.folder import World
 from vico.world.walkable import WalkableMap
+from vico.world.world import World
 
 #: What people may do on the way.
 KINDS = ("move_forward", "turn_left", "turn_right", "wait")

@@ -19,7 +19,7 @@ from vico.challenges.robot.episode import CARRIER, MANIPULATOR, UNUSABLE
 from vico.challenges.robot.model import Category
 from vico.community.model import Community
 from vico.envs import StepResult
-from vico.world.folder import World
+from vico.world.world import World
 
 # The carrier comes after the other robot once that is so far away, metres, to so far behind it, and not oftener than
 # every so many seconds.

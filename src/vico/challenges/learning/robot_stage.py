@@ -34,7 +34,7 @@ from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
 from vico.envs.arrays.surroundings import surroundings_of
 from vico.errors import InputError
 from vico.runner.loop import Step
-from vico.world.folder import World
+from vico.world.world import World
 
 #: What ``goal`` holds, and how many numbers each has; ``other`` is the other robot.
 GOAL = {"source": DIRECTION, "destination": DIRECTION, "person": DIRECTION, "other": DIRECTION, "thing": 7}

@@ -20,7 +20,7 @@ from vico.envs import StepResult
 from vico.envs.form_options import FormOptions
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 
 class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]

@@ -13,7 +13,7 @@ from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE
 from vico.challenges.pick_place.demonstrator import Demonstrator
 from vico.challenges.pick_place.episode import SIDE, Observation, Played, play
 from vico.challenges.pick_place.task import PickPlaceTask, draw_task
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Frames a second.
 FPS = round(1.0 / PERIOD)

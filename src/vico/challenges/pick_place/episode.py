@@ -15,7 +15,7 @@ from vico.challenges.pick_place.field import TABLE
 from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, Thing, world_of_task
 from vico.clock import clock_of
 from vico.envs import Simulation, make
-from vico.world.folder import World
+from vico.world.world import World
 
 #: The robot's name.
 ROBOT = "robot_0"

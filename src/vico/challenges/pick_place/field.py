@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from vico.assets.shapes import box, cylinder
 from vico.seeds import rng
 from vico.version import __version__
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin
@@ -16,6 +15,7 @@ from vico.world.objects import Objects
 from vico.world.street_model import Roads
 from vico.world.transit_model import Transit
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
+from vico.world.world import World
 
 #: Half the side, metres; name of such worlds.
 HALF, NAME = 20.0, "field"

@@ -14,9 +14,9 @@ from vico.assets.robots import MobileManipulator, robot_model
 from vico.challenges.pick_place.field import TABLE, level_field
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
-from vico.world.folder import World
 from vico.world.model import Point3
 from vico.world.walkable import OPEN, SIDEWALK
+from vico.world.world import World
 
 #: Where the thing comes from and goes to.
 Surface = Literal["ground", "table"]

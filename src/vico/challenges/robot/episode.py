@@ -42,8 +42,8 @@ from vico.quaternions import matrix_of
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 #: The cause of an episode that ended as a learned policy gave numbers that are none.
 UNUSABLE = "unusable action"

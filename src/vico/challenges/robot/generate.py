@@ -45,7 +45,7 @@ from vico.challenges.task_files import frame_of
 from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from vico.challenges.robot.thresholds import (
     SEEN_PIXELS,
 )
 from vico.runner.loop import Hook, Step
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Why a task fails, in the order in which a table lists them.
 CAUSES = (

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from vico.challenges.assistant.model import Person, Region, Start, TaskObject
 from vico.challenges.task_files import PlacedTask, check_thing, check_world, read_task_file
-from vico.world.folder import World
+from vico.world.world import World
 
 SCHEMA, VERSION = "vico.robot_task", 1
 

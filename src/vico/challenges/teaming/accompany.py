@@ -36,7 +36,7 @@ from vico.challenges.teaming.thresholds import (
     WITH_DISTANCE,
     WITH_SHARE,
 )
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Who accompanies.
 ROBOT = "h1"

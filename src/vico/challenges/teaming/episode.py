@@ -34,8 +34,8 @@ from vico.envs import Simulation
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
-from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 
 def play_teaming_task(

@@ -14,7 +14,7 @@ from vico.challenges.teaming.thresholds import LEAST_WALK, MOST_WALK, STEPS
 from vico.community.model import Community
 from vico.errors import EmptyInputError
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 #: How a task of each category is drawn.
 DRAWN: dict[Category, Callable[[Draw, dict[str, Any]], TeamingTask | None]] = {

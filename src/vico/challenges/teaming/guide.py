@@ -32,7 +32,7 @@ from vico.challenges.teaming.thresholds import (
     TOGETHER,
     WAITS_WITHIN,
 )
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Who guides.
 ROBOT = "go2"

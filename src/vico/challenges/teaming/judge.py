@@ -12,7 +12,7 @@ from vico.challenges.teaming.looking import Look, Robots, Truth, away, has_falle
 from vico.challenges.teaming.model import Category, TeamingTask
 from vico.challenges.teaming.thresholds import SEEN_DISTANCE
 from vico.runner.loop import Hook, Step
-from vico.world.folder import World
+from vico.world.world import World
 
 FALLEN = "fallen"
 

@@ -11,8 +11,8 @@ from vico.assets.robots import robot_names
 from vico.challenges.assistant.model import Person, Region, Start, TaskObject
 from vico.challenges.task_files import PlacedTask, check_thing, check_world, read_task_file
 from vico.errors import SchemaError
-from vico.world.folder import World
 from vico.world.model import Record
+from vico.world.world import World
 
 SCHEMA, VERSION = "vico.teaming_task", 1
 

@@ -30,7 +30,7 @@ from vico.challenges.teaming.thresholds import (
     SEEN_PIXELS,
     STANDS_FOR,
 )
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Why it fails, in the order in which a table lists them.
 CAUSES = (

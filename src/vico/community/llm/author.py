@@ -25,7 +25,7 @@ from vico.community.place_index import PlaceIndex
 from vico.errors import InputError
 from vico.llm import LanguageModel
 from vico.llm.prompts import Prompt, read_prompt
-from vico.world.folder import World
+from vico.world.world import World
 
 _ROOM = "community"
 _REPLIES: Mapping[str, type[BaseModel]] = {

@@ -13,8 +13,8 @@ from vico.render.records import ROOM_FRONT
 from vico.world.model import Category
 
 if TYPE_CHECKING:
-    from vico.world.folder import World
     from vico.world.model import Entrance, Room
+    from vico.world.world import World
 
 # What shows its room to the street.
 _OPEN_TO_SIGHT = frozenset({Category.STORE, Category.FOOD, Category.ENTERTAINMENT})

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.sim.environment.city_event import CityEvent
 from vico.sim.environment.event_kinds import kind_of_event
-from vico.world.folder import World
 from vico.world.model import Category, Place
 from vico.world.street_model import Road
 from vico.world.walkways import SIDEWALK, Walkways
+from vico.world.world import World
 
 #: Places that close when the power is cut: all but homes and open ground.
 TRADE = (Category.FOOD, Category.STORE, Category.OFFICE, Category.ENTERTAINMENT)

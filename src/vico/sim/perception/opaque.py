@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.world.folder import World
+from vico.world.world import World
 
 _CELL = 0.5
 

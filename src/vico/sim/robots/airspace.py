@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from vico.io.compiled import compiled
-from vico.world.folder import World
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap
+from vico.world.world import World
 
 Array = NDArray[np.float64]
 

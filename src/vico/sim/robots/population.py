@@ -30,9 +30,9 @@ from vico.sim.robots.trip_state import NONE
 from vico.sim.robots.ways import way_to
 from vico.sim.robots.work import Kind
 from vico.sim.state import MovableObjects, People
-from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
+from vico.world.world import World
 
 # What the arrays hold: members of an enumeration are slow to look up at every frame.
 _MOTORS, _FALLEN = int(RobotMode.MOTORS), int(RobotStatus.FALLEN)

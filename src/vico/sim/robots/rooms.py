@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import dijkstra
 from vico.assets.robots import RobotModel
 from vico.sim.bodies import FIXTURE, Bodies
 from vico.sim.indoor import Indoor
-from vico.world.folder import World
 from vico.world.model import Entrance, Room
+from vico.world.world import World
 
 Array = NDArray[np.float64]
 

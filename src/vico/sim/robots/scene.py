@@ -20,9 +20,9 @@ from vico.sim.robots.airspace import Airspace
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
 from vico.sim.robots.rooms import RobotRooms
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.routing import Router
+from vico.world.world import World
 
 #: Half the side of floors in physics, metres, and who can be near a robot in a room: people, and walls and furniture.
 _FLOOR, _IN_A_ROOM = 50.0, Capacity(people=12, vehicles=48, objects=0)

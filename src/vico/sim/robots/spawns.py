@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.world.folder import World
+from vico.world.world import World
 
 # Metres of free ground around each, and between two.
 _ROOM, _APART = 1.0, 3.0

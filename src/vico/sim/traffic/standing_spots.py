@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from vico.sim.traffic.records import NONE, SPOT, STOP, TALK, WINDOW, Records
 from vico.sim.traffic.state import WalkwayNetwork
-from vico.world.folder import World
 from vico.world.model import Category, Point2
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.walkways import SIDEWALK, Walkways
+from vico.world.world import World
 
 _BODY = 0.3  # m: a body's radius and a little air
 _LANE_LEFT = 0.65  # m that the middles of others can be apart who pass beside somebody who stands

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from vico.sim.traffic.car_park_ways import places_in_car_parks
 from vico.sim.traffic.records import NONE, STOPPING_PLACE, Records
 from vico.sim.traffic.state import LaneNetwork
-from vico.world.folder import World
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import CROSSING, Walkways
+from vico.world.world import World
 
 #: Length, width, overhang and wheelbase of the largest car that parks, and of the van, metres.
 _CAR, _VAN = (4.7, 1.9, 0.92, 2.78), (5.1, 1.98, 0.95, 3.1)

@@ -17,8 +17,8 @@ from vico.assets.house_doors import (
     leaf_surfaces,
 )
 from vico.sim.drawn_doors import hall_size
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 
 def door_entries(world: World) -> tuple[list[dict[str, Any]], dict[str, Sequence[Surface]]]:

@@ -22,7 +22,7 @@ from vico.viewer.city.robots import write_robots
 from vico.viewer.city.rooms import write_rooms
 from vico.viewer.city.textures import TextureLayers
 from vico.viewer.city.tiles import TILE, Grid, far_tiles, ground_grid, ground_picture, near_tiles
-from vico.world.folder import World
+from vico.world.world import World
 
 #: Of the files' layout; another number, and they are written anew.
 CITY_FORMAT = 6

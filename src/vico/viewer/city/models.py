@@ -18,8 +18,8 @@ from vico.assets.vehicle_lights import lit_lamps, night_lamps
 from vico.assets.vehicles import CAR_KINDS, ridden_prototypes, vehicle_prototypes
 from vico.viewer.city.pack import Blob, packed
 from vico.viewer.city.textures import TextureLayers
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 Models = Mapping[str, Sequence[Surface]]
 # From far away a shape has this share of its triangles, but some at least; leaves this share, each larger.

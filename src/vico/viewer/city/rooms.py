@@ -13,8 +13,8 @@ from vico.io.files import write_bytes
 from vico.viewer.city.models import write_instances
 from vico.viewer.city.pack import Blob, packed
 from vico.viewer.city.textures import TextureLayers
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 
 def write_rooms(world: World, textures: TextureLayers, folder: Path) -> dict[str, Any]:

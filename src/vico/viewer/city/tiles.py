@@ -14,8 +14,8 @@ from shapely.geometry import Polygon
 
 from vico.viewer.city.pack import Blob, PackedMesh, packed
 from vico.viewer.city.textures import PLAIN, TextureLayers
-from vico.world.folder import World
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 #: Side of a tile, metres.
 TILE = 100.0

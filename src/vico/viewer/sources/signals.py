@@ -12,8 +12,8 @@ from vico.sim.traffic import JunctionRule, TrafficNetwork
 from vico.sim.traffic.records import AMBER, GREEN, RED
 from vico.sim.traffic.signal_heads import SignalHeads
 from vico.sim.traffic.signals import SignalClock, SignalDay
-from vico.world.folder import World
 from vico.world.heights import HeightField
+from vico.world.world import World
 
 _LETTERS = {GREEN: "g", AMBER: "a", RED: "r"}
 

@@ -31,7 +31,8 @@ from vico.viewer.sources.relations import relations_of
 from vico.viewer.sources.skylight import Skylight
 from vico.viewer.sources.tables import Columns, RecordedTables, StepTables
 from vico.viewer.sources.timeline import Timeline
-from vico.world.folder import World, read_world
+from vico.world.folder import read_world
+from vico.world.world import World
 
 PROTOCOL = 1
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from vico.world.check.finding import WorldFinding
 from vico.world.check.solids import CoplanarPairs, coplanar_overlaps
-from vico.world.folder import World
 from vico.world.glb import read_glb
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import OPEN_KINDS, Building
+from vico.world.world import World
 
 _SEATED = 0.5  # metres a ground floor may lie above the highest ground at its walls
 _FLICKER = 0.05  # square metres of two triangles in one plane that count

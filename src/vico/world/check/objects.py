@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vico.geo import overlay
 from vico.world.check.finding import WorldFinding
-from vico.world.folder import World
 from vico.world.lanes import LaneGraph
+from vico.world.world import World
 
 _TOUCH = 0.01  # square metres of outlines that may overlap
 _KERB = 0.4  # metres at each side of a lane that no vehicle's body sweeps

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from vico.world.check.buildings import outline_of
 from vico.world.check.finding import WorldFinding
-from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Entrance, Place
 from vico.world.walkable import WalkableMap
+from vico.world.world import World
 
 _APPROACH = 2.0  # metres between a door and the spot in front of it
 _FRONT = 0.2  # metres before a door that lie outside its building

@@ -12,8 +12,8 @@ from vico.geo import overlay
 from vico.rules import REACH
 from vico.world.check.finding import WorldFinding
 from vico.world.check.indoors import BODY, walkable_inside
-from vico.world.folder import World
 from vico.world.model import Room
+from vico.world.world import World
 
 
 def _box(room: Room) -> shapely.Polygon:

@@ -9,9 +9,9 @@ import numpy as np
 
 from vico.rules import BUS_DOOR_REACH, BUS_DOORS_BEHIND_FRONT, BUS_WIDTH, TRAM_SECTIONS
 from vico.world.check.finding import WorldFinding
-from vico.world.folder import World
 from vico.world.rails import TRAM_LENGTH, Track, tram_door
 from vico.world.transit_model import Stop
+from vico.world.world import World
 
 # Metres beside the place to wait where one may stand instead.
 _BESIDE = 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,9 @@ from vico.world.check.objects import check_clearances, check_objects
 from vico.world.check.places import check_entrances, check_places
 from vico.world.check.rooms import check_containers, check_indoors, check_rooms
 from vico.world.check.streets import check_rails, check_roads, check_transit
-from vico.world.folder import World, world_files
 from vico.world.model import FAILED, FAULT, TRIED
+from vico.world.stored import world_files
+from vico.world.world import World
 
 MOST_FAILED = 0.05
 """Share of the objects of any stage that may fail to be made."""
@@ -25,42 +26,37 @@ MOST_FAILED = 0.05
 FEW_FAILED = 2
 """How many a stage may fail to make whatever their share: a small window has few objects."""
 
+_Rule = Callable[[World], Iterable[WorldFinding]]
+
 _MADE = {"buildings": "buildings"}  # what counts the objects of a stage that does not say how many it tried
 
 
-def check_world(world: World) -> list[WorldFinding]:
+def check_world(world: World, *, part: bool = False) -> list[WorldFinding]:
     """Check a world.
 
     Parameters
     ----------
     world
         As read from its folder.
+    part
+        Whether it is a tile of a city, whose streets are the city's (`check_streets`).
 
     Returns
     -------
     list of Finding
         Empty if all is well. A file that can't be read is a finding too, and ends the checks that need it.
     """
+    return _checked(world, _RULES if part else (*_RULES, *_STREET_RULES))
+
+
+def check_streets(world: World) -> list[WorldFinding]:
+    """Check the streets, transit and entities of a city as one world; as `check_world`."""
+    return _checked(world, (*_STREET_RULES, check_entities, check_dropped))
+
+
+def _checked(world: World, rules: Iterable[_Rule]) -> list[WorldFinding]:
     findings: list[WorldFinding] = []
-    for rule in (
-        check_files,
-        check_buildings_closed,
-        check_buildings_seated,
-        check_buildings_apart,
-        check_entrances,
-        check_places,
-        check_rooms,
-        check_containers,
-        check_indoors,
-        check_objects,
-        check_clearances,
-        check_roads,
-        check_transit,
-        check_rails,
-        check_rails,
-        check_entities,
-        check_dropped,
-    ):
+    for rule in rules:
         try:
             findings += rule(world)
         except VicoError as error:
@@ -129,3 +125,21 @@ def check_dropped(world: World) -> Iterator[WorldFinding]:
         if failed > max(FEW_FAILED, MOST_FAILED * tried):
             what = f"{failed} of {tried} can't be made; see the reasons in report.html"
             yield WorldFinding("much left out", stage.name, what)
+
+
+_RULES: tuple[_Rule, ...] = (
+    check_files,
+    check_buildings_closed,
+    check_buildings_seated,
+    check_buildings_apart,
+    check_entrances,
+    check_places,
+    check_rooms,
+    check_containers,
+    check_indoors,
+    check_objects,
+    check_clearances,
+    check_entities,
+    check_dropped,
+)
+_STREET_RULES: tuple[_Rule, ...] = (check_roads, check_transit, check_rails)

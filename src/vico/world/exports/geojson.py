@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vico.geo.frame import LocalFrame
 from vico.io.files import write_bytes
-from vico.world.folder import World
+from vico.world.world import World
 
 Feature = dict[str, Any]
 

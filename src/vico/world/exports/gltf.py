@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from vico.io.files import write_bytes
-from vico.world.folder import World
 from vico.world.glb import glb_bytes
 from vico.world.mesh import Surface
+from vico.world.world import World
 
 _SEEN = ("ground", "buildings", "roofs")
 # ENU, z up, to glTF's axes, y up.

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.io.files import write_bytes
-from vico.world.folder import World
 from vico.world.mesh import Surface, joined
+from vico.world.world import World
 
 _CELL = 1.0  # metres between the height field's corners
 _DEPTH = 5.0  # metres of solid below its lowest point

@@ -11,8 +11,8 @@ from PIL import Image
 
 from vico.errors import MissingExtraError
 from vico.io.files import write_bytes
-from vico.world.folder import World
 from vico.world.mesh import Material, Surface
+from vico.world.world import World
 
 _SEEN = ("ground", "buildings", "roofs")
 

@@ -23,7 +23,7 @@ from vico.geo.osm import OsmData, Tags
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import FIRST_OBJECT
+from vico.world.model import FIRST_OBJECT, FIRST_STOP
 from vico.world.objects import Objects
 from vico.world.street_model import ParkingSpot
 from vico.world.transit_model import Transit
@@ -113,7 +113,7 @@ def parking_from_osm(
     keep = _standing(found, feet, streets, osm.half) & _on_level_ground(found, height)
     keep &= _clear(feet, _kept_free(osm, streets, lanes, transit, solids, objects))
     chosen = _apart(np.flatnonzero(keep), feet)
-    entity = max([FIRST_OBJECT - 1, *objects.entity[objects.entity < 5 * FIRST_OBJECT].tolist()]) + 1
+    entity = max([FIRST_OBJECT - 1, *objects.entity[objects.entity < FIRST_STOP].tolist()]) + 1
     rows, spots = [], []
     for k in chosen.tolist():
         one = found[k]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from vico.io.compiled import compiled
-from vico.world.folder import World
 from vico.world.model import ENTITY_GREEN, ENTITY_ROAD, ENTITY_WATER, Category
+from vico.world.world import World
 
 Rgb = tuple[int, int, int]
 

@@ -13,7 +13,7 @@ from vico.render.cameras import Cameras
 from vico.render.frames import render, render_top_down
 from vico.render.world_scene import scene_of
 from vico.threads import for_each, in_order
-from vico.world.folder import World
+from vico.world.world import World
 from vico.worldgen.previews.maps import map_picture
 from vico.worldgen.previews.viewpoints import Overhead, Viewpoint, viewpoints
 

@@ -11,8 +11,8 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
-from vico.world.folder import World
 from vico.world.walkable import CROSSING, OPEN, SIDEWALK
+from vico.world.world import World
 
 _TILT = 0.02  # radians, a little up: more facades, less pavement
 

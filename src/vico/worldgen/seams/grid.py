@@ -51,6 +51,20 @@ class TileGrid:
             return False
         return all(a <= k <= b for a, k, b in zip(self.first, tile, self.last, strict=True))
 
+    @property
+    def reach(self) -> int:
+        """How many tiles there are from the middle one to the side that is farthest from it."""
+        return max(abs(k) for k in (*self.first, *self.last))
+
+    @property
+    def half(self) -> float:
+        """Half the side of the square around the middle tile that holds all tiles, metres."""
+        return (self.reach + 0.5) * self.size
+
+    def place(self, tile: Tile) -> Tile:
+        """Return which column and row of that square a tile is, counted from its south-western corner."""
+        return tile[0] + self.reach, tile[1] + self.reach
+
     def centre(self, tile: Tile) -> tuple[float, float]:
         """Return a tile's middle, metres east and north of the city's centre."""
         return tile[0] * self.size, tile[1] * self.size

@@ -15,7 +15,8 @@ from vico.geo.osm import polygons_of
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.grid import HALO, STRIP, Tile, TileGrid
 
-_KINDS = (
+#: Fields of `StreetPolygons` that are polygons of one kind each.
+KINDS = (
     "carriageway", "sidewalk", "crossing", "pedestrian", "path", "cycleway", "steps", "parking", "sunken",
 )  # fmt: skip
 
@@ -35,7 +36,7 @@ def adopted(streets: Mapping[Tile, StreetPolygons], tile: Tile, grid: TileGrid) 
     """
     zones = _zones(tile, grid)
     own = streets[tile]
-    kinds = {kind: _joined({one: getattr(streets[one], kind) for one in zones}, zones, tile, grid) for kind in _KINDS}
+    kinds = {kind: _joined({one: getattr(streets[one], kind) for one in zones}, zones, tile, grid) for kind in KINDS}
     names = sorted({name for one in zones for name in streets[one].paved})
     none = MultiPolygon()
     paved = {

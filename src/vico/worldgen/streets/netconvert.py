@@ -62,7 +62,7 @@ _OPTIONS = {
     "xml-validation": "never",
     "xml-validation.net": "never",
 }
-# netconvert needs under a second for 800 m of a dense city; this only ends a hang.
+# netconvert needs under a second for 800 m of a dense city; this only ends a hang. For each km2 of larger ones:
 _LIMIT_SECONDS = 60
 _ABOVE_ALL, _PROFILE = 1e5, 10.0  # metres; between points of lanes on decks
 # So many streets may be left out because netconvert refuses them.
@@ -75,10 +75,13 @@ class NetconvertError(VicoError, RuntimeError):
 
 @dataclass(frozen=True)
 class RoadNetwork:
-    """The bytes of `roads.net.xml` (SUMO) and `roads.xodr` (OpenDRIVE), local metres, free of times and paths."""
+    """The bytes of `roads.net.xml` (SUMO) and `roads.xodr` (OpenDRIVE), local metres, free of times and paths.
+
+    A part of a larger network has no OpenDRIVE of its own.
+    """
 
     net_xml: bytes
-    xodr: bytes
+    xodr: bytes | None
 
 
 def netconvert_binary() -> Path:
@@ -190,12 +193,11 @@ def _converted(
             *[part for key, value in _OPTIONS.items() for part in (f"--{key}", value)],
         ]  # fmt: skip
         environment = {"PATH": os.environ.get("PATH", ""), "LC_ALL": "C", "SUMO_HOME": str(binary.parent.parent)}
+        limit = _LIMIT_SECONDS * max(1.0, 4e-6 * osm.half**2)
         try:
-            done = subprocess.run(
-                command, cwd=work, env=environment, capture_output=True, timeout=_LIMIT_SECONDS, check=False
-            )
+            done = subprocess.run(command, cwd=work, env=environment, capture_output=True, timeout=limit, check=False)
         except subprocess.TimeoutExpired:
-            raise NetconvertError(f"road network: netconvert did not end within {_LIMIT_SECONDS} s") from None
+            raise NetconvertError(f"road network: netconvert did not end within {limit:.0f} s") from None
         net, xodr = work / "net.xml", work / "roads.xodr"
         # netconvert's exit status lies when the clip cuts a relation: trust the files, not the code.
         if not (net.exists() and xodr.exists() and b"</net>" in net.read_bytes()[-64:]):

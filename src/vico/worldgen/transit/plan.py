@@ -15,10 +15,16 @@ from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs
 
 MIN_STOPS, MAX_STOPS = 4, 12
 MAX_LOOP = 4500.0
+_DISTRICT = 600.0  # metres: half the side of the largest window that these suit
 
 _PLANNED = 8
 _FEW = 12  # fewer named places than this say little about where people go: buildings count too
 _APART = 60.0  # metres between two stops of a planned line
+
+
+def times_as_wide(half: float) -> float:
+    """Return how many times as wide as a district a place is, at least 1: so much longer may its lines be."""
+    return max(1.0, half / _DISTRICT)
 
 
 def where_people_go(site: SiteFacts) -> NDArray[np.float64]:

@@ -23,12 +23,13 @@ from vico.world.transit_model import TramLine, TramStop
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import is_bridge, on_the_ground
+from vico.worldgen.transit.plan import times_as_wide
 from vico.worldgen.transit.routes import interval_of
 
 _ROUTES = {"tram": "tram", "light_rail": "light_rail", "train": "rail"}
 _RAILS = ("tram", "light_rail", "rail")
 _LEAST_TRACK = 90.0  # metres of track through the window worth a line
-_MOST_LINES = 3  # lines, both ways each: with more, streets stand full of trams
+_MOST_LINES = 3  # lines of a district, both ways each: with more, streets stand full of trams
 _STOP_REACH = 6.0  # metres between a track and a pole or platform of its own
 _FEED_REACH = 30.0
 _STOPS_APART = 60.0
@@ -231,7 +232,8 @@ def _chosen(routes: Sequence[_Route], half: float, left_out: list[Dropped]) -> l
         lines.append([first, *back[:1]])
     chosen: list[list[_Route]] = []
     covered = shapely.Polygon()
-    while lines and len(chosen) < _MOST_LINES:
+    most = round(_MOST_LINES * times_as_wide(half) ** 2)
+    while lines and len(chosen) < most:
         ways = [shapely.MultiLineString([route.line for route in line]) for line in lines]
         fresh = [round(way.difference(covered).length) for way in ways]
         best = max(range(len(lines)), key=lambda k: (fresh[k], ways[k].length, -k))

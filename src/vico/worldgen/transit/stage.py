@@ -15,14 +15,21 @@ from vico.geo.osm import OsmData
 from vico.rules import BUS_DOOR_BEHIND_FRONT
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import FAILED, Dropped
+from vico.world.model import FAILED, FIRST_STOP, Dropped
 from vico.world.transit_model import Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.worldgen.facts.expendable import expendable, leave_out
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
-from vico.worldgen.transit.plan import MAX_LOOP, MAX_STOPS, MIN_STOPS, planned_berths, planned_loop
+from vico.worldgen.transit.plan import (
+    MAX_LOOP,
+    MAX_STOPS,
+    MIN_STOPS,
+    planned_berths,
+    planned_loop,
+    times_as_wide,
+)
 from vico.worldgen.transit.rails import trams_from_osm
 from vico.worldgen.transit.routes import NOT_ON_THE_MAP, Pole, Route, routes_from_gtfs, routes_from_osm
 from vico.worldgen.transit.times import (
@@ -48,13 +55,11 @@ __all__ = (
     "transit_from_osm",
 )
 
-# Entities of stops, at the upper end of the numbers for objects; those of stations follow.
-FIRST_STOP = 90_000
-
 _REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
 _FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
 _ILL = 6.0  # metres of drive that a metre off the pole is worth
-_MOST_LINES = 3  # with more the buses of central Helsinki bring its cars to a stand
+# Lines of a district; with more the buses of central Helsinki bring its cars to a stand. A city has as many an area.
+_MOST_LINES = 3
 _AT_A_STOP = 2  # lines that stop at one place: the third one's buses would wait behind the others'
 _STAGGER = 120  # seconds between the buses of lines that share a stop
 _MOST_NAMES = 3  # of lines that are driven as one
@@ -136,7 +141,7 @@ def transit_from_osm(
     known = {route.name for route in timed}
     left_out += [what for what in untold if not known]
     routes = timed + [route for route in drawn if route.name not in known]
-    chosen = _driven(routes, kerbs, mapped, left_out)
+    chosen = _driven(routes, kerbs, mapped, left_out, times_as_wide(osm.half))
     names = "osm" if mapped else "planned"
     if timed and any(line.route is not None and line.route.origin == "gtfs" for line in chosen):
         names = "osm and gtfs" if mapped else "gtfs"
@@ -245,13 +250,16 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
     return berths
 
 
-def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped]) -> list[_Chosen]:
+def _driven(
+    routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped], wide: float
+) -> list[_Chosen]:
     """Choose some routes that can be driven as closed rounds: timetables first, then the longest on the map."""
     fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
     ways: list[tuple[set[int], int]] = []
+    most = round(_MOST_LINES * wide * wide)
     for route in routes:
         with expendable(route.id):
-            fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)])
+            fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)], wide)
             if isinstance(fit, str):
                 left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
             else:
@@ -284,7 +292,7 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
             # Who turns on the spot reaches into the lane of who comes the other way: both would wait for ever.
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: has to turn where others drive"))
         elif (
-            len(chosen) < _MOST_LINES
+            len(chosen) < most
             and 3 * len(set(loop) - taken) >= len(loop)
             and max(sum(berth in line.loop for line in chosen) for berth in loop) < _AT_A_STOP
         ):
@@ -298,7 +306,7 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
             why = (
                 f"its stops are served by {serve}"
                 if serve
-                else f"{_MOST_LINES} lines are as many as keep the streets of a window moving"
+                else f"{most} lines are as many as keep the streets of a window moving"
             )
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {why}"))
     return chosen
@@ -351,7 +359,9 @@ def _round_seconds(lanes: LaneGraph, way: set[int], loop: Sequence[Berth]) -> fl
     return float(lanes.length[sorted(way)].sum()) / 6.0 + 45.0 * len(loop)
 
 
-def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Berth, ...], Drive, float] | str:
+def _fit(
+    route: Route, kerbs: Kerbs, known: Sequence[Berth], wide: float
+) -> tuple[tuple[Berth, ...], Drive, float] | str:
     """Find a closed drive past a route's stops, there and back, else there and round; say why not if there is none."""
     drive = Drive(kerbs.lanes, route.way)
     reach = _FEED_REACH if route.origin == "gtfs" else _REACH
@@ -371,14 +381,15 @@ def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Bert
     if len(there) + len(back) < 2:
         return "fewer than two of its stops lie on streets that buses can go round"
     best: tuple[float, list[Berth]] = (math.inf, [])
-    for rows in ([*there, *back][:MAX_STOPS], there[:MAX_STOPS], [*back, *there[::-1]][:MAX_STOPS]):
+    most, longest = round(MAX_STOPS * wide), MAX_LOOP * wide
+    for rows in ([*there, *back][:most], there[:most], [*back, *there[::-1]][:most]):
         loop = list(dict.fromkeys(drive.best_round(rows)[1]))
-        if len(loop) >= 2 and drive.round(loop) < min(MAX_LOOP, best[0]):
+        if len(loop) >= 2 and drive.round(loop) < min(longest, best[0]):
             best = (drive.round(loop), loop)
             if not drive.driven(loop)[1]:
                 break
     if not best[1]:
-        return f"no closed drive of {MAX_LOOP / 1000:g} km past its stops"
+        return f"no closed drive of {longest / 1000:g} km past its stops"
     return tuple(best[1]), drive, best[0]
 
 

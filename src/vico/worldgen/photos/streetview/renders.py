@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.render.cameras import Cameras
 from vico.render.frames import render
 from vico.render.world_scene import scene_of
-from vico.world.folder import World
+from vico.world.world import World
 from vico.worldgen.photos.streetview.photo import Photographer
 
 

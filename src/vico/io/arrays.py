@@ -1,0 +1,60 @@
+"""Arrays in files (``.npy``) that are larger than one wants to hold: written part by part, and read where looked at."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vico.errors import MissingFileError, SchemaError
+from vico.io.files import new_file
+
+
+@contextmanager
+def new_array(path: Path, shape: tuple[int, ...], kind: DTypeLike, fill: float = 0) -> Iterator[NDArray[Any]]:
+    """Yield a new array whose pages lie in a file; it takes the name of `path` when the block ends well.
+
+    Parameters
+    ----------
+    path
+        The ``.npy`` file.
+    shape, kind
+        Of the array.
+    fill
+        What it holds at first.
+
+    Raises
+    ------
+    OutputError
+        If there is no room for it, or it cannot be written.
+    """
+    with new_file(path) as temporary:
+        array = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.dtype(kind), shape=shape)
+        with temporary.open("r+b") as file:
+            # Where the disk is full this says so; writing into pages that have no room would end the process.
+            os.posix_fallocate(file.fileno(), 0, os.fstat(file.fileno()).st_size)
+        if fill:
+            array[...] = fill
+        yield np.asarray(array)
+        array.flush()
+
+
+def mapped_array(path: Path) -> NDArray[Any]:
+    """Return the array of a file, read page by page where it is looked at; what is written into it nobody else sees.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If the file is not there, or is no array.
+    """
+    try:
+        return np.asarray(np.load(path, mmap_mode="c", allow_pickle=False))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build it anew") from None
+    except (ValueError, OSError, EOFError) as error:
+        raise SchemaError(f"{path}: not a readable array ({error}); build it anew") from None

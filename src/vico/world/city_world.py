@@ -1,0 +1,156 @@
+"""A city as one world: what its tiles have, told in its own frame, and the streets that are the city's."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+from vico.geo.frame import LocalFrame
+from vico.io.arrays import mapped_array
+from vico.io.files import sha256_of
+from vico.world.city import CITY, City, CityTile
+from vico.world.city_files import COST, GATES, WHOLE
+from vico.world.city_ground import whole_ground, whole_walkable
+from vico.world.city_routing import CityRouter, Gates
+from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.world.model import Building, Entrance, Manifest, Place, Room
+from vico.world.moving import Shift
+from vico.world.objects import Objects
+from vico.world.routing import Router
+from vico.world.street_model import ParkingSpot
+from vico.world.walkable import WalkableMap
+from vico.world.world import World
+
+T = TypeVar("T")
+
+
+class CityWorld(World):
+    """A city of tiles as one world.
+
+    Entities of a tile's things are those it gave them, shifted by a number of its own (`vico.world.moving`); ids that
+    only a tile knew apart begin with its name.
+
+    Parameters
+    ----------
+    city
+        The city.
+    """
+
+    def __init__(self, city: City) -> None:
+        self.city = city
+        super().__init__(_manifest(city), city.path)
+
+    def file(self, name: str) -> Path:
+        """Path of one of the files that the city has as a whole."""
+        return self.city.path / WHOLE / name
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of ``city.json``, which holds the digests of all tiles: the city's identity."""
+        return sha256_of(self.city.path / CITY)
+
+    def _joined(self, read: Callable[[World, Shift], Iterable[T]]) -> list[T]:
+        """Return what all tiles have, in their order."""
+        return [one for tile in self.city.manifest.tiles for one in read(*self._tile(tile))]
+
+    def _tile(self, tile: CityTile) -> tuple[World, Shift]:
+        place = tile.column, tile.row
+        return self.city.world(place), Shift.of(self.city, place)
+
+    @cached_property
+    def height(self) -> HeightField:
+        """Ground heights, read where they are looked at."""
+        return whole_ground(self.city.path / WHOLE, self.half)
+
+    @cached_property
+    def buildings(self) -> list[Building]:
+        """Buildings, tile by tile."""
+        return self._joined(lambda world, shift: map(shift.building, world.buildings))
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """Named places, tile by tile."""
+        return self._joined(lambda world, shift: map(shift.place, world.places))
+
+    @cached_property
+    def entrances(self) -> list[Entrance]:
+        """Doors of the accessible buildings."""
+        return self._joined(lambda world, shift: map(shift.entrance, world.entrances))
+
+    @cached_property
+    def rooms(self) -> list[Room]:
+        """Rooms of the places."""
+        return self._joined(lambda world, shift: map(shift.room, world.rooms))
+
+    @cached_property
+    def parking(self) -> list[ParkingSpot]:
+        """Parking spots."""
+        return self._joined(lambda world, shift: map(shift.spot, world.parking))
+
+    @cached_property
+    def objects(self) -> Objects:
+        """Things that stand outdoors and indoors."""
+        parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+        return Objects.joined(shift.objects(world.objects) for world, shift in parts)
+
+    @cached_property
+    def walkable(self) -> WalkableMap:
+        """Where people can walk, read where it is looked at."""
+        return whole_walkable(self.city.path / WHOLE, self.half)
+
+    @cached_property
+    def router(self) -> Router:
+        """Finds ways on the walkable map: from gate to gate of the tiles."""
+        whole = self.city.path / WHOLE
+        gates = Gates.read(whole / GATES)
+        side = round(self.city.manifest.size / self.walkable.cell)
+        return CityRouter(self.walkable, mapped_array(whole / COST), gates, side)
+
+    def surfaces(self, layer: str) -> list[Surface]:
+        """Meshes of a layer of all tiles, ENU metres."""
+        if layer not in self._layers:
+            parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+            self._layers[layer] = [shift.surface(one) for world, shift in parts for one in world.surfaces(layer)]
+        return self._layers[layer]
+
+    def geometry(self, layer: str, material: str) -> list[Surface]:
+        """Return the meshes of a layer of all tiles that are of one material, without its texture."""
+        parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+        return [shift.surface(one) for world, shift in parts for one in world.geometry(layer, material)]
+
+    @cached_property
+    def _models(self) -> dict[str, list[Surface]]:
+        found: dict[str, list[Surface]] = {}
+        for tile in self.city.manifest.tiles:
+            found = {**self._tile(tile)[0].prototypes(), **found}
+        return dict(sorted(found.items()))
+
+
+def _manifest(city: City) -> Manifest:
+    """Return what a world's manifest would say of a city."""
+    known = city.manifest
+    frame = LocalFrame(known.origin.lat, known.origin.lon)
+    tiles = [city.world((tile.column, tile.row)).manifest for tile in known.tiles]
+    counts: Counter[str] = Counter()
+    by_type: Counter[str] = Counter()
+    for tile in tiles:
+        counts.update(tile.counts)
+        by_type.update(tile.places_by_type)
+    sources = {source.model_dump_json(): source for tile in tiles for source in tile.sources}
+    return Manifest(
+        producer=known.producer,
+        name=city.path.name,
+        origin=known.origin,
+        half=city.half,
+        bbox=frame.bbox(city.half),
+        seed=known.seed,
+        sources=[sources[key] for key in sorted(sources)],
+        stages=known.reports,
+        counts=dict(sorted(counts.items())),
+        places_by_type=dict(sorted(by_type.items())),
+        files={name.removeprefix(f"{WHOLE}/"): digest for name, digest in known.files.items()},
+    )

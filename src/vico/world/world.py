@@ -1,0 +1,224 @@
+"""A world: what one reads of it, whichever way it is stored."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vico.errors import MissingFileError
+from vico.geo.frame import LocalFrame
+from vico.io.files import sha256_of
+from vico.world import model
+from vico.world.glb import read_glb
+from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.world.model import Building, Entrance, Manifest, Place, Room
+from vico.world.objects import Objects, read_objects
+from vico.world.records import manifest_bytes, read_record, read_records, read_terrain
+from vico.world.routing import Router
+from vico.world.street_model import ParkingSpot, Roads
+from vico.world.transit_model import Transit
+from vico.world.trips import Trips
+from vico.world.walkable import WalkableMap, read_walkable
+
+if TYPE_CHECKING:
+    from vico.world.lanes import LaneGraph
+
+LAYERS = ("ground", "buildings", "roofs", "rooms", "collision")
+
+
+class World:
+    """A generated place. Its parts are read from the folder the first time they are used, and kept.
+
+    Parameters
+    ----------
+    manifest
+        What the world is.
+    path
+        Its folder; None for a world that lives in memory only.
+    parts
+        Parts by attribute name, instead of the folder's (for worlds in memory): ``height``, ``buildings``, ``places``,
+        ``entrances``, ``rooms``, ``objects``, ``roads``, ``transit``, ``walkable``, ``lanes``, ``parking``, ``layers``
+        (surfaces by layer) and ``models`` (surfaces by prototype).
+
+    Attributes
+    ----------
+    manifest, frame, half
+        The manifest, the local frame, and half the side of the square, metres.
+    derived
+        What others have made of the world and share, each under a key of its own.
+    """
+
+    def __init__(self, manifest: Manifest, path: Path | None = None, **parts: Any) -> None:
+        self.manifest = manifest
+        self.path = path
+        self.half = manifest.half
+        self.frame = LocalFrame(**manifest.origin.model_dump())
+        self.derived: dict[object, object] = {}
+        self._layers: dict[str, list[Surface]] = dict(parts.pop("layers", {}))
+        known = {"height", "buildings", "places", "entrances", "rooms", "objects", "roads", "transit", "walkable"}
+        if unknown := set(parts) - known - {"lanes", "models", "parking"}:
+            raise TypeError(f"World: unknown parts {sorted(unknown)}")
+        for name, value in parts.items():
+            self.__dict__["_models" if name == "models" else name] = value
+
+    def file(self, name: str) -> Path:
+        """Path of one of the world's files."""
+        if self.path is None:
+            raise MissingFileError(f"world {self.manifest.name!r} lives in memory and has no {name}; write it first")
+        return self.path / name
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of ``world.json``, which holds the hashes of all other files: the world's identity."""
+        if self.path is None:
+            return hashlib.sha256(manifest_bytes(self.manifest)).hexdigest()
+        return sha256_of(self.path / "world.json")
+
+    @cached_property
+    def height(self) -> HeightField:
+        """Ground heights."""
+        return read_terrain(self.file("terrain.npz"))
+
+    @cached_property
+    def buildings(self) -> list[Building]:
+        """Buildings, in the order of their entities."""
+        return read_records(self.file("buildings.json"), Building)
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """Named places."""
+        return read_records(self.file("places.json"), Place)
+
+    @cached_property
+    def entrances(self) -> list[Entrance]:
+        """Doors of the accessible buildings."""
+        return read_records(self.file("entrances.json"), Entrance)
+
+    @cached_property
+    def rooms(self) -> list[Room]:
+        """Rooms of the places, below ground."""
+        return read_records(self.file("rooms.json"), Room)
+
+    @cached_property
+    def objects(self) -> Objects:
+        """Things that stand outdoors and indoors."""
+        return read_objects(self.file("objects.parquet"))
+
+    @cached_property
+    def roads(self) -> Roads:
+        """The road database."""
+        return read_record(self.file("roads.json"), Roads)
+
+    @cached_property
+    def transit(self) -> Transit:
+        """Stops, lines, bicycle stations."""
+        return read_record(self.file("transit.json"), Transit)
+
+    @cached_property
+    def parking(self) -> list[ParkingSpot]:
+        """Parking spots; none in worlds that were built before there were any."""
+        if self.path is None or not (self.path / "parking.json").exists():
+            return []
+        return read_records(self.path / "parking.json", ParkingSpot)
+
+    @cached_property
+    def walkable(self) -> WalkableMap:
+        """Where people can walk."""
+        return read_walkable(self.file("walkable.npz"))
+
+    @cached_property
+    def router(self) -> Router:
+        """Finds ways on the walkable map."""
+        return Router(self.walkable)
+
+    @cached_property
+    def trips(self) -> Trips:
+        """Plans trips on foot, by bus, by tram and by bicycle."""
+        return Trips(self)
+
+    @cached_property
+    def lanes(self) -> LaneGraph:
+        """The lane graph of the road network."""
+        from vico.world.lane_reader import read_lanes
+
+        return read_lanes(self.file("roads.net.xml"))
+
+    def surfaces(self, layer: str) -> list[Surface]:
+        """Meshes of a layer (one of `LAYERS`), ENU metres."""
+        if layer not in self._layers:
+            if layer not in LAYERS:
+                raise KeyError(f"world has no layer {layer!r}; layers are {', '.join(LAYERS)}")
+            nodes = read_glb(self._mesh(layer))
+            self._layers[layer] = [surface for surfaces in nodes.values() for surface in surfaces]
+        return self._layers[layer]
+
+    def geometry(self, layer: str, material: str) -> list[Surface]:
+        """Return the meshes of a layer that are of one material, without its texture; none of a world without any."""
+        known = self._layers.get(layer)
+        if known is None and self.path is not None and self.file(f"meshes/{layer}.glb").exists():
+            nodes = read_glb(self._mesh(layer), only=material)
+            known = [surface for surfaces in nodes.values() for surface in surfaces]
+        return [surface for surface in known or () if surface.material.name == material]
+
+    def prototypes(self) -> dict[str, list[Surface]]:
+        """Models that the objects are instances of, by name; at the origin, z up, +x forward."""
+        return self._models
+
+    @cached_property
+    def _models(self) -> dict[str, list[Surface]]:
+        return read_glb(self._mesh("prototypes"))
+
+    def _mesh(self, name: str) -> Path:
+        path = self.file(f"meshes/{name}.glb")
+        if not path.exists():
+            raise MissingFileError(f"{path}: no such file; build the world anew")
+        return path
+
+    @cached_property
+    def entities(self) -> dict[int, dict[str, str]]:
+        """Kind and name of everything that segmentation images can show, by entity."""
+        found = {
+            model.ENTITY_GROUND: {"kind": "ground", "name": "ground"},
+            model.ENTITY_ROAD: {"kind": "road", "name": "road"},
+            model.ENTITY_WATER: {"kind": "water", "name": "water"},
+            model.ENTITY_GREEN: {"kind": "green", "name": "green"},
+            model.ENTITY_BACKDROP: {"kind": "backdrop", "name": "backdrop"},
+            model.ENTITY_WIRE: {"kind": "wire", "name": "contact wire"},
+        }
+        for b in self.buildings:
+            found[b.entity] = {"kind": "building", "name": b.name or b.id}
+        for room in self.rooms:
+            found[room.entity] = {"kind": "room", "name": f"{room.kind} {room.id}"}
+        for stop in self.transit.stops:
+            found[stop.entity] = {"kind": "bus_stop", "name": stop.name}
+        for tram_stop in self.transit.tram_stops:
+            found[tram_stop.entity] = {"kind": "tram_stop", "name": tram_stop.name}
+        for station in self.transit.bike_stations:
+            found[station.entity] = {"kind": "bike_station", "name": station.name}
+        objects = self.objects
+        for entity, kind, name in zip(objects.entity.tolist(), objects.kind, objects.id, strict=True):
+            found.setdefault(entity, {"kind": str(kind), "name": str(name)})
+        return found
+
+    @cached_property
+    def building_by_id(self) -> dict[str, Building]:
+        """Buildings by id."""
+        return {b.id: b for b in self.buildings}
+
+    @cached_property
+    def place_by_id(self) -> dict[str, Place]:
+        """Places by id."""
+        return {p.id: p for p in self.places}
+
+    @cached_property
+    def entrance_by_id(self) -> dict[str, Entrance]:
+        """Entrances by id."""
+        return {e.id: e for e in self.entrances}
+
+    @cached_property
+    def room_by_id(self) -> dict[str, Room]:
+        """Rooms by id."""
+        return {r.id: r for r in self.rooms}

@@ -1,0 +1,208 @@
+"""The streets of a whole city: one network of lanes and one of public transport, of which each tile gets its part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+
+from vico.geo.osm import OsmData
+from vico.io.files import read_json, write_bytes, write_json
+from vico.world.city_files import NET, ROADS, TRANSIT, WHOLE, XODR
+from vico.world.city_ground import whole_ground
+from vico.world.heights import HeightField
+from vico.world.lane_reader import read_lanes
+from vico.world.lanes import LaneGraph
+from vico.world.model import Point2, Point3, StageReport
+from vico.world.records import write_record
+from vico.world.street_model import Roads
+from vico.world.transit_model import Transit
+from vico.worldgen.city_request import CityRequest
+from vico.worldgen.facts.site import site_facts
+from vico.worldgen.product import read_head
+from vico.worldgen.seams.grid import Tile, TileGrid, tile_name
+from vico.worldgen.seams.join import CUT
+from vico.worldgen.seams.mosaic import TileShape, solids_of, streets_of, write_ground
+from vico.worldgen.seams.network_cut import NetworkCutter
+from vico.worldgen.stages import SUFFIX, Stages, keep_product, kept_product
+from vico.worldgen.streets.netconvert import RoadNetwork, road_network
+from vico.worldgen.streets.roads import closed_roads, roads_from_osm, streets_from_osm
+from vico.worldgen.streets.walk_lines import CarriagewayEdges
+from vico.worldgen.transit.stage import transit_from_osm
+from vico.worldgen.transit.waiting import waiting_places
+
+#: Products of a tile: its shape without the ground, and the ground.
+SHAPE, LEVELS = "shape", "levels"
+#: Folder of the products of a city's streets, among the plans.
+STREETS = "streets"
+_GROUND = "ground.json"
+# A tile knows the streets so far around it, metres.
+_AROUND = 40.0
+
+
+@dataclass(frozen=True)
+class TileStreets:
+    """A tile's part of its city's streets, in the tile's coordinates.
+
+    Attributes
+    ----------
+    roads
+        Those that reach into it, whole; junctions and crossings in it.
+    network
+        The lanes of streets near it, whole.
+    transit
+        Stops and stations in it; lines are the city's.
+    """
+
+    roads: Roads
+    network: RoadNetwork
+    transit: Transit
+
+
+def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
+    """Make a city's streets of what its tiles are, write them, and keep each tile's part for its build.
+
+    Parameters
+    ----------
+    request
+        Which city.
+    data
+        Its map.
+
+    Returns
+    -------
+    list of StageReport
+        What was made and left out.
+    """
+    whole = request.out / WHOLE
+    whole.mkdir(parents=True, exist_ok=True)
+    shapes, digests = _shapes(request)
+    both = sha256("\n".join(digests).encode()).hexdigest()
+    known = request.plans / STREETS / _GROUND
+    if not (known.exists() and read_json(known) == {"key": both}):
+        write_ground(whole, request.grid, lambda tile: _levels(request, tile))
+        write_json(known, {"key": both})
+    stages = Stages(request.plans / STREETS)
+    given = stages.given
+    data = given(data, f"{data.sha256} {data.frame} {data.half}")
+    with stages.timed("facts"):
+        site = given(site_facts(data), f"facts {stages.digest(data)}")
+    levels = given(whole_ground(whole, data.half), f"levels {both}")
+    height = given(replace(levels, decks=None, stairs=None), f"ground {both}")
+    solids = given(solids_of(shapes, request.grid), f"solids {both}")
+    streets = stages.run("polygons", streets_of, given(shapes, both), request.grid)
+    usable = frozenset(way for shape in shapes.values() for way in shape.open_ways)
+    ways = stages.run(STREETS, streets_from_osm, site, solids, usable)
+    roads = stages.run("roads", roads_from_osm, site, ways)
+    kerbs = given(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
+    network = stages.run("network", road_network, site, ways, levels, kerbs)
+    write_record(whole / ROADS, roads)
+    write_bytes(whole / NET, network.net_xml)
+    write_bytes(whole / XODR, network.xodr or b"")
+    lanes = given(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
+    mapped = stages.run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=request.seed)
+    with stages.timed("waiting"):
+        transit = waiting_places(mapped, streets, lanes, height, solids)
+    write_record(whole / TRANSIT, transit)
+    _report(stages, roads, lanes, transit)
+    cutter = NetworkCutter(network.net_xml)
+    for tile in shapes:
+        keep_product(request.plans / tile_name(tile), CUT, _part(cutter, roads, transit, tile, request.grid))
+    return stages.reports
+
+
+def _shapes(request: CityRequest) -> tuple[dict[Tile, TileShape], list[str]]:
+    """Return the shapes of the tiles that have one, and digests of all that was read or will be."""
+    shapes: dict[Tile, TileShape] = {}
+    digests: list[str] = []
+    for tile in request.grid:
+        folder = request.plans / tile_name(tile)
+        if (folder / f"{SHAPE}{SUFFIX}").exists():
+            shapes[tile], digest = kept_product(folder, SHAPE)
+            digests += [tile_name(tile), digest, read_head(folder / f"{LEVELS}{SUFFIX}")[1]]
+    return shapes, digests
+
+
+def _levels(request: CityRequest, tile: Tile) -> HeightField:
+    """Return the ground of a tile; as it was planned where nothing could be made on it."""
+    folder = request.plans / tile_name(tile)
+    made = (folder / f"{LEVELS}{SUFFIX}").exists()
+    levels: HeightField = kept_product(folder, LEVELS if made else "grading")[0]
+    return levels
+
+
+def _report(stages: Stages, roads: Roads, lanes: LaneGraph, transit: Transit) -> None:
+    counts = {"roads": len(roads.roads), "junctions": len(roads.junctions), "lanes": len(lanes)}
+    stages.report("roads", counts, closed_roads(roads))
+    counts = {
+        "stops": len(transit.stops),
+        "lines": len(transit.lines),
+        "tram_lines": len(transit.tram_lines),
+        "bike_stations": len(transit.bike_stations),
+    }
+    stages.report("transit", counts, transit.left_out)
+
+
+class _Shift:
+    """Tells coordinates of a city from the middle of a tile, and whether they lie in it."""
+
+    def __init__(self, grid: TileGrid, tile: Tile) -> None:
+        self._by, self._size, self._grid, self._tile = grid.centre(tile), grid.size, grid, tile
+
+    def point(self, xy: Point2) -> Point2:
+        return round(xy[0] - self._by[0], 3), round(xy[1] - self._by[1], 3)
+
+    def point3(self, xyz: Point3) -> Point3:
+        return (*self.point(xyz[:2]), xyz[2])
+
+    def has(self, xy: Point2 | Point3) -> bool:
+        own = math.floor(xy[0] / self._size + 0.5), math.floor(xy[1] / self._size + 0.5)
+        return self._grid.nearest(own) == self._tile
+
+    def reached_by(self, line: list[Point2]) -> bool:
+        points = np.array(line) - self._by
+        half = self._size / 2 + _AROUND
+        return bool((points.min(axis=0) <= half).all() and (points.max(axis=0) >= -half).all())
+
+
+def _part(cutter: NetworkCutter, roads: Roads, transit: Transit, tile: Tile, grid: TileGrid) -> TileStreets:
+    shift, (east, north) = _Shift(grid, tile), grid.centre(tile)
+    net = cutter.within(half=grid.size / 2 + _AROUND, east=east, north=north)
+    return TileStreets(_roads_in(roads, shift), RoadNetwork(net, None), _transit_in(transit, shift))
+
+
+def _roads_in(roads: Roads, shift: _Shift) -> Roads:
+    return Roads(
+        roads=[
+            road.model_copy(update={"line": [shift.point(xy) for xy in road.line]})
+            for road in roads.roads
+            if shift.reached_by(road.line)
+        ],
+        junctions=[
+            junction.model_copy(update={"position": shift.point(junction.position)})
+            for junction in roads.junctions
+            if shift.has(junction.position)
+        ],
+        crossings=[shift.point(xy) for xy in roads.crossings if shift.has(xy)],
+    )
+
+
+def _transit_in(transit: Transit, shift: _Shift) -> Transit:
+    def waits(stops: list[Any]) -> list[Any]:
+        return [s.model_copy(update={"wait": shift.point3(s.wait)}) for s in stops if shift.has(s.wait)]
+
+    return Transit(
+        stops=waits(transit.stops),
+        lines=[],
+        bike_stations=[
+            station.model_copy(update={"position": shift.point3(station.position)})
+            for station in transit.bike_stations
+            if shift.has(station.position)
+        ],
+        origin=transit.origin,
+        tram_stops=waits(transit.tram_stops),
+        tram_lines=[],
+    )

@@ -1,0 +1,199 @@
+"""From a map to what stands there: streets and graded ground, bridges, stairs, buildings; each stage one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from shapely import Polygon
+
+from vico.errors import EmptyInputError
+from vico.geo.elevation import HeightSamples
+from vico.geo.osm import OsmData
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.world.heights import HeightField
+from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
+from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
+from vico.worldgen.evidence import Evidence
+from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.outlines.merging import merged_buildings
+from vico.worldgen.facts.outlines.plans import BuildingPlans
+from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.ground.bridges.stage import Bridges, bridges_of
+from vico.worldgen.ground.grading import graded
+from vico.worldgen.ground.stairs import Flights, flights_of
+from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem, terrain_from_tiles
+from vico.worldgen.request import WorldRequest
+from vico.worldgen.seams.heights import cropped
+from vico.worldgen.seams.join import parted, seamless
+from vico.worldgen.stages import Stages, kept_product
+from vico.worldgen.streets.polygons import road_polygons
+from vico.worldgen.tables import read_tables
+
+#: Products of a tile's plan in which its neighbours have a say.
+SEAMS = ("streets", "grading")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is decided before anything is built: outlines of buildings, streets, and the ground graded to them.
+
+    Attributes
+    ----------
+    evidence
+        The sources, the map with what others know of buildings.
+    site, plans, streets, height
+        Facts of the map, buildings, streets, ground.
+    tiles
+        The photogrammetry mesh, on that ground.
+    """
+
+    evidence: Evidence
+    site: SiteFacts
+    plans: BuildingPlans
+    tiles: TileMesh | None
+    streets: StreetPolygons
+    height: HeightField
+
+
+def planned(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan:
+    """Run the stages that come before anything is built."""
+    read_tables()
+    run = stages.run
+    evidence, known = _merged(evidence, stages)
+    site = _left(_site(evidence.data, stages), stages)
+    plans = run("plans", building_plans, site.osm, seed=request.seed, **known)
+    bare, tiles = _terrain(evidence, plans, request, stages)
+    # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
+    streets = run("streets", road_polygons, site, plans.standing())
+    site = _left(site, stages)
+    height = run("grading", graded, bare, site, streets)
+    return Plan(evidence, _left(site, stages), plans, tiles, streets, height)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What stands and lies there: the plan carried out, before streets are driven on and things put beside them.
+
+    Attributes
+    ----------
+    plan
+        What was planned; of a tile as its neighbours see it.
+    bridges, flights, levels
+        Bridges and tunnels, stairs outdoors, and the ground with the surfaces of both.
+    built, solids
+        The buildings, and the footprints of all that nobody walks through, what stands just beyond a tile among it.
+    """
+
+    plan: Plan
+    bridges: Bridges
+    flights: Flights
+    levels: HeightField
+    built: BuildingsResult
+    solids: list[Polygon]
+
+
+def shaped(plan: Plan, request: WorldRequest, stages: Stages) -> Shape:
+    """Run the stages from the plan to what stands there."""
+    run = stages.run
+    plan, beyond = _among_neighbours(plan, request, stages)
+    site, plans, height = plan.site, plan.plans, plan.height
+    bridges = run("bridges", bridges_of, site, height, plan.streets)
+    site = _left(site, stages)
+    flights = run("stairs", flights_of, site, height, plan.streets.steps)
+    site = _left(site, stages)
+    levels = stages.digested(replace(height, decks=bridges.levels(), stairs=flights.treads()))
+    if plan.tiles is not None:
+        plans, fits = run("fit", plans_on_tiles, plans, plan.tiles, height)
+        stages.report("fit", fits.counts())
+    built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=request.seed)
+    solids = stages.digested([*built.standing(height), *bridges.feet, *beyond])
+    return Shape(replace(plan, site=site, plans=plans), bridges, flights, levels, built, solids)
+
+
+def _among_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> tuple[Plan, list[Polygon]]:
+    """Return the plan of a tile as its neighbours see it, and what stands just beyond it; others as they are."""
+    place = request.place
+    if place is None:
+        return plan, []
+    around = place.grid.around(place.tile)
+    found = {name: [kept_product(place.folder(one), name) for one in around] for name in SEAMS}
+    known = {name: [stages.given(*one) for one in products] for name, products in found.items()}
+    both = " ".join(digest for products in found.values() for _, digest in products)
+    streets = stages.given(known["streets"], f"streets {both}")
+    heights = stages.given(known["grading"], f"heights {both}")
+    joined = stages.run("seams", seamless, place.grid, place.tile, streets, heights, apron=APRON)
+    plans, beyond = parted(plan.plans, request.half)
+    osm = plan.site.osm
+    less = replace(osm, half=request.half, margin=osm.margin + osm.half - request.half)
+    site = stages.given(site_facts(less), f"{stages.digest(plan.site)} within {request.half}")
+    return replace(
+        plan,
+        site=site,
+        plans=stages.given(plans, f"{stages.digest(plan.plans)} within {request.half}"),
+        streets=stages.given(joined.streets, f"{stages.digest(joined)} streets"),
+        height=stages.given(joined.height, f"{stages.digest(joined)} height"),
+    ), beyond
+
+
+def _merged(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict[str, Any]]:
+    """Merge what other sources know of buildings into the map; also what their plans need to know beside it."""
+    if evidence.precedence is None:
+        return evidence, {}
+    merged = stages.run("sources", merged_buildings, evidence.data, evidence.buildings, evidence.precedence)
+    stages.report("sources", merged.counts, merged.dropped)
+    data = stages.given(merged.osm, f"map of {stages.digest(merged)}")
+    return replace(evidence, data=data), {"measured": merged.facets, "origins": merged.origins}
+
+
+def _site(data: OsmData, stages: Stages) -> SiteFacts:
+    """Read the facts of the site off its map; they are known by the map's own digest."""
+    with stages.timed("facts"):
+        return stages.given(site_facts(data), f"facts {stages.digest(data)}")
+
+
+def _left(site: SiteFacts, stages: Stages) -> SiteFacts:
+    """Return what is left of the site: what a stage could not make, those that follow don't see."""
+    if not stages.lost:
+        return site
+    less = site.without(stages.lost)
+    return stages.given(less, f"{stages.digest(site)} without {' '.join(sorted(stages.lost))}")
+
+
+def _terrain(
+    evidence: Evidence, plans: BuildingPlans, request: WorldRequest, stages: Stages
+) -> tuple[HeightField, TileMesh | None]:
+    """Make the bare ground of whatever tells heights; the tile mesh, if there is one, is raised to stand on it."""
+    tiles, half, place = evidence.tiles, request.reach, request.place
+    if place is not None and evidence.samples is not None:
+        # Of the whole city at once: a fit to fewer samples is another one.
+        whole = stages.given(*kept_product(place.plans, "terrain"))
+        east, north = place.grid.centre(place.tile)
+        return stages.run("terrain", cropped, whole, half=half + APRON, east=east, north=north), None
+    if tiles is None and evidence.samples is None:
+        return stages.run("terrain", flat_terrain, half=half), None
+    if tiles is None:
+        return stages.run("terrain", terrain_from_dem, evidence.samples, half=half), None
+    height, raised = stages.run("terrain", _ground_of_tiles, evidence.data, evidence.samples, tiles, plans, half=half)
+    if raised:
+        tiles = replace(tiles, positions=tiles.positions + np.array([0.0, 0.0, raised]))
+    return height, tiles
+
+
+def _ground_of_tiles(
+    data: OsmData, samples: HeightSamples | None, mesh: TileMesh, plans: BuildingPlans, *, half: float
+) -> tuple[HeightField, float]:
+    """Make the ground, and tell by how much the tile mesh has to be raised to stand on it.
+
+    An elevation file that is given goes before the mesh's own ground; a mesh of buildings alone has none.
+    """
+    if samples is None:
+        try:
+            return terrain_from_tiles(mesh, data, half=half)[0], 0.0
+        except EmptyInputError:
+            height = flat_terrain(half=half)
+    else:
+        height = terrain_from_dem(samples, half=half)
+    return height, settled(mesh, plans.plans, height)[1]

@@ -1,0 +1,149 @@
+"""Walks through a city of tiles: from gate to gate, and as good as a search of all its cells finds."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from vico.io.arrays import mapped_array
+from vico.world.city_files import COST, REACHED, ROOM, SURFACES
+from vico.world.city_ground import whole_walkable
+from vico.world.city_routing import CityRouter, Gates, border_gates, tile_gates
+from vico.world.routing import Router
+from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
+from vico.worldgen.seams.grid import TileGrid, tile_name
+from vico.worldgen.seams.walking import MOST_ROOM, square_of, write_walking
+
+SIDE = 300  # cells of a tile
+GRID = TileGrid(SIDE * 0.5, (-1, -1), (1, 1))
+
+
+def _town(rng: np.random.Generator) -> WalkableMap:
+    """Blocks of houses with streets between them, some closed by walls."""
+    n = 3 * SIDE
+    cls = np.full((n, n), OPEN, np.uint8)
+    for x in range(15, n - 60, 90):
+        for y in range(15, n - 60, 90):
+            cls[y - 10 : y + 70, x - 10 : x + 70] = SIDEWALK
+            cls[y : y + 60, x : x + 60] = BLOCKED
+            if rng.random() < 0.4:
+                cls[y + 20 : y + 30, x - 30 : x] = BLOCKED
+    cls[:, 80:84] = ROADWAY
+    return WalkableMap(cls, n * 0.25)
+
+
+@pytest.fixture(scope="module")
+def town() -> WalkableMap:
+    return _town(np.random.default_rng(3))
+
+
+def _opened(folder: Path, town: WalkableMap) -> CityRouter:
+    """Write a map tile by tile, as a city's build does, and open it."""
+    tiles = {}
+    for tile in GRID:
+        part = town.cls[square_of(tile, GRID, SIDE)]
+        tiles[tile] = folder / f"{tile_name(tile)}.npz"
+        write_walkable(tiles[tile], WalkableMap(np.ascontiguousarray(part), SIDE * 0.25))
+    write_walking(folder, GRID, tiles)
+    cost = mapped_array(folder / COST)
+    parts = [tile_gates(cost, square_of(tile, GRID, SIDE)) for tile in GRID]
+    gates = Gates(*(np.concatenate([getattr(one, name) for one in parts]) for name in Gates.__dataclass_fields__))
+    return CityRouter(whole_walkable(folder, town.half), cost, gates, SIDE)
+
+
+@pytest.fixture(scope="module")
+def router(town: WalkableMap, tmp_path_factory: pytest.TempPathFactory) -> CityRouter:
+    return _opened(tmp_path_factory.mktemp("town"), town)
+
+
+def test_a_city_has_the_walkable_map_of_its_tiles(town: WalkableMap, router: CityRouter) -> None:
+    whole = router.walkable
+    assert np.array_equal(whole.cls, town.cls)
+    assert np.array_equal(whole.connected, town.connected)
+    assert np.array_equal(whole.clearance, np.minimum(town.clearance, np.float32(MOST_ROOM)))
+    assert np.array_equal(router._cost, Router(town)._cost)
+
+
+def _length(way: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_long_walks_are_hardly_longer_than_the_cheapest(seed: int, town: WalkableMap, router: CityRouter) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = town.random_point(rng), town.random_point(rng)
+    whole = Router(town)
+    exact, found = whole.path(a, b), router.path(a, b)
+    assert exact is not None
+    assert found is not None
+    assert np.allclose(found[0], a)
+    assert np.allclose(found[-1], b)
+    for p, q in pairwise(found):
+        steps = np.linspace(p, q, max(2, int(np.linalg.norm(q - p) / 0.2)))
+        assert (town.class_at(steps) != BLOCKED).all()
+    # Dearer stretches are roadway, which both avoid; gates may lie a little off the way.
+    assert _length(found) <= _length(exact) * 1.06 + 20.0
+    assert np.array_equal(found, router.path(a, b))
+
+
+def test_short_walks_are_the_cheapest(town: WalkableMap, router: CityRouter) -> None:
+    whole, rng = Router(town), np.random.default_rng(5)
+    for _ in range(10):
+        a = town.random_point(rng)
+        b = town.random_point(rng, near=a, radius=80.0)
+        exact, found = whole.path(a, b), router.path(a, b)
+        assert exact is not None
+        assert found is not None
+        assert _length(found) == pytest.approx(_length(exact), abs=0.5)
+
+
+def test_what_is_closed_is_gone_round_on_long_walks_too(town: WalkableMap, router: CityRouter) -> None:
+    a, b = np.array([-215.0, -215.0]), np.array([210.0, 212.0])
+    usual = router.path(a, b)
+    assert usual is not None
+    middle = usual[len(usual) // 2]
+    squares = [(float(middle[0]), float(middle[1]), 6.0)]
+    around = router.path(a, b, closed=squares)
+    assert around is not None
+    steps = np.concatenate([np.linspace(p, q, 200) for p, q in pairwise(around)])
+    assert np.abs(steps - middle).max(axis=1).min() > 5.0
+    again = router.path(a, b)
+    assert again is not None
+    assert np.array_equal(again, usual)
+
+
+def test_there_is_no_way_into_a_yard_without_a_gate(tmp_path: Path) -> None:
+    cls = np.full((3 * SIDE, 3 * SIDE), OPEN, np.uint8)
+    cls[400:500, 400:500] = BLOCKED
+    cls[420:480, 420:480] = OPEN
+    town = WalkableMap(cls, 3 * SIDE * 0.25)
+    router = _opened(tmp_path, town)
+    assert router.path((-200.0, -200.0), (0.0, 0.0)) is None
+    assert not router.walkable.connected[450, 450]
+    assert (tmp_path / SURFACES).exists()
+    assert (tmp_path / ROOM).exists()
+    assert (tmp_path / REACHED).exists()
+
+
+@given(st.lists(st.sampled_from([0, 100, 120, 400]), min_size=1, max_size=300))
+def test_every_stretch_of_a_border_that_can_be_walked_over_has_a_gate(costs: list[int]) -> None:
+    row = np.array(costs, np.int32)
+    gates = border_gates(row, row)
+    assert all(row[k] > 0 for k in gates)
+    start = None
+    for k, value in enumerate([*costs, 0]):
+        if value and start is None:
+            start = k
+        elif not value and start is not None:
+            inside = [g for g in gates if start <= g < k]
+            assert inside
+            if any(0 < v < 400 for v in costs[start:k]):
+                assert all(row[g] < 400 for g in inside)
+            start = None
