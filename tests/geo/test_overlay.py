@@ -78,6 +78,16 @@ def test_results_lie_on_the_grid(pair: tuple[Polygon, Polygon]) -> None:
     assert np.abs(points - np.round(points)).max(initial=0.0) < 1e-6
 
 
+@given(neighbours())
+def test_results_are_overlaid_like_copies_of_them_from_a_file(pair: tuple[Polygon, Polygon]) -> None:
+    """A stage is given what another one computed, or what it wrote before: it must come to the same."""
+    made = [overlay.union(*pair), overlay.difference(*pair), overlay.on_grid(pair[0]), overlay.union_all(pair)]
+    assert (shapely.get_precision(np.array(made, object)) == 0.0).all()
+    copies = [shapely.from_wkb(shapely.to_wkb(shape)) for shape in made]
+    first, second = (overlay.union_all(shapes, grid=None) for shapes in (made, copies))
+    assert shapely.to_wkb(first) == shapely.to_wkb(second)
+
+
 @given(st.lists(neighbours(), min_size=1, max_size=4))
 def test_arrays_give_what_their_elements_give(pairs: list[tuple[Polygon, Polygon]]) -> None:
     first, second = (np.array(column, object) for column in zip(*pairs, strict=True))

@@ -158,7 +158,7 @@ def on_grid(shape: Any, *, grid: float = GRID) -> Any:
     OverlayError
         If the engine refuses it even mended.
     """
-    return _robust(lambda it, size: shapely.set_precision(it, size), "rounding", shape, grid)
+    return _robust(_snapped, "rounding", shape, grid)
 
 
 def mended(shape: Any) -> Any:
@@ -256,7 +256,7 @@ def _overlay(
             odd = (shapely.get_dimensions(made) != wanted) | (shapely.get_type_id(made) == _COLLECTION)
             for k in np.argwhere((odd & (wanted >= 0)) | ~shapely.is_valid(made)):
                 made[tuple(k)] = _only(made[tuple(k)], int(wanted[tuple(k)]))
-            return made if grid is None else shapely.set_precision(made, grid)
+            return made if grid is None else _snapped(made, grid)
         except GEOSException:
             return _each(lambda a, b: _overlay(operation, a, b, grid, dimension), one, two)
     wanted = int(dimension(shapely.get_dimensions(first), shapely.get_dimensions(second)))
@@ -266,13 +266,21 @@ def _overlay(
         return _only(_once_more(operation, first, second, grid), wanted)
 
 
+def _snapped(shape: Any, grid: float) -> Any:
+    """Round geometries to a grid, and forget it: overlays of what remembers a grid differ from those of a copy of it.
+
+    A file does not keep it, so what was read would be overlaid otherwise than what was computed.
+    """
+    return shapely.set_precision(shapely.set_precision(shape, grid), 0.0)
+
+
 def _rounded(shape: BaseGeometry, grid: float | None) -> BaseGeometry:
     """Round a geometry to the grid. What lies there already, as whatever was cut before does, costs next to nothing."""
     if grid is None:
         return shape
     scale = round(1 / grid)
     points = shapely.get_coordinates(shape)
-    return shape if bool((np.rint(points * scale) / scale == points).all()) else shapely.set_precision(shape, grid)
+    return shape if bool((np.rint(points * scale) / scale == points).all()) else _snapped(shape, grid)
 
 
 def _once_more(
@@ -291,7 +299,7 @@ def _once_more(
 def _clean(shape: BaseGeometry, grid: float) -> BaseGeometry:
     """Make a geometry valid, of its highest dimension alone, and on the grid."""
     made = _only(shape, int(shapely.get_dimensions(shape)))
-    return _only(shapely.set_precision(made, grid), int(shapely.get_dimensions(made)))
+    return _only(_snapped(made, grid), int(shapely.get_dimensions(made)))
 
 
 def _union_of_each(shapes: Shapes, wanted: int, grid: float | None) -> BaseGeometry:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cached_property
+from hashlib import blake2b
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
 
 from vico.geo.frame import LocalFrame
 from vico.io.arrays import mapped_array
@@ -16,7 +20,7 @@ from vico.world.city_files import COST, GATES, WHOLE
 from vico.world.city_ground import whole_ground, whole_walkable
 from vico.world.city_routing import CityRouter, Gates
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface
+from vico.world.mesh import Material, Surface
 from vico.world.model import Building, Entrance, Manifest, Place, Room
 from vico.world.moving import Shift
 from vico.world.objects import Objects
@@ -42,6 +46,7 @@ class CityWorld(World):
 
     def __init__(self, city: City) -> None:
         self.city = city
+        self._materials = _Materials()
         super().__init__(_manifest(city), city.path)
 
     def file(self, name: str) -> Path:
@@ -114,7 +119,11 @@ class CityWorld(World):
         """Meshes of a layer of all tiles, ENU metres."""
         if layer not in self._layers:
             parts = (self._tile(tile) for tile in self.city.manifest.tiles)
-            self._layers[layer] = [shift.surface(one) for world, shift in parts for one in world.surfaces(layer)]
+            self._layers[layer] = [
+                shift.surface(replace(one, material=self._materials.shared(one.material)))
+                for world, shift in parts
+                for one in world.surfaces(layer)
+            ]
         return self._layers[layer]
 
     def geometry(self, layer: str, material: str) -> list[Surface]:
@@ -126,8 +135,25 @@ class CityWorld(World):
     def _models(self) -> dict[str, list[Surface]]:
         found: dict[str, list[Surface]] = {}
         for tile in self.city.manifest.tiles:
-            found = {**self._tile(tile)[0].prototypes(), **found}
+            for name, surfaces in self._tile(tile)[0].prototypes().items():
+                if name not in found:
+                    found[name] = [replace(one, material=self._materials.shared(one.material)) for one in surfaces]
         return dict(sorted(found.items()))
+
+
+class _Materials:
+    """Makes materials one that look the same: every tile's files have pictures of their own of the same facades."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Any, ...], Material] = {}
+
+    def shared(self, material: Material) -> Material:
+        """Return the first of the materials that look like this one."""
+        picture = material.texture
+        look = b"" if picture is None else blake2b(np.ascontiguousarray(picture).data).digest()
+        shape = () if picture is None else picture.shape
+        others = (getattr(material, name) for name in Material.__dataclass_fields__ if name != "texture")
+        return self._known.setdefault((look, shape, *others), material)
 
 
 def _manifest(city: City) -> Manifest:
