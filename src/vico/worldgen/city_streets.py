@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Any
@@ -41,6 +43,7 @@ STREETS = "streets"
 _GROUND = "ground.json"
 # A tile knows the streets so far around it, metres.
 _AROUND = 40.0
+_LANE = re.compile(rb'<lane id="([^"]*)"')
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class TileStreets:
     network
         The lanes of streets near it, whole.
     transit
-        Stops and stations in it; lines are the city's.
+        Stops and stations in it; lines that drive there, with all their stops and lanes.
     """
 
     roads: Roads
@@ -171,7 +174,8 @@ class _Shift:
 def _part(cutter: NetworkCutter, roads: Roads, transit: Transit, tile: Tile, grid: TileGrid) -> TileStreets:
     shift, (east, north) = _Shift(grid, tile), grid.centre(tile)
     net = cutter.within(half=grid.size / 2 + _AROUND, east=east, north=north)
-    return TileStreets(_roads_in(roads, shift), RoadNetwork(net, None), _transit_in(transit, shift))
+    lanes = {name.decode() for name in _LANE.findall(net)}
+    return TileStreets(_roads_in(roads, shift), RoadNetwork(net, None), _transit_in(transit, shift, lanes))
 
 
 def _roads_in(roads: Roads, shift: _Shift) -> Roads:
@@ -190,13 +194,13 @@ def _roads_in(roads: Roads, shift: _Shift) -> Roads:
     )
 
 
-def _transit_in(transit: Transit, shift: _Shift) -> Transit:
+def _transit_in(transit: Transit, shift: _Shift, lanes: Set[str]) -> Transit:
     def waits(stops: list[Any]) -> list[Any]:
         return [s.model_copy(update={"wait": shift.point3(s.wait)}) for s in stops if shift.has(s.wait)]
 
     return Transit(
         stops=waits(transit.stops),
-        lines=[],
+        lines=[line for line in transit.lines if not lanes.isdisjoint(line.lanes)],
         bike_stations=[
             station.model_copy(update={"position": shift.point3(station.position)})
             for station in transit.bike_stations

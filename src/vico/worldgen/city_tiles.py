@@ -12,18 +12,22 @@ import numpy as np
 
 from vico.errors import VicoError, sentence_of
 from vico.io.arrays import mapped_array
-from vico.io.files import read_json, sha256_of, write_json
+from vico.io.files import read_json, write_json
 from vico.world.borders import Side, profile_of
 from vico.world.city import TILES
 from vico.world.city_files import COST, WHOLE
 from vico.world.city_routing import tile_gates
 from vico.world.glb import write_glb
 from vico.world.mesh import Surface, joined
+from vico.world.model import Building
+from vico.world.moving import Shift
 from vico.world.stored import read_stored, seal, stage_seconds
+from vico.world.world import World
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import LEVELS, SHAPE
 from vico.worldgen.evidence import Evidence, gather
-from vico.worldgen.pipeline import STAGES, build_requested
+from vico.worldgen.pipeline import OF_A_CITY, STAGES, build_requested
+from vico.worldgen.previews.stage import write_map
 from vico.worldgen.product import digest_of, read_head
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import Tile, tile_name
@@ -112,28 +116,37 @@ def _plans(request: CityRequest, tile: Tile) -> list[str]:
 
 
 def fit(request: CityRequest, tile: Tile) -> dict[str, Any]:
-    """Make a tile's ground meet that of the tiles before it, and return what the tile came to."""
+    """Make a tile's ground meet that of the tiles before it, draw its map, and return what the tile came to."""
     out = request.out / TILES / tile_name(tile)
     before = {axis: (tile[0] - (axis == 0), tile[1] - (axis == 1)) for axis in (0, 1)}
     there = {axis: request.out / TILES / tile_name(one) for axis, one in before.items()}
     there = {axis: folder for axis, folder in there.items() if (folder / STAGES / f"ground{SUFFIX}").exists()}
     made_of = [_head(folder / STAGES, name) for folder in (out, *there.values()) for name in ("ground", "wires")]
+    around = [
+        one for one in request.grid.around(tile) if (request.out / TILES / tile_name(one) / "world.json").exists()
+    ]
+    made_of += [_head(request.plans / tile_name(one), "buildings") for one in around]
     known = _known(request, tile, "fit")
     if known is not None and read_stored(out).digest != known["found"]["digest"]:
         _forget(request, tile, "fit")  # it was built anew
-    return _unless_kept(request, tile, "fit", [*map(str, there), *made_of], lambda: _fit(request, out, there))
+    return _unless_kept(request, tile, "fit", [*map(str, there), *made_of], lambda: _fit(request, tile, there, around))
 
 
-def _fit(request: CityRequest, out: Path, there: Mapping[int, Path]) -> dict[str, Any]:
-    world, half = read_stored(out), request.grid.size / 2
+def _fit(request: CityRequest, tile: Tile, there: Mapping[int, Path], around: Sequence[Tile]) -> dict[str, Any]:
+    out, half = request.out / TILES / tile_name(tile), request.grid.size / 2
+    world = read_stored(out)
     ground = _drawn(out)
     for axis, folder in there.items():
         ground = conformed(ground, Side(axis, -half), profile_of(_drawn(folder), Side(axis, half)))
-    mesh = out / "meshes" / "ground.glb"
     wires: list[Surface] = kept_product(out / STAGES, "wires")[0]
-    write_glb(mesh, {"ground": joined([*ground, *wires])})
-    if sha256_of(mesh) != world.manifest.files["meshes/ground.glb"]:
-        seal(out, world.manifest, seconds=stage_seconds(world), without=("roads.xodr",))
+    write_glb(out / "meshes" / "ground.glb", {"ground": joined([*ground, *wires])})
+    houses: list[Building] = []
+    for one in around:
+        east, north = ((a - b) * request.grid.size for a, b in zip(one, tile, strict=True))
+        shift = Shift(east, north, 0, tile_name(one))
+        houses += map(shift.building, read_stored(request.out / TILES / tile_name(one)).buildings)
+    write_map(World(world.manifest, out, buildings=houses), out)
+    seal(out, world.manifest, seconds=stage_seconds(world), without=OF_A_CITY)
     done = read_stored(out)
     return {
         "digest": done.digest,

@@ -33,6 +33,8 @@ from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress, Stages
 
 STAGES = ".stages"
+#: Files that a tile lacks: its streets are its city's, and only that has them as OpenDRIVE.
+OF_A_CITY = ("roads.xodr",)
 _REQUEST = "request.json"
 _LEAST_RADIUS, _MOST_RADIUS = 50.0, 2000.0
 _DEFAULTS = BuildOptions()
@@ -179,15 +181,14 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions) -> Manifest:
         write_json(folder / STAGES / _REQUEST, request.to_json())
         world = make_world(evidence, request, folder, stages)
         del evidence  # the mesh of a photographed city is large, and so are its pictures
-        with stages.timed("previews"):
-            counts = write_previews(world, folder, views=request.previews)
-        stages.report("previews", counts)
+        if part is None:
+            with stages.timed("previews"):
+                stages.report("previews", write_previews(world, folder, views=request.previews))
         stages.sweep()
         if not options.keep_stages:
             shutil.rmtree(folder / STAGES)
         made = world.manifest.model_copy(update={"stages": stages.reports})
-        # A tile's streets are its city's; only that has them as OpenDRIVE.
-        manifest = seal(folder, made, seconds=stages.seconds, without=() if part is None else ("roads.xodr",))
+        manifest = seal(folder, made, seconds=stages.seconds, without=() if part is None else (*OF_A_CITY, "map.png"))
         write_report(read_world(folder))
     return manifest
 

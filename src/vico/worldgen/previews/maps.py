@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,12 +113,13 @@ def map_picture(world: World) -> Image.Image:
 def _draw_lines(
     draw: ImageDraw.ImageDraw, world: World, at: Callable[[Sequence[float]], tuple[float, float]], scale: int
 ) -> None:
-    """Bus lines along the lanes they use."""
+    """Bus lines along the lanes they use; of a tile's lines those lanes alone that it has."""
     lanes = world.lanes
     for line in world.transit.lines:
-        points = [at(p) for name in line.lanes if name in lanes.index for p in lanes.line(lanes.index[name]).tolist()]
-        if len(points) > 1:
-            draw.line(points, fill=line.colour, width=2 * scale, joint="curve")
+        for there, names in groupby(line.lanes, lambda name: name in lanes.index):
+            points = [at(p) for name in names if there for p in lanes.line(lanes.index[name]).tolist()]
+            if len(points) > 1:
+                draw.line(points, fill=line.colour, width=2 * scale, joint="curve")
 
 
 def _street_names(

@@ -22,7 +22,7 @@ _VIEWS = 8
 
 def write_previews(world: World, folder: Path, *, views: bool) -> dict[str, int]:
     """Write ``map.png`` and, with `views`, the rendered pictures of ``previews/``; return how many there are."""
-    map_picture(world).save(folder / "map.png")
+    write_map(world, folder)
     if not views:
         return {"maps": 1, "views": 0}
     spots = viewpoints(world, count=_VIEWS)
@@ -36,6 +36,11 @@ def write_previews(world: World, folder: Path, *, views: bool) -> dict[str, int]
 
     for_each(save, zip(names, frames, strict=True))
     return {"maps": 1, "views": len(spots)}
+
+
+def write_map(world: World, folder: Path) -> None:
+    """Write ``map.png``."""
+    map_picture(world).save(folder / "map.png")
 
 
 def render_views(world: World, views: Sequence[Viewpoint | Overhead]) -> Iterator[NDArray[np.uint8]]:
