@@ -31,10 +31,10 @@ from vico.worldgen.previews.stage import write_map
 from vico.worldgen.product import digest_of, read_head
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import Tile, tile_name
-from vico.worldgen.seams.join import CUT, MAP, map_of
+from vico.worldgen.seams.join import CUT, MAP
 from vico.worldgen.seams.mosaic import TileShape
 from vico.worldgen.seams.walking import around, square_of
-from vico.worldgen.shaping import SEAMS, planned, shaped
+from vico.worldgen.shaping import SEAMS, map_of, planned, shaped
 from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
 
 #: Product with a tile's gates.

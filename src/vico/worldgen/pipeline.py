@@ -28,7 +28,7 @@ from vico.worldgen.previews.stage import write_previews
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
 from vico.worldgen.request import BuildOptions, WorldRequest
-from vico.worldgen.seams.join import map_of
+from vico.worldgen.shaping import map_of
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress, Stages
 

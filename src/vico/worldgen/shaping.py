@@ -27,13 +27,19 @@ from vico.worldgen.ground.stairs import Flights, flights_of
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.request import WorldRequest
 from vico.worldgen.seams.heights import cropped
-from vico.worldgen.seams.join import parted, seamless
+from vico.worldgen.seams.join import MAP, TilePlace, parted, seamless
 from vico.worldgen.stages import Stages, kept_product
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.tables import read_tables
 
 #: Products of a tile's plan in which its neighbours have a say.
 SEAMS = ("streets", "grading")
+
+
+def map_of(place: TilePlace) -> tuple[OsmData, str]:
+    """Return what of the city's map lies in a tile and around it, and its digest."""
+    found: tuple[OsmData, str] = kept_product(place.own, MAP)
+    return found
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ from pathlib import Path
 import shapely
 from shapely import Polygon
 
-from vico.geo.osm import OsmData
 from vico.world.heights import HeightField
 from vico.worldgen.facts.outlines.plans import BuildingPlans
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.grid import Tile, TileGrid, tile_name
 from vico.worldgen.seams.heights import blended, cropped
 from vico.worldgen.seams.streets import adopted
-from vico.worldgen.stages import kept_product
 
 #: Product of the city's streets that a tile is given: its part of them.
 CUT = "cut"
@@ -47,12 +45,6 @@ class TilePlace:
     def folder(self, tile: Tile) -> Path:
         """Return the folder of what a tile planned."""
         return self.plans / tile_name(tile)
-
-
-def map_of(place: TilePlace) -> tuple[OsmData, str]:
-    """Return what of the city's map lies in a tile and around it, and its digest."""
-    found: tuple[OsmData, str] = kept_product(place.own, MAP)
-    return found
 
 
 @dataclass(frozen=True)
