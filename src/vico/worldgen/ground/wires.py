@@ -61,9 +61,11 @@ def contact_wires(
         if tags.get("bridge", "no") != "no" or way.id in site.levels.above:
             continue
         with expendable(f"w{way.id}"):
-            for piece in shapely.get_parts(overlay.intersection(shapely.LineString(way.line), window)):
+            # Of the whole way, so that wires go on where the next tile of a city begins.
+            track = overlay.simplify(shapely.LineString(way.line), 0.1)
+            for piece in shapely.get_parts(overlay.intersection(track, window)):
                 if piece.geom_type == "LineString" and piece.length > 2.0:
-                    xy = np.asarray(shapely.segmentize(overlay.simplify(piece, 0.1), _STEP).coords)
+                    xy = np.asarray(shapely.segmentize(piece, _STEP).coords)
                     wires.append(np.c_[xy, terrain.lower(xy) + CONTACT])
                     spans += _spans(piece, walls, terrain, spans)
     lines = wires + spans
