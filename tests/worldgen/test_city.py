@@ -15,13 +15,16 @@ from shapely.affinity import translate
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.io.files import write_json
 from vico.world.borders import Side, border_findings, profile_of
 from vico.world.check import check_streets
-from vico.world.city import read_city
+from vico.world.city import CityManifest, CityTile, read_city
 from vico.world.city_world import CityWorld
 from vico.world.folder import read_world
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
+from vico.world.model import Origin
+from vico.world.world import World
 from vico.worldgen.city_build import build_city, city_request, divide_map
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
@@ -207,6 +210,34 @@ def _check_whole(path: Path) -> None:
     way = world.router.path(a, b)
     assert way is not None
     assert np.linalg.norm(np.diff(way, axis=0), axis=1).sum() < 2.0 * np.linalg.norm(b - a)
+
+
+def _city_of(folder: Path, tile: Path, digest: str) -> None:
+    (folder / "tiles").mkdir(parents=True)
+    (folder / "tiles" / "0_0").symlink_to(tile)
+    content = CityManifest(
+        producer="vico",
+        origin=Origin(lat=60.0, lon=25.0),
+        size=160.0,
+        first=(0, 0),
+        last=(0, 0),
+        seed=0,
+        tiles=[CityTile(column=0, row=0, name="0_0", digest=digest, buildings=1, places=1)],
+    )
+    write_json(folder / "city.json", content.model_dump(mode="json"))
+
+
+def test_a_tile_that_is_gone_or_another_one_is_named(corner: World, corner_path: Path, tmp_path: Path) -> None:
+    _city_of(tmp_path / "good", corner_path, corner.digest)
+    assert read_city(tmp_path / "good").world((0, 0)).digest == corner.digest
+    _city_of(tmp_path / "other", corner_path, "0" * 64)
+    with pytest.raises(SchemaError, match=r"tile 0_0: .* of another build"):
+        read_city(tmp_path / "other").world((0, 0))
+    (tmp_path / "good" / "tiles" / "0_0").unlink()
+    with pytest.raises(MissingFileError, match=r"tile 0_0: .* is gone"):
+        read_city(tmp_path / "good").world((0, 0))
+    with pytest.raises(MissingFileError, match="has no tile 3_4"):
+        read_city(tmp_path / "good").world((3, 4))
 
 
 @pytest.mark.slow

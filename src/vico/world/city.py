@@ -24,6 +24,7 @@ from vico.world.world import World
 VERSION = 2
 #: Name of a city's manifest.
 CITY = "city.json"
+_AGAIN = "the vico city build that made the city makes it again"
 #: Folder of the folders of the tiles' worlds.
 TILES = "tiles"
 
@@ -114,11 +115,19 @@ class City:
         ------
         MissingFileError
             If the city has no such tile, or its folder is gone.
+        SchemaError
+            If the tile is not the one that the city was built of.
         """
         known = self._tiles.get(tile)
         if known is None:
             raise MissingFileError(f"{self.path}: has no tile {tile[0]}_{tile[1]}; vico city info lists its tiles")
-        return read_stored(self.path / TILES / known.name)
+        folder = self.path / TILES / known.name
+        if not (folder / "world.json").exists():
+            raise MissingFileError(f"tile {known.name}: {folder} is gone or not whole; {_AGAIN}")
+        world = read_stored(folder)
+        if world.digest != known.digest:
+            raise SchemaError(f"tile {known.name}: {folder} is of another build than {self.path / CITY}; {_AGAIN}")
+        return world
 
 
 def read_city(path: Path) -> City:
