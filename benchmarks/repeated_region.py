@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import osmium
+from numpy.typing import NDArray
 
 from vico.geo.frame import LocalFrame
 
@@ -59,12 +60,13 @@ def _inside(extract: Path, frame: LocalFrame, half: float) -> set[int]:
 def _copy(
     extract: Path,
     writer: osmium.SimpleWriter,
-    kind: object,
-    more: int,
+    kind: osmium.osm.osm_entity_bits,
+    move: tuple[int, NDArray[np.float64]],
     frame: LocalFrame,
-    shift: np.ndarray,
     kept: set[int],
 ) -> None:
+    """Write the things of one kind, their ids larger and their places shifted by `move`."""
+    more, shift = move
     for thing in osmium.FileProcessor(str(extract), kind):
         if thing.is_node():
             xy = frame.to_enu(thing.location.lat, thing.location.lon) + shift
