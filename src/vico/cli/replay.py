@@ -16,7 +16,7 @@ from vico.sim.recording import read_run
 from vico.viewer.demo_film import write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.replay import write_replay
-from vico.world.folder import read_world
+from vico.world.folder import is_world, read_world
 from vico.world.world import World
 from vico.worldgen.previews.viewpoints import Overhead
 
@@ -31,7 +31,7 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
     """
     run = read_run(path)
     folder = world or run.source("world")
-    if not (folder / "world.json").exists():
+    if not is_world(folder):
         raise MissingFileError(f"{path}: its world is no longer at {folder}; say where it is with --world")
     place = read_world(folder)
     recording = recording_of(run)

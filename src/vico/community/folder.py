@@ -27,6 +27,7 @@ from vico.community.tags import with_tags
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
 from vico.io.files import read_json, write_bytes, write_json
 from vico.io.folders import check_replaceable, new_folder
+from vico.world.folder import is_world
 from vico.world.model import Record
 from vico.world.world import World
 
@@ -190,7 +191,7 @@ def world_of(path: Path) -> Path | None:
     if not isinstance(content, dict) or not isinstance(content.get("world"), str):
         raise SchemaError(f"{origin}: does not say where the world is; give it with --world")
     found = Path(os.path.normpath(Path(path).resolve() / content["world"]))
-    return found if (found / "world.json").exists() else None
+    return found if is_world(found) else None
 
 
 def _records(path: Path, kind: type[R], manifest: CommunityManifest) -> list[R]:

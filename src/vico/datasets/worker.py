@@ -32,7 +32,7 @@ from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
 from vico.sim.recording import Run, read_run
-from vico.world.folder import read_world
+from vico.world.folder import is_world, read_world
 from vico.world.world import World
 
 Tell = Callable[[Mapping[str, Any]], None]
@@ -211,7 +211,7 @@ def chosen_agents(run: Run, contents: Contents) -> list[str]:
 def world_of_run(run: Run, given: str | None) -> World | None:
     """Return the world of a run, if it is still there."""
     folder = Path(given) if given else run.source("world")
-    if not (folder / "world.json").exists():
+    if not is_world(folder):
         return None
     world = _read_world(folder)
     return world if world.digest == run.manifest["world"]["digest"] else None

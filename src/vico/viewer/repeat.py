@@ -18,7 +18,7 @@ from vico.sim.recording import Run
 from vico.sim.recording.setup import repeat_setup
 from vico.sim.simulation import Simulation
 from vico.sim.simulation_state import SimulationState
-from vico.world.folder import read_world
+from vico.world.folder import is_world, read_world
 from vico.world.world import World
 
 T = TypeVar("T")
@@ -166,6 +166,6 @@ class RepeatedRun:
 
 def _folder(run: Run, given: Path | None, what: Literal["world", "community"]) -> Path:
     folder = given or run.source(what)
-    if not (folder / f"{what}.json").exists():
+    if not (is_world(folder) if what == "world" else (folder / "community.json").exists()):
         raise MissingFileError(f"{run.path}: its {what} is no longer at {folder}; say where it is with --{what}")
     return folder

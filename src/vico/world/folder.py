@@ -11,6 +11,11 @@ from vico.world.stored import read_stored
 from vico.world.world import World
 
 
+def is_world(path: Path) -> bool:
+    """Return whether a folder holds a finished world, or a city."""
+    return any((Path(path) / name).exists() for name in ("world.json", CITY))
+
+
 def read_world(path: Path) -> World:
     """Open a world folder, or a city as one world.
 

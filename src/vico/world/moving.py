@@ -149,12 +149,12 @@ class Shift:
 
     def objects(self, objects: Objects) -> Objects:
         """Move things. Those indoors are named after a room, and that is in one tile; a street may lie in several."""
-        ids = [
-            key if room else self.id(key) for key, room in zip(objects.id.tolist(), objects.room.tolist(), strict=True)
-        ]
+        ids = objects.id.astype(f"<U{objects.id.dtype.itemsize // 4 + len(self.name) + 1}")
+        outdoors = np.flatnonzero(objects.room == "")
+        ids[outdoors] = [self.id(key) for key in objects.id[outdoors].tolist()]
         return replace(
             objects,
-            id=np.array(ids, np.str_),
+            id=ids,
             entity=self.numbers(objects.entity),
             x=objects.x + self.east,
             y=objects.y + self.north,

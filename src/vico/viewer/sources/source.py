@@ -31,7 +31,7 @@ from vico.viewer.sources.relations import relations_of
 from vico.viewer.sources.skylight import Skylight
 from vico.viewer.sources.tables import Columns, RecordedTables, StepTables
 from vico.viewer.sources.timeline import Timeline
-from vico.world.folder import read_world
+from vico.world.folder import is_world, read_world
 from vico.world.world import World
 
 PROTOCOL = 1
@@ -85,7 +85,7 @@ class Source:
 
         run = read_run(path)
         folder = world or run.source("world")
-        there = (folder / "world.json").exists()
+        there = is_world(folder)
         if world is not None and not there:
             raise MissingFileError(f"{world}: holds no world; give its folder with --world")
         return cls(path, RecordedTables(run), read_world(folder) if there else None, live=False)
