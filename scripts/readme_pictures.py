@@ -57,7 +57,8 @@ def main() -> None:
     plan = Image.open(arguments.demo / "world" / "map.png").convert("RGB")
     plan.thumbnail((900, 900))
     plan.save(arguments.out / "map.png", optimize=True)
-    seen = next(read_film(arguments.demo / "run" / "views" / "resident_2.mp4", wanted={240}))
+    films = sorted((arguments.demo / "run" / "views" / "resident_2").glob("*.mp4"))
+    seen = next(read_film(films[0], wanted={240}))
     Image.fromarray(seen).resize((512, 512), Image.Resampling.BICUBIC).save(arguments.out / "first_person.png")
 
 
