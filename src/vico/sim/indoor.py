@@ -61,7 +61,7 @@ class Indoor:
         Index of the place each room belongs to, -1 if it is not a place of this world.
     """
 
-    rooms: list[Room]
+    rooms: Sequence[Room]
     index: dict[str, int]
     boxes: NDArray[np.float64]
     floor: NDArray[np.float64]
@@ -87,7 +87,7 @@ class Indoor:
         start = np.cumsum([0, *(len(one) for one in rows)]).astype(np.int64)
         number = {place.id: i for i, place in enumerate(places)}
         return cls(
-            list(rooms),
+            rooms,
             index,
             boxes,
             np.array([r.centre[2] for r in rooms], np.float64),

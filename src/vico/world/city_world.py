@@ -18,10 +18,11 @@ from vico.io.files import sha256_of
 from vico.world.city import CITY, City, CityTile
 from vico.world.city_files import COST, GATES, WHOLE
 from vico.world.city_ground import whole_ground, whole_walkable
+from vico.world.city_rooms import CityRooms, RoomsById
 from vico.world.city_routing import CityRouter, Gates
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
-from vico.world.model import Building, Entrance, Manifest, Place, Room
+from vico.world.model import Building, Entrance, Manifest, Place
 from vico.world.moving import Shift
 from vico.world.objects import Objects
 from vico.world.routing import Router
@@ -87,9 +88,15 @@ class CityWorld(World):
         return self._joined(lambda world, shift: map(shift.entrance, world.entrances))
 
     @cached_property
-    def rooms(self) -> list[Room]:
-        """Rooms of the places."""
-        return self._joined(lambda world, shift: map(shift.room, world.rooms))
+    def rooms(self) -> CityRooms:
+        """Rooms of the places, each read when it is asked for."""
+        parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+        return CityRooms([(world.file("rooms.json"), shift) for world, shift in parts])
+
+    @cached_property
+    def room_by_id(self) -> RoomsById:
+        """Rooms by id."""
+        return RoomsById(self.rooms)
 
     @cached_property
     def parking(self) -> list[ParkingSpot]:

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Entities of the first tile's things begin here: above those of bodies and of what a simulation adds.
 _FIRST, _EACH = 2_000_000, 500_000
+# A city has millions of things: their names take a quarter of the room if each takes only what it needs.
+_TEXT = np.dtypes.StringDType()
 _OF_THE_CITY = ("stop_", "tram_stop_", "bikes_")
 
 
@@ -149,12 +151,16 @@ class Shift:
 
     def objects(self, objects: Objects) -> Objects:
         """Move things. Those indoors are named after a room, and that is in one tile; a street may lie in several."""
-        ids = objects.id.astype(f"<U{objects.id.dtype.itemsize // 4 + len(self.name) + 1}")
+        ids = objects.id.astype(_TEXT)
         outdoors = np.flatnonzero(objects.room == "")
         ids[outdoors] = [self.id(key) for key in objects.id[outdoors].tolist()]
         return replace(
             objects,
             id=ids,
+            kind=objects.kind.astype(_TEXT),
+            group=objects.group.astype(_TEXT),
+            prototype=objects.prototype.astype(_TEXT),
+            room=objects.room.astype(_TEXT),
             entity=self.numbers(objects.entity),
             x=objects.x + self.east,
             y=objects.y + self.north,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -98,7 +99,7 @@ class World:
         return read_records(self.file("entrances.json"), Entrance)
 
     @cached_property
-    def rooms(self) -> list[Room]:
+    def rooms(self) -> Sequence[Room]:
         """Rooms of the places, below ground."""
         return read_records(self.file("rooms.json"), Room)
 
@@ -219,6 +220,6 @@ class World:
         return {e.id: e for e in self.entrances}
 
     @cached_property
-    def room_by_id(self) -> dict[str, Room]:
+    def room_by_id(self) -> Mapping[str, Room]:
         """Rooms by id."""
         return {r.id: r for r in self.rooms}

@@ -1,0 +1,113 @@
+"""The rooms of a city, read one by one when they are asked for: there are hundreds of thousands."""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import overload
+
+import numpy as np
+from pydantic import ValidationError
+
+from vico.errors import MissingFileError
+from vico.world.model import Room
+from vico.world.moving import Shift
+from vico.world.records import invalid
+
+# Rooms that are kept: those that a community is in, and more.
+_KEPT = 32_768
+
+
+class CityRooms(Sequence[Room]):
+    """The rooms of all tiles, in the order of the tiles.
+
+    Parameters
+    ----------
+    files
+        Each tile's ``rooms.json``, one room a line, and how its things become the city's.
+
+    Raises
+    ------
+    MissingFileError
+        If one of the files is not there.
+    """
+
+    def __init__(self, files: Sequence[tuple[Path, Shift]]) -> None:
+        self._files = list(files)
+        self._maps = [_mapped(path) for path, _ in files]
+        self._ends = [_line_ends(content) for content in self._maps]
+        self._first = np.cumsum([0, *map(_rows, self._ends)])
+        self._kept = lru_cache(maxsize=_KEPT)(self._read)
+
+    def __len__(self) -> int:
+        return int(self._first[-1])
+
+    @overload
+    def __getitem__(self, number: int) -> Room: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> list[Room]: ...
+
+    def __getitem__(self, number: int | slice) -> Room | list[Room]:
+        if isinstance(number, slice):
+            return [self[k] for k in range(*number.indices(len(self)))]
+        k = int(number) + (len(self) if number < 0 else 0)
+        if not 0 <= k < len(self):
+            raise IndexError(f"room {number} of {len(self)}")
+        return self._kept(k)
+
+    def __iter__(self) -> Iterator[Room]:
+        """Yield all rooms, without keeping them."""
+        return map(self._read, range(len(self)))
+
+    def _read(self, number: int) -> Room:
+        tile = int(np.searchsorted(self._first, number, side="right")) - 1
+        row, (path, shift) = number - int(self._first[tile]), self._files[tile]
+        start, end = self._ends[tile][row : row + 2].tolist()
+        try:
+            return shift.room(Room.model_validate_json(self._maps[tile][start + 1 : end].rstrip(b",")))
+        except ValidationError as error:
+            raise invalid(path, error) from None
+
+
+class RoomsById(Mapping[str, Room]):
+    """Rooms of a city by their ids.
+
+    Parameters
+    ----------
+    rooms
+        The rooms.
+    """
+
+    def __init__(self, rooms: CityRooms) -> None:
+        self._rooms = rooms
+        self._numbers = {room.id: k for k, room in enumerate(rooms)}
+
+    def __getitem__(self, key: str) -> Room:
+        return self._rooms[self._numbers[key]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+
+def _mapped(path: Path) -> bytes | mmap.mmap:
+    try:
+        with path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the city anew") from None
+
+
+def _rows(ends: np.ndarray) -> int:
+    """Return how many rooms a file has: a line each between its brackets, and an empty one where there is none."""
+    return 0 if len(ends) < 3 or ends[1] - ends[0] == 1 else len(ends) - 2
+
+
+def _line_ends(content: bytes | mmap.mmap) -> np.ndarray:
+    """Return where lines end."""
+    return np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
