@@ -32,6 +32,9 @@ from vico.world.world import World
 
 T = TypeVar("T")
 
+# Counts of tiles that say nothing added up: a street is in several of them, and so are kinds of things.
+_NOT_A_SUM = ("kinds", "roads", "walkways")
+
 
 class CityWorld(World):
     """A city of tiles as one world.
@@ -173,6 +176,10 @@ def _manifest(city: City) -> Manifest:
     for tile in tiles:
         counts.update(tile.counts)
         by_type.update(tile.places_by_type)
+    for name in _NOT_A_SUM:
+        counts.pop(name, None)
+    for report in known.reports:
+        counts |= {name: number for name, number in report.counts.items() if name in ("roads", "lanes")}
     sources = {source.model_dump_json(): source for tile in tiles for source in tile.sources}
     return Manifest(
         producer=known.producer,
