@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.affinity import translate
@@ -17,7 +18,7 @@ from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.io.files import write_json
 from vico.world.borders import Side, border_findings, profile_of
-from vico.world.check import check_streets
+from vico.world.check import check_whole
 from vico.world.city import CityManifest, CityTile, read_city
 from vico.world.city_world import CityWorld
 from vico.world.folder import read_world
@@ -25,7 +26,7 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import Origin
 from vico.world.world import World
-from vico.worldgen.city_build import build_city, city_request, divide_map
+from vico.worldgen.city_build import bare_ground, build_city, city_request, divide_map
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
 from vico.worldgen.facts.streets import StreetPolygons
@@ -118,6 +119,29 @@ def test_streets_and_kerbs_of_two_tiles_are_the_same_at_their_border(planned: Ci
         assert np.array_equal(here, there), side
 
 
+def test_heights_that_cover_one_tile_alone_go_on_in_the_next(tmp_path: Path) -> None:
+    frame = LocalFrame(*CENTRE)
+    lat, lon = frame.to_geodetic(np.array([[-260.0, 260.0], [-40.0, -260.0]]))
+    step = 0.0002
+    rows, columns = int((lat[0] - lat[1]) / step), int((lon[1] - lon[0]) / step)
+    dem = tmp_path / "west.tif"
+    keys = (1, 1, 0, 3, 1024, 0, 1, 2, 1025, 0, 1, 2, 2048, 0, 1, 4326)
+    tags = [
+        (33550, "d", 3, (step, step, 0.0), False),
+        (33922, "d", 6, (0.0, 0.0, 0.0, float(lon[0]), float(lat[0]), 0.0), False),
+        (34735, "H", len(keys), keys, False),
+    ]
+    tifffile.imwrite(dem, np.full((rows, columns), 7.0, np.float32), extratags=tags)
+    request = CityRequest(Sources(EXTRACT, dem=(dem,)), *CENTRE, PAIR, 0, tmp_path / "city")
+    divide_map(request)
+    bare_ground(request)
+    assert [plan(request, tile) for tile in PAIR] == [{}, {}]
+    west, east = (kept_product(request.plans / tile_name(tile), "grading")[0] for tile in PAIR)
+    assert west.smooth([[0.0, 0.0]])[0] == pytest.approx(7.0, abs=0.3)
+    assert np.isfinite(east.smooth([[0.0, 0.0]])[0])
+    assert west.smooth([[80.0, 0.0]])[0] == pytest.approx(east.smooth([[-80.0, 0.0]])[0], abs=0.3)
+
+
 def _strip(ys: list[float], zs: list[float], *, east: bool, stuff: str = "ground") -> Surface:
     """Ground along a border at x = 80 or -80 with corners at some heights there."""
     x, inner = (80.0, 70.0) if east else (-80.0, -70.0)
@@ -185,7 +209,7 @@ def _check_whole(path: Path) -> None:
     """Check that a city opens as one world: everything once, streets and ways across borders."""
     world = read_world(path)
     assert isinstance(world, CityWorld)
-    assert check_streets(world) == []
+    assert check_whole(world) == []
     for name in ("buildings", "places", "entrances", "rooms", "parking"):
         ids = [one.id for one in getattr(world, name)]
         assert len(set(ids)) == len(ids), name

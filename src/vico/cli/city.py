@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from vico.cli.city_options import CityBuildOptions
-from vico.cli.output import check_output, print_json, print_table, progress_bars
+from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError
 from vico.world.city import read_city
 from vico.world.city_world import CityWorld
@@ -70,7 +70,7 @@ def info(path: Path, *, json: bool = False) -> int:
 def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
     """Check a city; 1 if anything is wrong."""
     from vico.world.borders import border_findings
-    from vico.world.check import check_streets, check_world
+    from vico.world.check import check_whole, check_world
 
     city = read_city(path)
     findings: list[str] = []
@@ -84,7 +84,7 @@ def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
             findings += [f"{tile.name}: {one.where}: {one.what}" for one in found]
             report("tiles", k, len(city.manifest.tiles))
         if tiles:
-            findings += [f"{one.where}: {one.what}" for one in check_streets(CityWorld(city))]
+            findings += [f"{one.where}: {one.what}" for one in check_whole(CityWorld(city))]
             report("streets", 1, 1)
     findings += [f"{name}: not built: {reason}" for name, reason in city.manifest.failed.items()]
     if json:
@@ -102,8 +102,5 @@ def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool =
 
     check_output(out, path, force=force)
     counts = export_city(read_city(path), to, out, rooms=rooms, force=force)
-    if json:
-        print_json({"format": to, "out": str(out), **counts})
-    else:
-        print(f"{out}: {to}, " + ", ".join(f"{number:,} {name}" for name, number in counts.items()))
+    print_export(out, to, counts, json=json)
     return 0

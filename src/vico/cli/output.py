@@ -114,3 +114,11 @@ def print_table(title: str, rows: Mapping[str, Any]) -> None:
     for name, value in rows.items():
         table.add_row(name, f"{value:,.2f}" if isinstance(value, float) else f"{value}")
     Console().print(table)
+
+
+def print_export(out: Path, to: str, counts: Mapping[str, int], *, json: bool) -> None:
+    """Say what was written in another format."""
+    if json:
+        print_json({"format": to, "out": str(out), **counts})
+    else:
+        print(f"{out}: {to}, " + ", ".join(f"{number:,} {name}" for name, number in counts.items()))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.cli.options import WorldBuildOptions
-from vico.cli.output import check_output, print_json, print_table, progress_bars
+from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
 from vico.world.stored import stage_seconds
@@ -252,8 +252,5 @@ def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool =
 
     check_output(out, path, force=force)
     counts = export_world(read_world(path), to, out, rooms=rooms, force=force)
-    if json:
-        print_json({"format": to, "out": str(out), **counts})
-    else:
-        print(f"{out}: {to}, " + ", ".join(f"{number:,} {name}" for name, number in counts.items()))
+    print_export(out, to, counts, json=json)
     return 0

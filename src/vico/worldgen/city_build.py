@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vico.errors import InputError
+from vico.errors import InputError, StageError
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, checked_extract, read_osm
@@ -101,11 +101,13 @@ def build_city(
     InputError
         If no tile could be built.
     VicoError
-        If the sources can't be used.
+        If the sources can't be used, and then a city that was there stays; or if the streets can't be made.
     """
     request.plans.mkdir(parents=True, exist_ok=True)
     data = divide_map(request)
-    _bare_ground(request)
+    bare_ground(request)
+    # The sources are good: from here on what the city has as a whole may be another one's until all is written.
+    (request.out / CITY).unlink(missing_ok=True)
     failed: dict[str, str] = {}
     found: dict[Tile, Any] = {}
     workers = min(workers, len(request.grid)) if ray is None else workers
@@ -133,7 +135,9 @@ def build_city(
             tiles = dict(found)
             maps = {one: request.out / TILES / tile_name(one) / "walkable.npz" for one in left}
             write_walking(request.out / WHOLE, request.grid, maps)
-            done("gates", left)
+            if lost := set(left).difference(done("gates", left)):
+                name = tile_name(min(lost))
+                raise StageError(f"city build: the ways out of tile {name} can't be found: {failed[name]}")
     if not left:
         raise InputError(f"{request.out}: no tile could be built: {next(iter(failed.values()))}")
     whole = request.out / WHOLE
@@ -179,7 +183,7 @@ def divide_map(request: CityRequest) -> OsmData:
     return replace(whole, half=request.grid.half, margin=whole.margin + HALO)
 
 
-def _bare_ground(request: CityRequest) -> None:
+def bare_ground(request: CityRequest) -> None:
     """Fit the bare ground of the whole city, if anything tells its heights."""
     if not request.sources.dem:
         return

@@ -122,10 +122,9 @@ def fit(request: CityRequest, tile: Tile) -> dict[str, Any]:
     there = {axis: request.out / TILES / tile_name(one) for axis, one in before.items()}
     there = {axis: folder for axis, folder in there.items() if (folder / STAGES / f"ground{SUFFIX}").exists()}
     made_of = [_head(folder / STAGES, name) for folder in (out, *there.values()) for name in ("ground", "wires")]
-    around = [
-        one for one in request.grid.around(tile) if (request.out / TILES / tile_name(one) / "world.json").exists()
-    ]
-    made_of += [_head(request.plans / tile_name(one), "buildings") for one in around]
+    folders = {one: request.out / TILES / tile_name(one) for one in request.grid.around(tile)}
+    around = [one for one, folder in folders.items() if (folder / "world.json").exists()]
+    made_of += [read_stored(folders[one]).manifest.files["buildings.json"] for one in around]
     known = _known(request, tile, "fit")
     if known is not None and read_stored(out).digest != known["found"]["digest"]:
         _forget(request, tile, "fit")  # it was built anew

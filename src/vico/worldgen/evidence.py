@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from vico.errors import InputError
+from vico.errors import EmptyInputError, InputError
 from vico.geo.buildings.files import checked_files, read_buildings
 from vico.geo.buildings.model import FoundBuildings
 from vico.geo.detections.model import Detections
@@ -105,7 +105,7 @@ def gather(
         else:
             data = stages.given(*part)
         finest = precedence is None or precedence.terrain == "finest"
-        samples = read_elevation(sources.dem, frame, half, finest_first=finest) if sources.dem else None
+        samples, without = _heights(sources, frame, half, finest_first=finest, part=part is not None)
         if samples is not None:
             stages.given(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
     stages.report(
@@ -119,6 +119,8 @@ def gather(
         },
         [Dropped(id=key, reason=reason) for key, reason in data.broken],
     )
+    if without is not None:
+        stages.report("map", {}, [without])
     if samples is not None and samples.beyond:
         stages.report(
             "map",
@@ -178,6 +180,20 @@ def gather(
         with stages.timed("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
+
+
+def _heights(
+    sources: Sources, frame: LocalFrame, half: float, *, finest_first: bool, part: bool
+) -> tuple[HeightSamples | None, Dropped | None]:
+    """Read the elevation files; where they have nothing of a part of a place, what lies around decides, and say so."""
+    if not sources.dem:
+        return None, None
+    try:
+        return read_elevation(sources.dem, frame, half, finest_first=finest_first), None
+    except EmptyInputError as error:
+        if not part:
+            raise
+        return None, Dropped(id=sources.dem[0].name, reason=str(error))
 
 
 def _precedence(sources: Sources) -> Precedence | None:

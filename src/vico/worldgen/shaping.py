@@ -173,7 +173,7 @@ def _terrain(
 ) -> tuple[HeightField, TileMesh | None]:
     """Make the bare ground of whatever tells heights; the tile mesh, if there is one, is raised to stand on it."""
     tiles, half, place = evidence.tiles, request.reach, request.place
-    if place is not None and evidence.samples is not None:
+    if place is not None and request.sources.dem:
         # Of the whole city at once: a fit to fewer samples is another one.
         whole = stages.given(*kept_product(place.plans, "terrain"))
         east, north = place.grid.centre(place.tile)

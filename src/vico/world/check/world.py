@@ -39,7 +39,7 @@ def check_world(world: World, *, part: bool = False) -> list[WorldFinding]:
     world
         As read from its folder.
     part
-        Whether it is a tile of a city, whose streets are the city's (`check_streets`).
+        Whether it is a tile of a city, whose streets are the city's (`check_whole`).
 
     Returns
     -------
@@ -49,9 +49,9 @@ def check_world(world: World, *, part: bool = False) -> list[WorldFinding]:
     return _checked(world, _RULES if part else (*_RULES, *_STREET_RULES))
 
 
-def check_streets(world: World) -> list[WorldFinding]:
-    """Check the streets, transit and entities of a city as one world; as `check_world`."""
-    return _checked(world, (*_STREET_RULES, check_entities, check_dropped))
+def check_whole(world: World) -> list[WorldFinding]:
+    """Check what a city has as a whole, and that its tiles' entities differ; as `check_world`."""
+    return _checked(world, (check_whole_files, *_STREET_RULES, check_entities, check_dropped))
 
 
 def _checked(world: World, rules: Iterable[_Rule]) -> list[WorldFinding]:
@@ -99,6 +99,16 @@ def check_files(world: World) -> Iterator[WorldFinding]:
     for name in there:
         if name in listed and sha256_of(world.path / name) != listed[name]:
             yield WorldFinding("file changed", name, "its SHA-256 is not the one in world.json")
+
+
+def check_whole_files(world: World) -> Iterator[WorldFinding]:
+    """Check that what a city has as a whole is what its manifest names."""
+    for name, digest in world.manifest.files.items():
+        path = world.file(name)
+        if not path.exists():
+            yield WorldFinding("file missing", name, "listed in city.json, but not there")
+        elif sha256_of(path) != digest:
+            yield WorldFinding("file changed", name, "its SHA-256 is not the one in city.json")
 
 
 def check_entities(world: World) -> Iterator[WorldFinding]:
