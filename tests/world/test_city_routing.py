@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 
 from vico.io.arrays import mapped_array
 from vico.world.city_files import COST, REACHED, ROOM, SURFACES
+from vico.world.city_gates import Gates, border_gates, tile_gates
 from vico.world.city_ground import whole_walkable
-from vico.world.city_routing import CityRouter, Gates, border_gates, tile_gates
+from vico.world.city_routing import CityRouter
+from vico.world.city_walk_lengths import CityWalkLengths
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
 from vico.worldgen.seams.grid import TileGrid, tile_name
@@ -52,8 +55,8 @@ def _opened(folder: Path, town: WalkableMap) -> CityRouter:
         write_walkable(tiles[tile], WalkableMap(np.ascontiguousarray(part), SIDE * 0.25))
     write_walking(folder, GRID, tiles)
     cost = mapped_array(folder / COST)
-    parts = [tile_gates(cost, square_of(tile, GRID, SIDE)) for tile in GRID]
-    gates = Gates(*(np.concatenate([getattr(one, name) for one in parts]) for name in Gates.__dataclass_fields__))
+    room = mapped_array(folder / ROOM)
+    gates = Gates.joined([tile_gates(cost, room, square_of(tile, GRID, SIDE), cell=0.5) for tile in GRID])
     return CityRouter(whole_walkable(folder, town.half), cost, gates, SIDE)
 
 
@@ -147,3 +150,18 @@ def test_every_stretch_of_a_border_that_can_be_walked_over_has_a_gate(costs: lis
             if any(0 < v < 400 for v in costs[start:k]):
                 assert all(row[g] < 400 for g in inside)
             start = None
+
+
+def test_lengths_of_many_walks_are_those_of_walks(town: WalkableMap, router: CityRouter) -> None:
+    """Cells of a metre and gates between: hardly longer, and hardly shorter where they cut a corner."""
+    lengths, whole, rng = CityWalkLengths(router, SIDE), Router(town), np.random.default_rng(8)
+    far = 0
+    for _ in range(150):
+        a, b = (tuple(town.random_point(rng).tolist()) for _ in range(2))
+        exact, found = whole.path(a, b), lengths.between(a, b)
+        assert exact is not None
+        assert _length(exact) * 0.97 - 3.0 <= found.metres <= _length(exact) * 1.06 + 20.0
+        assert found == lengths.between(a, b)
+        far += max(abs(p - q) for p, q in zip(a, b, strict=True)) > 400.0
+    assert far >= 3
+    assert math.isinf(lengths.between((0.0, 0.0), (5_000.0, 0.0)).metres)

@@ -35,11 +35,15 @@ def house() -> list[Room]:
     ]  # fmt: skip
 
 
+def _by_id(rooms: list[Room]) -> dict[str, Room]:
+    return {room.id: room for room in rooms}
+
+
 def test_a_room_costs_the_walk_through_those_before_it_and_a_moment_at_each_door() -> None:
-    found = IndoorWays(house()).from_street("hall")
+    found = IndoorWays(_by_id(house())).from_street("hall")
     assert found == pytest.approx({"hall": DOOR, "corridor": 3.0 + 2 * DOOR, "office": 3.0 + 9.0 + 3 * DOOR})
-    assert IndoorWays(house()).seconds(["hall", "corridor", "office"]) == pytest.approx(15.0)
-    assert IndoorWays(house()).seconds([]) == 0.0
+    assert IndoorWays(_by_id(house())).seconds(["hall", "corridor", "office"]) == pytest.approx(15.0)
+    assert IndoorWays(_by_id(house())).seconds([]) == 0.0
 
 
 def test_on_stairs_one_goes_up_one_flight_and_back_on_the_other() -> None:
@@ -54,7 +58,7 @@ def test_on_stairs_one_goes_up_one_flight_and_back_on_the_other() -> None:
 
 
 def test_every_room_of_a_real_city_is_reached_and_upper_floors_take_longer(helsinki: World) -> None:
-    ways = IndoorWays(helsinki.rooms)
+    ways = IndoorWays(helsinki.room_by_id)
     floor = {r.id: r.centre[2] for r in helsinki.rooms}
     higher = []
     for place in helsinki.places:

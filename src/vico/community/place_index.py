@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.community.hours import Span, open_spans
+from vico.community.place_rooms import PlaceRooms
 from vico.community.ride_times import RideTimes
 from vico.community.usual_hours import usual_spans
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
-from vico.rules import BED_WIDTH, WALK_SPEED
-from vico.world.indoor_ways import IndoorWays
+from vico.io.recent import Recent
+from vico.rules import WALK_SPEED
 from vico.world.model import Category, Place, Point2
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World
@@ -27,8 +28,8 @@ GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment",
 #: Distance that spawn points keep from each other, metres.
 SPAWN_GAP = 2.0
 
-# Rooms that one only passes through.
-_WAYS = frozenset({"corridor", "stairs", "lift", "lobby", "hall"})
+# Places whose estimates to all others are kept, 8 bytes each.
+_ESTIMATES = 2048
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
 
@@ -50,16 +51,14 @@ class PlaceIndex:
         self.router = world.router
         self.walks = Walks.of(world)
         self.place_by_id = {p.id: p for p in world.places}
-        rooms = world.rooms if any(p.rooms for p in world.places) else ()
-        self._rooms = {r.id: r for r in rooms}
         self.buildings = {b.id: b for b in world.buildings}
         self.spot = {p.id: k for k, p in enumerate(world.places)}
         self._positions = np.array([p.position[:2] for p in world.places], float).reshape(-1, 2)
         self._names = np.array([p.id for p in world.places])
-        ways = IndoorWays(rooms)
+        self._rooms = PlaceRooms.of(world)
         # From the street to the farthest room: whoever has come that far is there, whatever the room.
-        self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
-        self._estimates: dict[str, NDArray[np.int64]] = {}
+        self._inside = self._rooms.inside
+        self._estimates: Recent[str, NDArray[np.int64]] = Recent(_ESTIMATES)
         self._reachable: dict[str, bool] = {}
         self._hours: dict[tuple[str, int], list[Span]] = {}
 
@@ -110,13 +109,11 @@ class PlaceIndex:
 
     def beds(self, place: Place) -> int:
         """How many people can lie in the beds of a place: wide beds are for two."""
-        tops = (top for name in place.rooms for top in self._rooms[name].containers if top.kind == "bed")
-        return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in tops)
+        return int(self._rooms.beds[self.spot[place.id]])
 
     def floor_area(self, place: Place) -> float:
         """Square metres of a place's rooms, without corridors, stairs and lifts."""
-        rooms = (self._rooms[name] for name in place.rooms)
-        return sum(room.size[0] * room.size[1] for room in rooms if room.kind not in _WAYS)
+        return float(self._rooms.area[self.spot[place.id]])
 
     def same_building(self, a: str, b: str) -> bool:
         """Whether two places are under one roof, or the same."""
@@ -160,14 +157,15 @@ class PlaceIndex:
 
     def estimates(self, a: str, spots: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return `estimate` from a place to several, given as numbers of places (`spot`); the shape is theirs."""
-        if a not in self._estimates:
+        known = self._estimates.get(a)
+        if known is None:
             k = self.spot[a]
             far = np.hypot(*(self._positions - self._positions[k]).T)
             inside = self._inside + self._inside[k]
-            minutes = np.ceil((far * 1.5 + inside * 1.05 + 45) / 60).astype(np.int64)
-            minutes[k] = 0
-            self._estimates[a] = minutes
-        return self._estimates[a][spots]
+            known = np.ceil((far * 1.5 + inside * 1.05 + 45) / 60).astype(np.int64)
+            known[k] = 0
+            self._estimates.keep(a, known)
+        return known[spots]
 
     def metres(self, a: str, b: str) -> float:
         """Metres between two places as the crow flies: enough to tell near from far."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vico.clock import DAY
 from vico.community.model import Mode
-from vico.community.walks import Walk, Walks
+from vico.community.walks import Walks
 from vico.rules import BIKE_RATE, BIKE_SPEED, BUS_FARE, WALK_SPEED
 from vico.world.model import Point2
 from vico.world.timetable import LineTimes, TramTimes
@@ -23,6 +23,7 @@ from vico.world.transit_model import Stop, TramStop, Transit
 from vico.world.trips import AHEAD
 from vico.world.trips.network import ALIGHT, BOARD, DISMOUNT, MOUNT
 from vico.world.trips.ways import TURN
+from vico.world.walk_lengths import Walk
 
 # Metres that a walk may be shorter than the bee line: its ends may lie off what is walked on.
 _SNAP = 12.0

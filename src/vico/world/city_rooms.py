@@ -10,8 +10,9 @@ from typing import overload
 
 import numpy as np
 from pydantic import ValidationError
+from pydantic_core import from_json
 
-from vico.errors import MissingFileError
+from vico.errors import MissingFileError, SchemaError
 from vico.world.model import Room
 from vico.world.moving import Shift
 from vico.world.records import invalid
@@ -62,12 +63,28 @@ class CityRooms(Sequence[Room]):
         """Yield all rooms, without keeping them."""
         return map(self._read, range(len(self)))
 
-    def _read(self, number: int) -> Room:
+    def ids(self) -> Iterator[str]:
+        """Yield the ids of all rooms."""
+        for number in range(len(self)):
+            tile, line = self._line(number)
+            try:
+                # Not the whole room: what it holds takes ten times as long to read.
+                yield from_json(line)["id"]
+            except (ValueError, TypeError, KeyError) as error:
+                raise SchemaError(f"{self._files[tile][0]}: room {number}: {error}; build the city anew") from None
+
+    def _line(self, number: int) -> tuple[int, bytes]:
+        """Return the tile that a room is in, and what its file says of it."""
         tile = int(np.searchsorted(self._first, number, side="right")) - 1
-        row, (path, shift) = number - int(self._first[tile]), self._files[tile]
+        row = number - int(self._first[tile])
         start, end = self._ends[tile][row : row + 2].tolist()
+        return tile, self._maps[tile][start + 1 : end].rstrip(b",")
+
+    def _read(self, number: int) -> Room:
+        tile, line = self._line(number)
+        path, shift = self._files[tile]
         try:
-            return shift.room(Room.model_validate_json(self._maps[tile][start + 1 : end].rstrip(b",")))
+            return shift.room(Room.model_validate_json(line))
         except ValidationError as error:
             raise invalid(path, error) from None
 
@@ -83,7 +100,7 @@ class RoomsById(Mapping[str, Room]):
 
     def __init__(self, rooms: CityRooms) -> None:
         self._rooms = rooms
-        self._numbers = {room.id: k for k, room in enumerate(rooms)}
+        self._numbers = {name: k for k, name in enumerate(rooms.ids())}
 
     def __getitem__(self, key: str) -> Room:
         return self._rooms[self._numbers[key]]

@@ -17,16 +17,18 @@ from vico.io.arrays import mapped_array
 from vico.io.files import sha256_of
 from vico.world.city import CITY, City, CityTile
 from vico.world.city_files import COST, GATES, WHOLE
+from vico.world.city_gates import Gates
 from vico.world.city_ground import whole_ground, whole_walkable
 from vico.world.city_rooms import CityRooms, RoomsById
-from vico.world.city_routing import CityRouter, Gates
+from vico.world.city_routing import CityRouter
+from vico.world.city_walk_lengths import CityWalkLengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import Building, Entrance, Manifest, Place
 from vico.world.moving import Shift
 from vico.world.objects import Objects
-from vico.world.routing import Router
 from vico.world.street_model import ParkingSpot
+from vico.world.walk_lengths import CoarseWalkLengths, WalkLengths
 from vico.world.walkable import WalkableMap
 from vico.world.world import World
 
@@ -118,12 +120,19 @@ class CityWorld(World):
         return whole_walkable(self.city.path / WHOLE, self.half)
 
     @cached_property
-    def router(self) -> Router:
+    def router(self) -> CityRouter:
         """Finds ways on the walkable map: from gate to gate of the tiles."""
         whole = self.city.path / WHOLE
-        gates = Gates.read(whole / GATES)
-        side = round(self.city.manifest.size / self.walkable.cell)
-        return CityRouter(self.walkable, mapped_array(whole / COST), gates, side)
+        return CityRouter(self.walkable, mapped_array(whole / COST), Gates.read(whole / GATES), self._side)
+
+    @property
+    def _side(self) -> int:
+        """Cells of the walkable map along a tile's side."""
+        return round(self.city.manifest.size / self.walkable.cell)
+
+    def walk_lengths(self) -> WalkLengths:
+        """Return what measures many walks: from gate to gate, too."""
+        return CoarseWalkLengths(self.router) if self._side % 2 else CityWalkLengths(self.router, self._side)
 
     def surfaces(self, layer: str) -> list[Surface]:
         """Meshes of a layer of all tiles, ENU metres."""

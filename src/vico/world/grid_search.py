@@ -230,18 +230,18 @@ def backtrack(cost, costs, start, goal):  # type: ignore[no-untyped-def]
 @compiled
 def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
     """Cost of a straight walk between points in cell units, or -1 where there is no room for it."""
-    n = cost.shape[0]
+    height, width = cost.shape
     length = math.hypot(x1 - x0, y1 - y0)
     steps = max(1, math.ceil(length / 0.4))
     total = 0.0
     for k in range(steps + 1):
         t = k / steps
         x, y = x0 + (x1 - x0) * t, y0 + (y1 - y0) * t
-        i, j = min(n - 1, max(0, int(x))), min(n - 1, max(0, int(y)))
+        i, j = min(width - 1, max(0, int(x))), min(height - 1, max(0, int(y)))
         if cost[j, i] == 0 or (checks and blocked[j, i]):
             return -1.0
-        u, v = min(n - 1.0, max(0.0, x - 0.5)), min(n - 1.0, max(0.0, y - 0.5))
-        a, b = min(n - 2, int(u)), min(n - 2, int(v))
+        u, v = min(width - 1.0, max(0.0, x - 0.5)), min(height - 1.0, max(0.0, y - 0.5))
+        a, b = min(width - 2, int(u)), min(height - 2, int(v))
         fu, fv = u - a, v - b
         room = (clearance[b, a] * (1 - fu) + clearance[b, a + 1] * fu) * (1 - fv) + (
             clearance[b + 1, a] * (1 - fu) + clearance[b + 1, a + 1] * fu

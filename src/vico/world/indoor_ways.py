@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from vico.rules import STAIRS_SPEED, WALK_SPEED
 from vico.world.model import LANDING, LIFT, Doorway, Point3, Room
@@ -27,11 +27,11 @@ class IndoorWays:
     Parameters
     ----------
     rooms
-        Of a world; those of a place are joined by their doors.
+        Of a world, by their ids; those of a place are joined by their doors.
     """
 
-    def __init__(self, rooms: Iterable[Room]) -> None:
-        self._rooms = {room.id: room for room in rooms}
+    def __init__(self, rooms: Mapping[str, Room]) -> None:
+        self._rooms = rooms
         self._from_street: dict[str, dict[str, float]] = {}
 
     def from_street(self, first: str) -> dict[str, float]:

@@ -79,14 +79,22 @@ class Shift:
 
     def entity(self, number: int) -> int:
         """Return an entity's number in the city."""
-        return int(self.numbers(np.array([number]))[0])
+        self._check(number)
+        return number + self.entities if self._is_own(number) else number
 
     def numbers(self, entities: NDArray[Any]) -> NDArray[np.int32]:
         """Return numbers of entities in the city, shaped as those in the tile."""
+        self._check(int(entities.max(initial=0)))
         own = (entities >= FIRST_BUILDING) & ((entities < FIRST_STOP) | (entities >= FIRST_ROOM))
-        if entities.max(initial=0) >= _EACH:
-            raise SchemaError(f"tile {self.name}: entity {entities.max()}; a tile of a city has fewer than {_EACH}")
         return np.where(own, entities + self.entities, entities).astype(np.int32)
+
+    def _check(self, number: int) -> None:
+        if number >= _EACH:
+            raise SchemaError(f"tile {self.name}: entity {number}; a tile of a city has fewer than {_EACH}")
+
+    @staticmethod
+    def _is_own(number: int) -> bool:
+        return number >= FIRST_BUILDING and (number < FIRST_STOP or number >= FIRST_ROOM)
 
     def building(self, building: Building) -> Building:
         """Move a building."""

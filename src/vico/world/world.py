@@ -22,6 +22,7 @@ from vico.world.routing import Router
 from vico.world.street_model import ParkingSpot, Roads
 from vico.world.transit_model import Transit
 from vico.world.trips import Trips
+from vico.world.walk_lengths import CoarseWalkLengths, WalkLengths
 from vico.world.walkable import WalkableMap, read_walkable
 
 if TYPE_CHECKING:
@@ -134,6 +135,10 @@ class World:
     def router(self) -> Router:
         """Finds ways on the walkable map."""
         return Router(self.walkable)
+
+    def walk_lengths(self) -> WalkLengths:
+        """Return what measures many walks; who made it keeps it, for it takes some memory."""
+        return CoarseWalkLengths(self.router)
 
     @cached_property
     def trips(self) -> Trips:

@@ -15,8 +15,8 @@ from vico.io.arrays import mapped_array
 from vico.io.files import read_json, write_json
 from vico.world.borders import Side, profile_of
 from vico.world.city import TILES
-from vico.world.city_files import COST, WHOLE
-from vico.world.city_routing import tile_gates
+from vico.world.city_files import COST, ROOM, WHOLE
+from vico.world.city_gates import tile_gates
 from vico.world.glb import write_glb
 from vico.world.mesh import Surface, joined
 from vico.world.model import Building
@@ -162,13 +162,15 @@ def _drawn(tile: Path) -> list[Surface]:
 
 def gates(request: CityRequest, tile: Tile) -> dict[str, Any]:
     """Find where one walks from a tile into others, and what ways between these places cost."""
-    cost = mapped_array(request.out / WHOLE / COST)
+    cost, room = (mapped_array(request.out / WHOLE / name) for name in (COST, ROOM))
     square = square_of(tile, request.grid, len(cost) // (2 * request.grid.reach + 1))
     wide = around(square, 1)[0]
     made_of = [str(square), sha256(np.ascontiguousarray(cost[wide]).tobytes()).hexdigest()]
+    made_of.append(sha256(np.ascontiguousarray(room[square]).tobytes()).hexdigest())
+    cell = request.grid.size / (square[0].stop - square[0].start)
 
     def made() -> dict[str, Any]:
-        keep_product(request.plans / tile_name(tile), GATES, tile_gates(cost, square))
+        keep_product(request.plans / tile_name(tile), GATES, tile_gates(cost, room, square, cell=cell))
         return {}
 
     return _unless_kept(request, tile, "gates", made_of, made)

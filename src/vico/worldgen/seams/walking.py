@@ -15,7 +15,7 @@ from vico.io.arrays import new_array
 from vico.io.files import write_bytes
 from vico.io.npz import npz_bytes
 from vico.world.city_files import COST, GATES, REACHED, ROOM, SURFACES
-from vico.world.city_routing import Gates
+from vico.world.city_gates import Gates
 from vico.world.disjoint import DisjointSets
 from vico.world.routing import walking_costs
 from vico.world.walkable import BLOCKED, WalkableMap, read_walkable
@@ -56,8 +56,7 @@ def write_walking(folder: Path, grid: TileGrid, tiles: Mapping[Tile, Path]) -> N
 
 def write_gates(folder: Path, gates: Sequence[Gates]) -> None:
     """Write the gates of all tiles of a city as one table."""
-    whole = Gates(*(np.concatenate([getattr(part, name) for part in gates]) for name in Gates.__dataclass_fields__))
-    write_bytes(folder / GATES, npz_bytes(whole.arrays()))
+    write_bytes(folder / GATES, npz_bytes(Gates.joined(gates).arrays()))
 
 
 def around(square: tuple[slice, slice], cells: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:

@@ -1,0 +1,266 @@
+"""Where one walks from a city's tiles into others, and what walks between these places cost.
+
+Where two tiles meet there are gates: the middle of each stretch of the border that can be walked over. Each tile knows
+the walks between its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import SchemaError
+from vico.io.npz import read_npz
+from vico.world.grid_search import CELL, RING, STRAIGHT, SearchMemory, backtrack, pull, search
+from vico.world.routing import WEIGHTS
+from vico.world.walkable import ROADWAY
+
+Ints = NDArray[np.int64]
+
+# A gate for so many cells side by side.
+_GATE = 64
+_NOTHING = np.zeros((0, 0), np.bool_)
+
+
+@dataclass(frozen=True)
+class Gates:
+    """Gates of a city's tiles, and the walks between them.
+
+    Attributes
+    ----------
+    cells
+        The cell on one side of a border of each, number in the city's map, int64, shape ``(n,)``.
+    start, end
+        Between which gates walks lead, within a tile or over a border: cells, int64, shape ``(m,)``; each pair once.
+    cost
+        What they cost, int64, shape ``(m,)``.
+    metres, corners
+        How long they are, and how many corners they have between their ends, float64 and int64, shape ``(m,)``.
+    """
+
+    cells: Ints
+    start: Ints
+    end: Ints
+    cost: Ints
+    metres: NDArray[np.float64]
+    corners: Ints
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return them as named arrays, for a file."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+    @classmethod
+    def joined(cls, parts: Sequence[Gates]) -> Gates:
+        """Return the gates of several tiles as one table."""
+        return cls(*(np.concatenate([getattr(one, name) for one in parts]) for name in cls.__dataclass_fields__))
+
+    @classmethod
+    def read(cls, path: Path) -> Gates:
+        """Read what was written of `arrays`.
+
+        Raises
+        ------
+        SchemaError
+            If the file does not hold them.
+        """
+        arrays = read_npz(path.read_bytes())
+        missing = sorted(set(cls.__dataclass_fields__) - set(arrays))
+        if missing:
+            raise SchemaError(f"{path}: has no {', '.join(missing)}; build the city anew")
+        whole = {k: np.ascontiguousarray(arrays[k], np.int64) for k in cls.__dataclass_fields__ if k != "metres"}
+        return cls(**whole, metres=np.ascontiguousarray(arrays["metres"], np.float64))
+
+
+class Reached(NamedTuple):
+    """Walks from a cell to others, an entry each.
+
+    Attributes
+    ----------
+    cost
+        int64; -1 where there is none.
+    metres, corners
+        float64 and int64.
+    """
+
+    cost: Ints
+    metres: NDArray[np.float64]
+    corners: Ints
+
+
+class Window:
+    """Searches the cells of a rectangle of a map.
+
+    Parameters
+    ----------
+    cost
+        Of its cells, int32, contiguous.
+    row, column
+        Of its south-western cell in the map.
+    width
+        Of the map, cells.
+    """
+
+    def __init__(self, cost: NDArray[np.int32], row: int, column: int, width: int) -> None:
+        self._cost, self._row, self._column, self._width = cost, row, column, width
+        self._memory = SearchMemory(np.zeros(cost.size, CELL), np.empty(RING, np.int32))
+        self._landmarks = np.zeros((cost.size, 0), np.int32)
+        self._generation = 0
+
+    def own(self, cells: Ints) -> Ints:
+        """Return the numbers in the window of cells of the map."""
+        rows, columns = cells // self._width - self._row, cells % self._width - self._column
+        return np.asarray(rows * self._cost.shape[1] + columns, np.int64)
+
+    def costs(self, start: int, goals: Ints) -> Ints:
+        """Return what walks from a cell of the map to others cost; -1 where there is none."""
+        self._search(start, -1)
+        own = self.own(goals)
+        final = self._memory.cells["stamp"][own] == self._generation + 1
+        return np.where(final, self._memory.cells["g"][own], -1).astype(np.int64)
+
+    def reached(self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float) -> Reached:
+        """Return what walks from a cell of the map to others cost, and how long they are, pulled straight.
+
+        Parameters
+        ----------
+        start, goals
+            Numbers of cells in the map.
+        clearance
+            Room to walls of the window's cells, metres.
+        cell
+            Side of a cell, metres.
+        """
+        cost = self.costs(start, goals)
+        metres, corners = np.zeros(len(goals)), np.zeros(len(goals), np.int64)
+        first = int(self.own(np.array([start]))[0])
+        for k, last in enumerate(self.own(goals).tolist()):
+            if cost[k] > 0:
+                metres[k], corners[k] = self._length(first, last, clearance, cell)
+        return Reached(cost, metres, corners)
+
+    def length(self, start: int, goal: int, clearance: NDArray[np.float32], cell: float) -> tuple[float, int] | None:
+        """Return how long the cheapest walk between two cells of the map is, and its corners; None if there is none."""
+        if start == goal:
+            return 0.0, 0
+        if not self._search(start, goal):
+            return None
+        first, last = self.own(np.array([start, goal])).tolist()
+        return self._length(first, last, clearance, cell)
+
+    def walk(self, start: int, goal: int) -> tuple[Ints, Ints] | None:
+        """Return the cells of the cheapest walk between two cells of the map, and its cost up to each."""
+        if not self._search(start, goal):
+            return None
+        first, last = self.own(np.array([start, goal])).tolist()
+        cells, costs = self._found(first, last)
+        side = self._cost.shape[1]
+        return (cells // side + self._row) * self._width + cells % side + self._column, costs
+
+    def _search(self, start: int, goal: int) -> bool:
+        self._generation += 2
+        first, last = self.own(np.array([start, max(goal, 0)])).tolist()
+        last = last if goal >= 0 else -1
+        return bool(search(self._cost, self._memory, first, last, self._generation, self._landmarks))
+
+    def _found(self, first: int, last: int) -> tuple[Ints, Ints]:
+        known = self._memory.cells["g"], self._memory.cells["stamp"], self._generation + 1
+        cells = backtrack(self._cost, known, first, last)
+        return cells, self._memory.cells["g"][cells].astype(np.int64)
+
+    def _length(self, first: int, last: int, clearance: NDArray[np.float32], cell: float) -> tuple[float, int]:
+        cells, g = self._found(first, last)
+        side = self._cost.shape[1]
+        points = np.column_stack([cells % side, cells // side]) + 0.5
+        kept = points[pull(self._cost, clearance, _NOTHING, False, points, g)]
+        return float(np.hypot(*np.diff(kept, axis=0).T).sum()) * cell, max(0, len(kept) - 2)
+
+
+def border_gates(mine: NDArray[np.int32], theirs: NDArray[np.int32]) -> list[int]:
+    """Return where gates are along a border, given the costs of the cells on both sides of it.
+
+    Returns
+    -------
+    list of int
+        Numbers of cells along it: the middle of each stretch that can be walked over without stepping on a roadway, and
+        of stretches that are roadway all along.
+    """
+    step = np.where((mine > 0) & (theirs > 0), np.maximum(mine, theirs), 0)
+    found: list[int] = []
+    for start, end in _runs(step > 0):
+        walkways = [(start + a, start + b) for a, b in _runs(step[start:end] < WEIGHTS[ROADWAY])]
+        for a, b in walkways or [(start, end)]:
+            pieces = max(1, math.ceil((b - a) / _GATE))
+            found += [a + (b - a) * (2 * k + 1) // (2 * pieces) for k in range(pieces)]
+    return found
+
+
+def _runs(on: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where stretches of True begin and end."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def tile_gates(
+    cost: NDArray[np.int32], clearance: NDArray[np.float32], square: tuple[slice, slice], *, cell: float
+) -> Gates:
+    """Find a tile's gates, the walks between them, and the steps over its eastern and northern border.
+
+    Parameters
+    ----------
+    cost, clearance
+        Of all cells of the city.
+    square
+        Rows and columns of the tile.
+    cell
+        Side of a cell, metres.
+    """
+    height, width = cost.shape
+    (bottom, top), (left, right) = ((part.start, part.stop) for part in square)
+    sides = [
+        ((slice(bottom, top), right - 1), (0, 1)),
+        ((top - 1, slice(left, right)), (1, 0)),
+        ((slice(bottom, top), left), (0, -1)),
+        ((bottom, slice(left, right)), (-1, 0)),
+    ]
+    own: list[int] = []
+    walks: list[tuple[int, int, int, float, int]] = []
+    for (rows, columns), (up, aside) in sides:
+        there = tuple(_shifted(part, by) for part, by in ((rows, up), (columns, aside)))
+        if not all(_within(part, size) for part, size in zip(there, (height, width), strict=True)):
+            continue
+        mine, theirs = cost[rows, columns], cost[there]
+        for k in border_gates(mine, theirs):
+            row = rows.start + k if isinstance(rows, slice) else rows
+            column = columns.start + k if isinstance(columns, slice) else columns
+            own.append(row * width + column)
+            if up + aside > 0:
+                other = (row + up) * width + column + aside
+                walks.append((own[-1], other, STRAIGHT * (int(mine[k]) + int(theirs[k])) // 2, cell, 0))
+    cells = np.unique(np.array(own, np.int64))
+    window = Window(np.ascontiguousarray(cost[square]), bottom, left, width)
+    room = np.ascontiguousarray(clearance[square], np.float32)
+    for k, first in enumerate(cells.tolist()):
+        rest = cells[k + 1 :]
+        found = window.reached(first, rest, room, cell)
+        for other, far, metres, corners in zip(rest.tolist(), *(part.tolist() for part in found), strict=True):
+            if far >= 0:
+                walks.append((first, other, far, round(metres, 2), corners))
+    ends = np.array([walk[:3] for walk in walks], np.int64).reshape(-1, 3)
+    metres = np.array([walk[3] for walk in walks], np.float64)
+    corners = np.array([walk[4] for walk in walks], np.int64)
+    start, end, far = ends.T
+    return Gates(cells, start, end, far, metres, corners)
+
+
+def _shifted(part: slice | int, by: int) -> slice | int:
+    return slice(part.start + by, part.stop + by) if isinstance(part, slice) else part + by
+
+
+def _within(part: slice | int, size: int) -> bool:
+    return part.start >= 0 and part.stop <= size if isinstance(part, slice) else 0 <= part < size

@@ -1,0 +1,158 @@
+"""The cheapest ways over the gates of a city, looked for in compiled code: a large city has thousands of gates."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
+from vico.world.city_gates import Gates, Ints
+from vico.world.grid_search import DIAGONAL, STRAIGHT
+
+_FAR = np.int64(1) << 60
+
+
+class GateGraph:
+    """Which gates lead to which, and at what cost.
+
+    Parameters
+    ----------
+    gates
+        Of a city.
+    width
+        Of its map, cells.
+    side
+        Cells along a tile's side.
+
+    Attributes
+    ----------
+    cells
+        The gates, number of the cell of each, rising.
+    """
+
+    def __init__(self, gates: Gates, width: int, side: int) -> None:
+        self.cells = np.unique(np.concatenate([gates.cells, gates.start, gates.end]))
+        self._width, self._side = width, side
+        first, last = (np.searchsorted(self.cells, part) for part in (gates.start, gates.end))
+        starts, ends = np.concatenate([first, last]), np.concatenate([last, first])
+        order = np.lexsort((ends, starts))
+        self._ends = ends[order]
+        self._costs = np.tile(gates.cost, 2)[order]
+        self._metres = np.tile(gates.metres, 2)[order]
+        self._corners = np.tile(gates.corners, 2)[order]
+        self._first = np.searchsorted(starts[order], np.arange(len(self.cells) + 1))
+
+    @cached_property
+    def _by_tile(self) -> dict[tuple[int, int], Ints]:
+        tiles = np.column_stack([self.cells // self._width, self.cells % self._width]) // self._side
+        found: dict[tuple[int, int], list[int]] = {}
+        for number, (row, column) in enumerate(tiles.tolist()):
+            found.setdefault((row, column), []).append(number)
+        return {tile: np.array(numbers, np.int64) for tile, numbers in found.items()}
+
+    def of_tile(self, tile: tuple[int, int]) -> Ints:
+        """Return the numbers of the gates of a tile, given by its row and column."""
+        return self._by_tile.get(tile, np.zeros(0, np.int64))
+
+    def edge(self, a: int, b: int) -> int:
+        """Return the number of the walk from gate to gate; -1 if there is none."""
+        begin, end = self._first[a : a + 2].tolist()
+        k = begin + int(np.searchsorted(self._ends[begin:end], b))
+        return k if k < end and self._ends[k] == b else -1
+
+    def cost(self, a: int, b: int) -> int:
+        """Return what the walk from gate to gate costs; -1 if there is none."""
+        k = self.edge(a, b)
+        return -1 if k < 0 else int(self._costs[k])
+
+    def length(self, a: int, b: int) -> tuple[float, int]:
+        """Return how long the walk from gate to gate is, metres, and its corners."""
+        k = self.edge(a, b)
+        return float(self._metres[k]), int(self._corners[k])
+
+    def cheapest(
+        self,
+        leaving: tuple[Ints, Ints],
+        arriving: tuple[Ints, Ints],
+        goal: int,
+        changed: Mapping[tuple[int, int], int] | None = None,
+    ) -> list[int]:
+        """Return the gates of the cheapest way.
+
+        Parameters
+        ----------
+        leaving, arriving
+            Gates by number that lie in the tile of the start and of the goal, and the costs from the one and to the
+            other; below 0 where there is no walk.
+        goal
+            Its cell.
+        changed
+            What walks from gate to gate cost instead; below 0 if there is none now.
+
+        Returns
+        -------
+        list of int
+            Empty if there is no way.
+        """
+        costs = self._costs
+        if changed:
+            costs = costs.copy()
+            for (a, b), cost in changed.items():
+                k = self.edge(a, b)
+                if k >= 0:
+                    costs[k] = cost
+        graph = self.cells, self._first, self._ends, costs
+        found: NDArray[np.int64] = _cheapest(graph, *leaving, *arriving, goal, self._width)
+        return found.tolist()
+
+
+@compiled
+def _least(cell, goal, width):  # type: ignore[no-untyped-def]
+    """Return a cost that no walk between two cells is below."""
+    dx, dy = abs(cell % width - goal % width), abs(cell // width - goal // width)
+    return 100 * (STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy))
+
+
+@compiled
+def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # type: ignore[no-untyped-def]
+    """Run A* over the gates; of ways that cost the same, the gates with the lower numbers are taken first."""
+    cells, first, ends, costs = graph
+    count = len(cells)
+    best, came = np.full(count, _FAR), np.full(count, -1)
+    onward, done = np.full(count, -1), np.zeros(count, np.bool_)
+    for k in range(len(arrive)):
+        onward[arrive[k]] = arrive_costs[k]
+    queue = [(np.int64(0), np.int64(-1))]
+    queue.pop()
+    for k in range(len(leave)):
+        if 0 <= leave_costs[k] < best[leave[k]]:
+            best[leave[k]] = leave_costs[k]
+            heapq.heappush(queue, (leave_costs[k] + _least(cells[leave[k]], goal, width), leave[k]))
+    total, last = _FAR, np.int64(-1)
+    while len(queue) > 0:
+        bound, node = heapq.heappop(queue)
+        if bound >= total:
+            break
+        if done[node]:
+            continue
+        done[node] = True
+        if onward[node] >= 0 and best[node] + onward[node] < total:
+            total, last = best[node] + onward[node], node
+        for k in range(first[node], first[node + 1]):
+            other = ends[k]
+            if costs[k] < 0 or done[other]:
+                continue
+            value = best[node] + costs[k]
+            if value < best[other]:
+                best[other], came[other] = value, node
+                heapq.heappush(queue, (value + _least(cells[other], goal, width), other))
+    way = [np.int64(0)]
+    way.pop()
+    while last >= 0:
+        way.append(np.int64(last))
+        last = came[last]
+    return np.array(way[::-1], np.int64)
