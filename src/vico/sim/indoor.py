@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,9 @@ from scipy import ndimage
 
 from vico.io.compiled import compiled
 from vico.sim.collisions import box_gap, gap_to, room_gap
+from vico.sim.room_doors import Door, DoorsListed
 from vico.sim.state import RADIUS
+from vico.world.city_rooms import numbers_of
 from vico.world.model import FLIGHT_STEPS, LANDING, Entrance, Place, Room
 from vico.world.objects import Objects
 
@@ -28,18 +30,6 @@ _SAMPLES = 16
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
 # Kinds of rooms in whose seats nobody sits down who finds another one: they would be in the way.
 _PASSAGES = frozenset({"hall", "corridor"})
-
-
-@dataclass(frozen=True)
-class Door:
-    """A way out of a room: to the room with index `to`, or outdoors where `to` is -1.
-
-    `inside` is the free spot of this room where people stand who come in by it; None in worlds that don't say.
-    """
-
-    to: int
-    position: tuple[float, float, float]
-    inside: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -59,43 +49,42 @@ class Indoor:
         Ways out of each room.
     place
         Index of the place each room belongs to, -1 if it is not a place of this world.
+    treads
+        Depth of the treads of each room's stairs, metres, 0 where it has none; and last 0 for those who are in none,
+        shape ``(r + 1,)``.
+    climbs, is_passage
+        Whether each room's floor climbs, and whether people only pass through it, bool, shape ``(r,)``.
     """
 
     rooms: Sequence[Room]
-    index: dict[str, int]
+    index: Mapping[str, int]
     boxes: NDArray[np.float64]
     floor: NDArray[np.float64]
     furniture: NDArray[np.float64]
     furniture_start: NDArray[np.int64]
-    doors: list[list[Door]]
+    doors: Sequence[Sequence[Door]]
     place: NDArray[np.int32]
+    treads: NDArray[np.float64]
+    climbs: NDArray[np.bool_]
+    is_passage: NDArray[np.bool_]
 
     @classmethod
     def from_world(cls, rooms: Sequence[Room], places: Sequence[Place], objects: Objects) -> Indoor:
-        """Pack the rooms, and the solid objects that stand in them."""
-        index = {room.id: i for i, room in enumerate(rooms)}
-        boxes = np.array([[*r.centre[:2], r.yaw, r.size[0] / 2, r.size[1] / 2] for r in rooms]).reshape(-1, 5)
-        rows: list[list[list[float]]] = [[] for _ in rooms]
-        for k in np.flatnonzero(np.asarray(objects.solid, bool) & (objects.room != "")):
-            room = index.get(str(objects.room[k]))
-            if room is not None:
-                o = objects
-                rows[room].append(
-                    [float(o.x[k]), float(o.y[k]), float(o.yaw[k]), float(o.size_x[k]) / 2, float(o.size_y[k]) / 2]
-                )
-        furniture = np.array([row for one in rows for row in one], np.float64).reshape(-1, 5)
-        start = np.cumsum([0, *(len(one) for one in rows)]).astype(np.int64)
-        number = {place.id: i for i, place in enumerate(places)}
-        return cls(
-            rooms,
-            index,
-            boxes,
-            np.array([r.centre[2] for r in rooms], np.float64),
-            furniture,
-            start,
-            _doors(rooms, places, index),
-            np.array([number.get(r.place, -1) for r in rooms], np.int32),
-        )
+        """Pack the rooms, each of which is looked at once, and the solid objects that stand in them."""
+        index = numbers_of(rooms)
+        place_number = {place.id: i for i, place in enumerate(places)}
+        boxes, floor, treads = np.zeros((len(rooms), 5)), np.zeros(len(rooms)), np.zeros(len(rooms) + 1)
+        climbs, is_passage = (np.zeros(len(rooms), np.bool_) for _ in range(2))
+        place, doors = np.full(len(rooms), -1, np.int32), DoorsListed(index)
+        for i, room in enumerate(rooms):
+            boxes[i] = *room.centre[:2], room.yaw, room.size[0] / 2, room.size[1] / 2
+            floor[i], place[i] = room.centre[2], place_number.get(room.place, -1)
+            climbs[i], is_passage[i] = bool(room.rise), room.kind in _PASSAGES
+            treads[i] = (room.size[0] - 2 * LANDING) / FLIGHT_STEPS if room.rise else 0.0
+            doors.tell(i, room)
+        furniture, start = _furniture(objects, index, len(rooms))
+        ways = doors.doors(rooms, places)
+        return cls(rooms, index, boxes, floor, furniture, start, ways, place, treads, climbs, is_passage)
 
     def floor_at(self, room: int, xy: ArrayLike) -> float:
         """Height of a room's floor at a point, metres: on stairs it depends on where one stands."""
@@ -107,32 +96,18 @@ class Indoor:
     def floors_at(self, rooms: NDArray[np.int32], xy: NDArray[np.float64]) -> NDArray[np.float64]:
         """Heights of the floors under several people, metres, shape ``(n,)``."""
         heights: NDArray[np.float64] = self.floor[rooms]
-        for k in np.flatnonzero(self._climbs[rooms]):
+        for k in np.flatnonzero(self.climbs[rooms]):
             heights[k] = self.floor_at(int(rooms[k]), xy[k])
         return heights
 
     def treads_under(self, rooms: NDArray[np.int32]) -> NDArray[np.float64]:
         """Depth of the treads of the stairs that several people are on, metres, shape ``(n,)``; 0 elsewhere."""
-        return self._treads[rooms]
+        return self.treads[rooms]
 
     @cached_property
     def stairs(self) -> frozenset[int]:
         """Rooms whose floor climbs."""
-        return frozenset(i for i, room in enumerate(self.rooms) if room.rise)
-
-    @cached_property
-    def _treads(self) -> NDArray[np.float64]:
-        """Of each room, and last 0 for those who are in none."""
-        return np.array([(r.size[0] - 2 * LANDING) / FLIGHT_STEPS if r.rise else 0.0 for r in self.rooms] + [0.0])
-
-    @cached_property
-    def is_passage(self) -> NDArray[np.bool_]:
-        """Whether people only pass through each room."""
-        return np.array([room.kind in _PASSAGES for room in self.rooms], np.bool_)
-
-    @cached_property
-    def _climbs(self) -> NDArray[np.bool_]:
-        return np.array([bool(room.rise) for room in self.rooms], bool)
+        return frozenset(np.flatnonzero(self.climbs).tolist())
 
     def arrival(self, room: int, origin: int) -> NDArray[np.float64]:
         """Where people stand who come into a room from another one (-1: from outdoors), ENU metres."""
@@ -315,38 +290,6 @@ class Indoor:
         return spot
 
 
-def _doors(rooms: Sequence[Room], places: Sequence[Place], index: dict[str, int]) -> list[list[Door]]:
-    """Ways out, as the rooms list them.
-
-    Where a room lists none, a place's first room leads outdoors by its own door, and a further room's door leads to
-    those it links.
-    """
-    doors: list[list[Door]] = [[] for _ in rooms]
-    listed = {i for i, room in enumerate(rooms) if room.doors}
-    for i in sorted(listed):
-        for way in rooms[i].doors:
-            to = index.get(way.to, -2) if way.to else -1
-            if to >= -1:
-                doors[i].append(Door(to, way.position, way.inside))
-    rank = {}
-    for place in places:
-        for k, room_id in enumerate(place.rooms):
-            rank[room_id] = k
-            if k == 0 and room_id in index and index[room_id] not in listed:
-                doors[index[room_id]].append(Door(-1, rooms[index[room_id]].door))
-    for i, room in enumerate(rooms):
-        for other_id in room.links:
-            j = index.get(other_id)
-            if j is None or i in listed or any(d.to == j for d in doors[i]):
-                continue
-            # The doorway between two rooms is the door of the one further in.
-            inner = i if rank.get(room.id, 0) > rank.get(other_id, 0) else j
-            doors[i].append(Door(j, rooms[inner].door))
-            if j not in listed and not any(d.to == i for d in doors[j]):
-                doors[j].append(Door(i, rooms[inner].door))
-    return doors
-
-
 @compiled
 def _free_room(points, box, furniture):  # type: ignore[no-untyped-def]
     """Distance from points of a room to the nearest wall or piece of furniture, metres; negative in one."""
@@ -358,6 +301,18 @@ def _free_room(points, box, furniture):  # type: ignore[no-untyped-def]
             gap = min(gap, gap_to(x, y, furniture[f]))
         out[k] = gap
     return out
+
+
+def _furniture(objects: Objects, index: Mapping[str, int], rooms: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the outlines of the solid things in rooms, room by room, and where those of each room begin."""
+    inside = np.flatnonzero(np.asarray(objects.solid, bool) & (objects.room != ""))
+    room = np.array([index.get(name, -1) for name in objects.room[inside].tolist()], np.int64)
+    inside, room = inside[room >= 0], room[room >= 0]
+    order = np.argsort(room, kind="stable")
+    inside = inside[order]
+    columns = objects.x, objects.y, objects.yaw, objects.size_x / 2, objects.size_y / 2
+    rows = np.column_stack([column[inside] for column in columns]).astype(np.float64)
+    return rows, np.searchsorted(room[order], np.arange(rooms + 1)).astype(np.int64)
 
 
 def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import overload
 
@@ -18,7 +18,7 @@ from vico.world.moving import Shift
 from vico.world.records import invalid
 
 # Rooms that are kept: those that a community is in, and more.
-_KEPT = 32_768
+_KEPT = 8192
 
 
 class CityRooms(Sequence[Room]):
@@ -63,8 +63,12 @@ class CityRooms(Sequence[Room]):
         """Yield all rooms, without keeping them."""
         return map(self._read, range(len(self)))
 
-    def ids(self) -> Iterator[str]:
-        """Yield the ids of all rooms."""
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Number of each room by its id."""
+        return {name: k for k, name in enumerate(self._ids())}
+
+    def _ids(self) -> Iterator[str]:
         for number in range(len(self)):
             tile, line = self._line(number)
             try:
@@ -89,6 +93,11 @@ class CityRooms(Sequence[Room]):
             raise invalid(path, error) from None
 
 
+def numbers_of(rooms: Sequence[Room]) -> Mapping[str, int]:
+    """Return the number of each of some rooms by its id."""
+    return rooms.numbers if isinstance(rooms, CityRooms) else {room.id: k for k, room in enumerate(rooms)}
+
+
 class RoomsById(Mapping[str, Room]):
     """Rooms of a city by their ids.
 
@@ -100,7 +109,7 @@ class RoomsById(Mapping[str, Room]):
 
     def __init__(self, rooms: CityRooms) -> None:
         self._rooms = rooms
-        self._numbers = {name: k for k, name in enumerate(rooms.ids())}
+        self._numbers = rooms.numbers
 
     def __getitem__(self, key: str) -> Room:
         return self._rooms[self._numbers[key]]
