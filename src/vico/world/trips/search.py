@@ -140,7 +140,7 @@ def _settle(question: Question, depart: float) -> list[Label]:
             if not question.all_good:
                 return [label]
             continue
-        for after, left in _steps(question, label):
+        for after, left in _steps(question, label, limit):
             if after.price > question.cash or after.arrive + left > limit:
                 continue
             if question.all_good:
@@ -157,35 +157,44 @@ def _is_no_better(arrive: float, price: float, metres: float, others: list[Label
     return any(o.arrive <= arrive and o.price <= price and o.metres <= metres for o in others)
 
 
-def _steps(question: Question, label: Label) -> Iterator[tuple[Label, float]]:
-    """Yield what may come after a label, each with the least that is left to the goal, seconds."""
+def _steps(question: Question, label: Label, limit: float) -> Iterator[tuple[Label, float]]:
+    """Yield what may come after a label and be at the goal by `limit`, each with the least that is left, seconds."""
     network, ways, node = question.network, question.ways, label.node
     top = max(network.top_speed, ways.walk_speed)
     if label.walked:
-        for ride in _rides(question, label):
+        for ride in _rides(question, label, limit):
+            if ride.arrive + ways.bee_line[ride.to] / top > limit:
+                continue
             price = round(label.price + ride.price, 2)
             trace = (*label.trace, (ride.to, ride.line, ride.first, ride.last))
             after = Label(ride.arrive, price, label.metres, ride.to, False, label, ride, trace)
             yield after, ways.bee_line[ride.to] / top
         return
-    seconds, metres = ways.walk[node], ways.metres[node]
-    for to in network.boardable:
-        if to == node:
-            # Changing where one got off costs no way.
-            yield _on_foot(label, to, 0.0, 0.0), ways.bee_line[to] / top
-        elif seconds[to] < math.inf:
-            yield _on_foot(label, to, seconds[to], metres[to]), ways.bee_line[to] / top
+    metres, seconds, _ = ways.leaving(node)
     if seconds[question.goal] < math.inf and (question.direct or label.parent is not None):
         yield _on_foot(label, question.goal, seconds[question.goal], metres[question.goal]), 0.0
+        if not question.all_good:
+            limit = min(limit, label.arrive + seconds[question.goal])
+    for to in network.boardable:
+        left = ways.bee_line[to] / top
+        if to == node:
+            # Changing where one got off costs no way.
+            yield _on_foot(label, to, 0.0, 0.0), left
+        elif label.arrive + seconds[to] + left <= limit and seconds[to] < math.inf:
+            yield _on_foot(label, to, seconds[to], metres[to]), left
 
 
-def _rides(question: Question, label: Label) -> Iterator[Ride]:
+def _rides(question: Question, label: Label, limit: float) -> Iterator[Ride]:
+    """Yield the rides from where one has come on foot; bicycles only as far as one may be at the goal by `limit`."""
     network, ways, node = question.network, question.ways, label.node
     yield from network.bus_rides(node, label.arrive)
     if node in network.stations and network.stations[node].gives:
+        seconds, top = ways.leaving(node).ride, max(network.top_speed, ways.walk_speed)
         for to, station in network.stations.items():
-            if to != node and station.takes and ways.ride[node][to] < math.inf:
-                yield network.bike_ride(to, label.arrive, ways.ride[node][to])
+            if to == node or not station.takes or seconds[to] == math.inf:
+                continue
+            if label.arrive + seconds[to] + ways.bee_line[to] / top <= limit:
+                yield network.bike_ride(to, label.arrive, seconds[to])
 
 
 def _on_foot(label: Label, to: int, seconds: float, metres: float) -> Label:

@@ -49,6 +49,20 @@ def find_way(router: Router, start: Point2, goal: Point2, blocked: NDArray[np.bo
     return Way(path, round(float(np.hypot(*np.diff(path, axis=0).T).sum()), 3))
 
 
+class From(NamedTuple):
+    """Ways from one point to each.
+
+    Attributes
+    ----------
+    metres, walk, ride
+        Metres, seconds on foot and by bicycle; lower bounds until a way is known.
+    """
+
+    metres: list[float]
+    walk: list[float]
+    ride: list[float]
+
+
 class Ways:
     """Ways between numbered points.
 
@@ -69,8 +83,6 @@ class Ways:
 
     Attributes
     ----------
-    metres, walk, ride
-        Of the way from each point to each: metres, seconds on foot and by bicycle; lower bounds until it is known.
     bee_line
         Metres that a way from each point to the goal has at least.
     """
@@ -88,26 +100,35 @@ class Ways:
         self.points = list(points)
         self.walk_speed = walk_speed
         self._router, self._names, self._kept, self._blocked = router, list(names), kept, blocked
-        xy = np.array(self.points, np.float64).reshape(-1, 2)
-        sure = router.walkable.is_connected(xy) if blocked is None else np.zeros(len(xy), bool)
-        off = np.where(sure, 0.0, _SNAP)
-        away = np.hypot(xy[:, None, 0] - xy[None, :, 0], xy[:, None, 1] - xy[None, :, 1])
-        # A little below, so that rounding makes no bound too high.
-        self.metres: list[list[float]] = np.maximum(away - off[:, None] - off[None, :] - 0.02, 0.0).tolist()
-        self.bee_line = [row[-1] for row in self.metres]
-        n = len(self.points)
-        self.walk = [[m / walk_speed for m in row] for row in self.metres]
-        self.ride = [[m / BIKE_SPEED for m in row] for row in self.metres]
+        self._xy = np.array(self.points, np.float64).reshape(-1, 2)
+        sure = router.walkable.is_connected(self._xy) if blocked is None else np.zeros(len(self._xy), bool)
+        self._off = np.where(sure, 0.0, _SNAP)
+        self.bee_line: list[float] = self._bounds(len(self.points) - 1).tolist()
+        self._from: dict[int, From] = {}
         self._found: dict[tuple[int, int], Way] = {}
-        if blocked is None:
-            for a in range(n):
-                for b in range(n):
+
+    def leaving(self, a: int) -> From:
+        """Return the ways from a point, made when they are first asked for: there are many points in a large city."""
+        if a not in self._from:
+            metres = self._bounds(a)
+            row = From(metres.tolist(), (metres / self.walk_speed).tolist(), (metres / BIKE_SPEED).tolist())
+            self._from[a] = row
+            if self._blocked is None:
+                for b in range(len(self.points)):
                     way = self._remembered(a, b)
                     if way is not None:
                         self._note(a, b, way)
+        return self._from[a]
+
+    def _bounds(self, a: int) -> NDArray[np.float64]:
+        """Return metres that ways between a point and each have at least."""
+        away = np.hypot(*(self._xy - self._xy[a]).T)
+        # A little below, so that rounding makes no bound too high.
+        return np.maximum(away - self._off - self._off[a] - 0.02, 0.0)
 
     def known(self, a: int, b: int) -> bool:
         """Whether the way is known, and not a bound."""
+        self.leaving(a)
         return (a, b) in self._found
 
     def way(self, a: int, b: int) -> Way:
@@ -126,6 +147,7 @@ class Ways:
 
     def _note(self, a: int, b: int, way: Way) -> None:
         self._found[a, b] = way
-        self.metres[a][b] = way.metres
-        self.walk[a][b] = way.seconds(self.walk_speed)
-        self.ride[a][b] = way.seconds(BIKE_SPEED)
+        row = self.leaving(a)
+        row.metres[b] = way.metres
+        row.walk[b] = way.seconds(self.walk_speed)
+        row.ride[b] = way.seconds(BIKE_SPEED)
