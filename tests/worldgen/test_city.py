@@ -31,7 +31,7 @@ from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.border_fit import conformed
-from vico.worldgen.seams.grid import HALO, TileGrid, grid_of, tile_name
+from vico.worldgen.seams.grid import HALO, TileGrid, grid_of, grid_over, tile_name
 from vico.worldgen.seams.heights import blended, cropped
 from vico.worldgen.seams.join import seamless
 from vico.worldgen.sources import Sources
@@ -50,6 +50,49 @@ def test_a_grid_covers_what_is_asked_for_with_as_few_tiles_as_can_be(extent: flo
     assert len(list(grid)) == len(grid) == side * side
     assert side * size >= extent
     assert side == 1 or (side - 2) * size < extent
+
+
+def _covers(grid: TileGrid, west: float, south: float, east: float, north: float) -> bool:
+    low, high = grid.box(grid.first).bounds[:2], grid.box(grid.last).bounds[2:]
+    return low[0] <= west and low[1] <= south and high[0] >= east and high[1] >= north
+
+
+@given(
+    *[st.floats(-4_000.0, 0.0)] * 2, *[st.floats(0.0, 4_000.0)] * 2, st.sampled_from([160.0, 400.0]),
+)  # fmt: skip
+def test_a_rectangle_is_covered_with_as_few_tiles_as_can_be(
+    west: float, south: float, east: float, north: float, size: float
+) -> None:
+    grid = grid_over((west, south), (east, north), size)
+    assert (0, 0) in grid
+    assert _covers(grid, west, south, east, north)
+    (left, low), (right, high) = grid.first, grid.last
+    smaller = [
+        ((left + 1, low), (right, high)), ((left, low + 1), (right, high)),
+        ((left, low), (right - 1, high)), ((left, low), (right, high - 1)),
+    ]  # fmt: skip
+    for first, last in smaller:
+        if (0, 0) in TileGrid(size, first, last):
+            assert not _covers(TileGrid(size, first, last), west, south, east, north)
+
+
+def test_a_box_is_covered_around_its_middle_or_a_centre_in_it(tmp_path: Path) -> None:
+    sources, lat, lon = Sources(tmp_path / "no.pbf"), *CENTRE
+    box = lon - 0.004, lat - 0.001, lon + 0.004, lat + 0.001
+    request = city_request(sources, lat=lat, lon=lon, extent=box, out=tmp_path / "city", tile=160.0)
+    # 445 m from west to east, 223 m from south to north.
+    assert (request.grid.first, request.grid.last) == ((-1, -1), (1, 1))
+    wide = city_request(
+        sources, lat=lat, lon=lon, extent=(box[0], lat - 0.0005, box[2], lat + 0.0005), out=tmp_path / "c", tile=160.0
+    )
+    assert (wide.grid.first, wide.grid.last) == ((-1, 0), (1, 0))
+    for bad, words in (
+        ((25.0, 60.0, 24.0, 61.0), "the smaller of each first"),
+        ((0.0, 0.0, 1.0, 1.0), "outside"),
+        ((20.0, 55.0, 30.0, 65.0), "smaller box"),
+    ):
+        with pytest.raises(InputError, match=words):
+            city_request(sources, lat=lat, lon=lon, extent=bad, out=tmp_path / "city", tile=160.0)
 
 
 def test_the_frame_of_a_tile_is_that_of_the_city_shifted() -> None:

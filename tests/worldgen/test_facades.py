@@ -178,10 +178,10 @@ def test_every_family_has_all_its_materials_in_every_region() -> None:
 
 def test_regions_are_told_apart() -> None:
     places = {
-        (60.17, 24.94): "finnish", (59.33, 18.06): "nordic", (51.51, -0.1): "british", (49.41, 8.7): "german",
-        (52.52, 13.4): "east_german", (43.73, 7.42): "southern", (40.72, -73.99): "northeastern",
+        (60.17, 24.94): "finnish", (59.33, 18.06): "swedish", (51.51, -0.1): "british", (49.41, 8.7): "german",
+        (52.52, 13.4): "east_german", (43.73, 7.42): "riviera", (40.72, -73.99): "northeastern",
         (42.33, -83.05): "american", (50.85, 4.35): "low_countries", (52.37, 4.9): "low_countries",
-        (48.86, 2.35): "french", (47.49, 11.1): "alpine", (42.51, 1.52): "southern", (40.42, -3.7): "spanish",
+        (48.86, 2.35): "french", (47.49, 11.1): "alpine", (42.51, 1.52): "pyrenean", (40.42, -3.7): "spanish",
         (38.71, -9.14): "portuguese", (41.9, 12.48): "italian", (45.46, 9.19): "italian", (48.14, 11.58): "german",
         (55.75, 37.62): "eastern", (52.23, 21.01): "eastern", (35.68, 139.75): "japanese", (50.94, 6.96): "german",
         (53.55, 10.0): "german", (-33.87, 151.2): "northern",

@@ -143,3 +143,20 @@ def test_a_model_stands_on_the_ground_and_is_light(name: str) -> None:
 def test_plants_are_the_same_in_every_build() -> None:
     first, second = ({plant.name: plant for plant in plant_models()}["tree_lime"].surfaces for _ in range(2))
     assert all(np.array_equal(a.positions, b.positions) for a, b in zip(first, second, strict=True))
+
+
+def test_steep_ground_that_nobody_mapped_grows_wild() -> None:
+    axis = np.linspace(-60.0, 60.0, 121)
+    rise = np.where(axis > 0.0, 0.5 * axis, 0.0).astype(np.float32)  # flat in the west, a slope in the east
+    slope, street = HeightField(np.tile(rise, (121, 1)), 60.0), shapely.box(30.0, -60.0, 38.0, 60.0)
+    grown, _ = placed([], height=slope, carriageway=street)
+    assert len(grown) > 30
+    assert grown.x.min() > -10.0
+    assert {"tree", "shrub"} <= set(grown.kind.tolist())
+    assert not ((grown.x > 30.0) & (grown.x < 38.0)).any()
+    # What is mapped elsewhere changes none of them.
+    more, _ = placed([node(7, -40.0, 0.0, amenity="bench")], height=slope, carriageway=street)
+    both = [set(zip(o.id.tolist(), o.x.tolist(), o.y.tolist(), strict=True)) for o in (grown, more)]
+    assert len(both[1] - both[0]) == 1
+    assert both[0] <= both[1]
+    assert len(placed([], carriageway=street)[0]) == 0

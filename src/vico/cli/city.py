@@ -19,12 +19,18 @@ def build(options: CityBuildOptions) -> int:
     from vico.worldgen.pipeline import extract_centre
     from vico.worldgen.sources import Sources
 
-    lat, lon = _degrees(options.center) if options.center else extract_centre(options.osm)
+    box = _box(options.bbox) if options.bbox else None
+    if options.center:
+        lat, lon = _degrees(options.center)
+    elif box is not None:
+        lat, lon = (box[1] + box[3]) / 2, (box[0] + box[2]) / 2
+    else:
+        lat, lon = extract_centre(options.osm)
     request = city_request(
         Sources(options.osm, dem=tuple(chain.from_iterable(options.dem))),
         lat=lat,
         lon=lon,
-        extent=options.size,
+        extent=options.size if box is None else box,
         out=options.out,
         tile=options.tile,
         seed=options.seed,
@@ -42,6 +48,16 @@ def _degrees(text: str) -> tuple[float, float]:
     except ValueError:
         raise InputError(f"center: {text!r}; give latitude and longitude, as in --center 60.1690,24.9435") from None
     return lat, lon
+
+
+def _box(text: str) -> tuple[float, float, float, float]:
+    try:
+        west, south, east, north = map(float, text.split(","))
+    except ValueError:
+        raise InputError(
+            f"bbox: {text!r}; give west, south, east and north, as in --bbox 24.93,60.16,24.96,60.18"
+        ) from None
+    return west, south, east, north
 
 
 def info(path: Path, *, json: bool = False) -> int:

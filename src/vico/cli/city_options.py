@@ -22,6 +22,9 @@ class CityBuildOptions:
         Latitude and longitude of the middle tile; the middle of the extract without.
     size
         Side of the square to cover, metres; whole tiles are built.
+    bbox
+        Box to cover instead: west, south, east and north, degrees, as in 24.93,60.16,24.96,60.18. Its middle is the
+        centre where --center names none.
     dem
         Elevation files; flat ground without.
     tile
@@ -40,6 +43,7 @@ class CityBuildOptions:
     out: Path
     center: str = ""
     size: float = 2000.0
+    bbox: str = ""
     dem: Files = ()
     tile: float = 400.0
     seed: int = 0

@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vico.errors import InputError, StageError
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
@@ -29,7 +31,7 @@ from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import make_streets
 from vico.worldgen.city_tiles import GATES
 from vico.worldgen.ground.terrain import APRON, terrain_from_dem
-from vico.worldgen.seams.grid import HALO, Tile, grid_of, tile_name
+from vico.worldgen.seams.grid import HALO, Tile, TileGrid, grid_of, grid_over, tile_name
 from vico.worldgen.seams.join import MAP
 from vico.worldgen.seams.walking import write_gates, write_walking
 from vico.worldgen.sources import Sources
@@ -43,7 +45,14 @@ Progress = Callable[[str, int, int], None]
 
 
 def city_request(
-    sources: Sources, *, lat: float, lon: float, extent: float, out: Path, tile: float = TILE, seed: int = 0
+    sources: Sources,
+    *,
+    lat: float,
+    lon: float,
+    extent: float | tuple[float, float, float, float],
+    out: Path,
+    tile: float = TILE,
+    seed: int = 0,
 ) -> CityRequest:
     """Return what `build_city` is to build.
 
@@ -54,7 +63,8 @@ def city_request(
     lat, lon
         The centre, degrees.
     extent
-        Side of the square to cover, metres; whole tiles are built.
+        Side of the square around the centre to cover, metres; or a box that holds the centre: west, south, east and
+        north, degrees. Whole tiles are built.
     out
         Folder to make, or to go on in.
     tile
@@ -69,12 +79,31 @@ def city_request(
     """
     if not (_LEAST <= tile <= _MOST) or tile % _CELL:
         raise InputError(f"tile: {tile:g} m; give a multiple of {_CELL:g} within {_LEAST:g}..{_MOST:g}")
-    if not (math.isfinite(extent) and 0 < extent <= _LARGEST):
-        raise InputError(f"size: {extent:g} m; give the side of the square to build, up to {_LARGEST:g}")
     if seed < 0:
         raise InputError(f"seed: {seed}; it must not be negative")
-    LocalFrame(lat, lon)  # refuses what is no place
-    return CityRequest(sources, lat, lon, grid_of(extent, tile), seed, Path(out).resolve())
+    frame = LocalFrame(lat, lon)  # refuses what is no place
+    grid = _grid_over(frame, extent, tile) if isinstance(extent, tuple) else _grid_around(extent, tile)
+    return CityRequest(sources, lat, lon, grid, seed, Path(out).resolve())
+
+
+def _grid_around(extent: float, tile: float) -> TileGrid:
+    if not (math.isfinite(extent) and 0 < extent <= _LARGEST):
+        raise InputError(f"size: {extent:g} m; give the side of the square to build, up to {_LARGEST:g}")
+    return grid_of(extent, tile)
+
+
+def _grid_over(frame: LocalFrame, box: tuple[float, float, float, float], tile: float) -> TileGrid:
+    west, south, east, north = box
+    what = f"bbox: {west:g},{south:g},{east:g},{north:g}"
+    if not (-180.0 <= west < east <= 180.0 and -90.0 < south < north < 90.0):
+        raise InputError(f"{what}; give west, south, east and north, degrees, the smaller of each first")
+    if not (west <= frame.lon <= east and south <= frame.lat <= north):
+        raise InputError(f"{what}: the centre {frame.lat:g},{frame.lon:g} lies outside; leave it out, or move it")
+    corners = np.array([frame.to_enu(lat, lon) for lat in (south, north) for lon in (west, east)])[:, :2]
+    low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    if max(b - a for a, b in zip(low, high, strict=True)) > _LARGEST:
+        raise InputError(f"{what}: more than {_LARGEST:g} m wide or high; give a smaller box")
+    return grid_over((low[0], low[1]), (high[0], high[1]), tile)
 
 
 def build_city(

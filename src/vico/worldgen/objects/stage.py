@@ -91,7 +91,7 @@ def objects_from_osm(
         (barrier_wishes(osm, carriageway, openings, half), True),
         (mapped, True),
         (group_wishes(osm, openings, half, seed, where=where), True),
-        (planted_wishes(osm, carriageway, openings, half, seed, zone), False),
+        (planted_wishes(osm, height, carriageway, openings, half, seed, zone), False),
         (lamp_wishes(osm, carriageway, solids, lamps, lamp=thing_of({"highway": "street_lamp"}, where=where)), False),
     ]
     rows: list[dict[str, Any]] = []

@@ -30,6 +30,15 @@ _BARE = {
     "public_transport": ("platform",), "railway": ("platform",), "waterway": ("riverbank", "dock"),
 }  # fmt: skip
 _MOST = 700  # plants that no map has, in a world
+# Green that is kept short.
+_MOWN = {
+    "landuse": ("grass", "meadow", "farmland", "vineyard", "allotments", "cemetery", "recreation_ground"),
+    "leisure": ("park", "garden", "golf_course", "pitch"),
+    "natural": ("grassland", "heath", "scree", "bare_rock", "cliff"),
+}
+# Rise per metre from which nobody mows, and side of the cells it is measured in, metres; square metres that a plant has
+# there, and the share of shrubs.
+_STEEP, _STEEP_CELL, _WILD_ROOM, _SHRUBS = 0.25, 10.0, 55.0, 0.6
 
 
 def climate(frame: LocalFrame, height: HeightField) -> str:
@@ -184,9 +193,18 @@ def _use(area: OsmArea) -> str | None:
 
 
 def planted_wishes(
-    osm: OsmData, carriageway: BaseGeometry, openings: BaseGeometry, half: float, seed: int, zone: str
+    osm: OsmData,
+    height: HeightField,
+    carriageway: BaseGeometry,
+    openings: BaseGeometry,
+    half: float,
+    seed: int,
+    zone: str,
 ) -> list[Wish]:
-    """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways."""
+    """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways.
+
+    Where nothing is mapped and the ground is too steep to be a lawn, it grows wild.
+    """
     window = shapely.box(-half, -half, half, half)
     keep_off = _kept_free(osm, carriageway, openings, window)
     mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
@@ -203,11 +221,51 @@ def planted_wishes(
             if not ground.is_empty:
                 done = overlay.union(done, ground)
                 found += _planted(area, use, ground, trunks, seed, zone)
+    mown = [NamedShape(area.id, area.polygon) for area in osm.areas if _is_mown(area)]
+    found += _grown_wild(
+        height, united([NamedShape("kept", keep_off), NamedShape("planted", done), *mown]), half, seed, zone
+    )
     if len(found) <= _MOST:
         return [wish for _, wish in found]
     # Every area is thinned alike.
     limit = sorted(rank for rank, _ in found)[_MOST]
     return [wish for rank, wish in found if rank < limit]
+
+
+def _is_mown(area: OsmArea) -> bool:
+    return any(area.tags.get(key) in values for key, values in _MOWN.items())
+
+
+def _grown_wild(
+    height: HeightField, elsewhere: BaseGeometry, half: float, seed: int, zone: str
+) -> list[tuple[float, Wish]]:
+    """Return what grows where the ground is too steep to be mown: trees as in woods, and more shrubs.
+
+    Each cell of ground decides for itself, so what is mapped elsewhere changes nothing.
+    """
+    count = max(int(2 * half // _STEEP_CELL), 1)
+    side = 2 * half / count
+    edges = np.linspace(-half, half, count + 1)
+    level = height.smooth(np.stack(np.meshgrid(edges, edges), axis=-1))
+    east, north = np.diff(level, axis=1) / side, np.diff(level, axis=0) / side
+    steep = np.hypot((east[1:] + east[:-1]) / 2, (north[:, 1:] + north[:, :-1]) / 2) > _STEEP
+    shapely.prepare(elsewhere)
+    found: list[tuple[float, Wish]] = []
+    for row, column in np.argwhere(steep).tolist():
+        random = rng(seed, "slope", row, column)
+        for k in range(int(side * side / _WILD_ROOM + random.random())):
+            xy = np.array([edges[column], edges[row]]) + random.uniform(0.0, side, 2)
+            if shapely.contains_xy(elsewhere, *xy):
+                continue
+            key = f"slope.{row}.{column}.{k}"
+            if random.random() < _SHRUBS:
+                name = ("shrub", "shrub_tall", "shrub_tall")[int(random.integers(3))]
+                wish = Wish(key, name, xy, None, float(random.uniform(0.8, 1.5)))
+            else:
+                wish = tree_wish(key, {}, xy, seed, zone, wild=True)
+            wish.reach = 0.0
+            found.append((float(random.random()), wish))
+    return found
 
 
 def _kept_free(

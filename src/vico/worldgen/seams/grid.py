@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -90,6 +91,13 @@ def grid_of(extent: float, size: float) -> TileGrid:
     """Return the grid that covers a square around the centre, `extent` metres wide: 2 n + 1 tiles a side."""
     more = max(0, -int(-(extent / size - 1.0) // 2))
     return TileGrid(size, (-more, -more), (more, more))
+
+
+def grid_over(low: tuple[float, float], high: tuple[float, float], size: float) -> TileGrid:
+    """Return the grid that covers a rectangle, given by two corners in metres east and north of the centre in it."""
+    first = [math.floor(k / size + 0.5) for k in low]
+    last = [math.ceil(k / size + 0.5) - 1 for k in high]
+    return TileGrid(size, (min(first[0], 0), min(first[1], 0)), (max(last[0], 0), max(last[1], 0)))
 
 
 def tile_name(tile: Tile) -> str:

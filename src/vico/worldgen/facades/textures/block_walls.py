@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from vico.worldgen.facades.textures.regional_walls import REGIONAL
 from vico.worldgen.facades.textures.townhouse_walls import TOWNHOUSES
 from vico.worldgen.facades.textures.walls import BAYS, STOREYS, WALLS, Picture, band, cells
 from vico.worldgen.facades.textures.windows import glass, window, window_style
@@ -130,6 +131,7 @@ def _pencil(random: np.random.Generator) -> Picture:
 UPPER_FLOORS: dict[str, Callable[[np.random.Generator], Picture]] = {
     **WALLS,
     **TOWNHOUSES,
+    **REGIONAL,
     "wall_large_panels": _large_panels,
     "wall_set_back": _set_back,
     "wall_chicago": _chicago,

@@ -135,6 +135,7 @@ PAINTERS: dict[str, Callable[[np.random.Generator], NDArray[np.uint8]]] = {
     "blank_boards": _blank_boards,
     "roof_tiles": _tiles,
     "roof_metal": _seamed,
+    "roof_sheet": _seamed,
     "roof_zinc": _seamed,
     "roof_slate": _slates,
     "roof_gravel": _gravel,
