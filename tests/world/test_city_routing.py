@@ -16,7 +16,7 @@ from vico.io.arrays import mapped_array
 from vico.world.city_files import COST, REACHED, ROOM, SURFACES
 from vico.world.city_gates import Gates, border_gates, tile_gates
 from vico.world.city_ground import whole_walkable
-from vico.world.city_routing import CityRouter
+from vico.world.city_routing import CityRouter, _Ask
 from vico.world.city_walk_lengths import CityWalkLengths
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
@@ -165,3 +165,17 @@ def test_lengths_of_many_walks_are_those_of_walks(town: WalkableMap, router: Cit
         far += max(abs(p - q) for p, q in zip(a, b, strict=True)) > 400.0
     assert far >= 3
     assert math.isinf(lengths.between((0.0, 0.0), (5_000.0, 0.0)).metres)
+
+
+def test_walks_begin_and_end_in_gates_too(town: WalkableMap, router: CityRouter) -> None:
+    n, gates = town.n, router.graph.cells
+    far = max(gates.tolist(), key=lambda cell: cell % n + cell // n)
+    near = min(gates.tolist(), key=lambda cell: cell % n + cell // n)
+    ends = [town.centre_of([cell % n, cell // n]) for cell in (near, far)]
+    ask = _Ask(router._cost, router._clearance, None, 0.0, SIDE, closing=False)
+    found = router._far(ask, near, far)
+    assert found is not None
+    assert (found[0][0], found[0][-1]) == (near, far)
+    assert len(found[0]) == len(found[1])
+    assert (np.diff(found[1]) > 0).all()
+    assert router.path(*ends) is not None

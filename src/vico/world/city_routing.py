@@ -101,7 +101,7 @@ class CityRouter(Router):
             if not gates:
                 return None
             cells = [first, *self.graph.cells[gates].tolist(), last]
-            parts, costs, dearer = [np.array([first])], [np.array([0])], False
+            parts, costs, so_far, dearer = [np.array([first])], [np.array([0])], 0, False
             for k, (a, b) in enumerate(pairwise(cells)):
                 told = self.graph.cost(*gates[k - 1 : k + 1]) if 0 < k < len(gates) else -1
                 if ask.tile(a) == ask.tile(b):
@@ -113,11 +113,14 @@ class CityRouter(Router):
                         break
                     if found is None:
                         return None
+                    # Of a walk that begins in a gate nothing is left here.
                     parts.append(found[0][1:])
-                    costs.append(found[1][1:] + costs[-1][-1])
+                    costs.append(found[1][1:] + so_far)
+                    so_far += int(found[1][-1])
                 else:
+                    so_far += told
                     parts.append(np.array([b]))
-                    costs.append(costs[-1][-1:] + told)
+                    costs.append(np.array([so_far]))
             if not dearer:
                 return np.concatenate(parts).astype(np.int64), np.concatenate(costs)
         return None
