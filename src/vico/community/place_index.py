@@ -28,8 +28,8 @@ GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment",
 #: Distance that spawn points keep from each other, metres.
 SPAWN_GAP = 2.0
 
-# Places whose estimates to all others are kept, 8 bytes each.
-_ESTIMATES = 2048
+# Places whose estimates to all others are kept, 2 bytes each: a city has tens of thousands.
+_ESTIMATES, _MOST_MINUTES = 1024, 32_000
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
 
@@ -58,7 +58,7 @@ class PlaceIndex:
         self._rooms = PlaceRooms.of(world)
         # From the street to the farthest room: whoever has come that far is there, whatever the room.
         self._inside = self._rooms.inside
-        self._estimates: Recent[str, NDArray[np.int64]] = Recent(_ESTIMATES)
+        self._estimates: Recent[str, NDArray[np.int16]] = Recent(_ESTIMATES)
         self._reachable: dict[str, bool] = {}
         self._hours: dict[tuple[str, int], list[Span]] = {}
 
@@ -162,10 +162,11 @@ class PlaceIndex:
             k = self.spot[a]
             far = np.hypot(*(self._positions - self._positions[k]).T)
             inside = self._inside + self._inside[k]
-            known = np.ceil((far * 1.5 + inside * 1.05 + 45) / 60).astype(np.int64)
+            minutes = np.ceil((far * 1.5 + inside * 1.05 + 45) / 60)
+            known = np.minimum(minutes, _MOST_MINUTES).astype(np.int16)
             known[k] = 0
             self._estimates.keep(a, known)
-        return known[spots]
+        return known[spots].astype(np.int64)
 
     def metres(self, a: str, b: str) -> float:
         """Metres between two places as the crow flies: enough to tell near from far."""
