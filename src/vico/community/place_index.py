@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -172,6 +172,11 @@ class PlaceIndex:
         """Metres between two places as the crow flies: enough to tell near from far."""
         p, q = self.place_by_id[a].position, self.place_by_id[b].position
         return math.hypot(p[0] - q[0], p[1] - q[1])
+
+    def metres_to(self, a: str, places: Sequence[Place]) -> NDArray[np.float64]:
+        """Metres from a place to others as the crow flies, shape ``(len(places),)``."""
+        spots = [self.spot[place.id] for place in places]
+        return np.asarray(np.hypot(*(self._positions[spots] - self._positions[self.spot[a]]).T), np.float64)
 
     def by_nearness(self, a: str) -> list[Place]:
         """Reachable places, the nearest to a place first."""

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vico.community.catalogue import Job, trades, ways_of_life
+from vico.community.day import MIDNIGHT
 from vico.community.hours import Span, staffed_stretches
 from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
@@ -26,6 +27,8 @@ STUDY_KINDS = frozenset({"university", "college", "research_institute", "library
 # What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
 _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
+# Metres as the crow flies that people go to work or to lectures; minutes at home before midnight.
+_COMMUTE, _LAST = 2000.0, 10
 # Days of work in a week; trades that work from Monday to Friday only; and the other two days.
 _WORKING_DAYS = 5
 # Trades that one may stay longer at, and how much longer than others the most ambitious of all would, minutes.
@@ -146,7 +149,8 @@ def assign_work(
         if draft.status in ("worker", "pupil"):
             continue
         if draft.status == "student":
-            place = study[int(rng.integers(len(study)))]
+            near = within_reach(index, draft.home, study)
+            place = near[int(rng.integers(len(near)))]
             options = ["music"] if kind_of(place) == "music_school" else list(ways.subjects)
             draft.subject = _rare(rng, options, held)
             draft.occupation = f"student of {draft.subject}"
@@ -277,7 +281,7 @@ class _JobMarket:
         return self._jobs[int(self._rng.choice(len(self._jobs), p=weights / weights.sum()))]
 
     def _place(self, draft: ResidentDraft, job: Job) -> Place:
-        offers = self._offers[job.title]
+        offers = within_reach(self._index, draft.home, self._offers[job.title])
         places = [p for p in offers if p.id != draft.home] or offers
         # Some work where somebody of the community works already: that makes colleagues.
         staff = self._staff
@@ -296,7 +300,17 @@ def _working_hours(
     start, end = _shift(rng, job.shift, stretch, first=first, more=_five(_OVERTIME * draft.drive))
     if end > 22 * 60:  # home before midnight, however far
         end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
-    return start, end
+    slow = index.minutes(place.id, draft.home, draft.pace) or 0
+    return start, min(end, (MIDNIGHT - _LAST - slow) // 5 * 5)
+
+
+def within_reach(index: PlaceIndex, home: str, places: Sequence[Place]) -> Sequence[Place]:
+    """Return the places that somebody walks to every day from a home; the nearest one where all are farther away."""
+    far = index.metres_to(home, places)
+    near = np.flatnonzero(far <= _COMMUTE)
+    if len(near) == len(places):
+        return places
+    return [places[k] for k in near.tolist()] or [places[int(far.argmin())]]
 
 
 def shift_on(
