@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from datetime import date as Date  # parameters of that name would hide it
 from datetime import timedelta
 from functools import partial
+from itertools import islice
 from typing import Protocol
 
 import numpy as np
@@ -322,9 +323,9 @@ def _known(index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], m
     known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
     near = index.by_nearness(draft.home)
     for hobby in draft.hobbies:
-        known += [p.id for p in near if p.kind in hobby.kinds][:2]
+        known += islice((p.id for p in near if p.kind in hobby.kinds), 2)
     for category in (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT):
-        known += [p.id for p in near if p.category is category][:3]
+        known += islice((p.id for p in near if p.category is category), 3)
     return list(dict.fromkeys(known))
 
 

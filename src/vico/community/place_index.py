@@ -180,11 +180,16 @@ class PlaceIndex:
 
     def by_nearness(self, a: str) -> list[Place]:
         """Reachable places, the nearest to a place first."""
-        reachable = self.places()
         x, y = self.place_by_id[a].position[:2]
-        numbers = [self.spot[p.id] for p in reachable]
+        reachable, numbers = self._all_reachable
         far = np.round(np.hypot(*(self._positions[numbers] - (x, y)).T), 3)
         return [reachable[k] for k in np.lexsort((self._names[numbers], far)).tolist()]
+
+    @cached_property
+    def _all_reachable(self) -> tuple[list[Place], NDArray[np.int64]]:
+        """All places that can be reached, and their numbers."""
+        reachable = self.places()
+        return reachable, np.array([self.spot[p.id] for p in reachable], np.int64)
 
     def given_hours(self, place: Place) -> list[Span] | None:
         """When the place says it is open on the day, minutes; None if it doesn't say, or not in a form we read."""

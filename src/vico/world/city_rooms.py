@@ -114,6 +114,10 @@ class RoomsById(Mapping[str, Room]):
     def __getitem__(self, key: str) -> Room:
         return self._rooms[self._numbers[key]]
 
+    def __contains__(self, key: object) -> bool:
+        """Whether there is such a room; it is not read for that."""
+        return key in self._numbers
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._numbers)
 
