@@ -31,6 +31,8 @@ SOONER = {Mode.BUS: 60.0, Mode.TRAM: 60.0, Mode.BIKE: 0.0}
 RESERVE = {Mode.BUS: 120.0, Mode.TRAM: 120.0, Mode.BIKE: 60.0}
 # Shorter ways are walked, seconds.
 _SHORT = 6 * 60
+#: A way may be planned with time to spare, but not with an hour of it: so many times what it takes, and seconds more.
+SLACK, SPARE = 2.0, 10 * 60
 _LEAST_PRICE = {Mode.BUS: BUS_FARE, Mode.TRAM: BUS_FARE, Mode.BIKE: BIKE_RATE}
 # Who carries a hundred would spend two minutes to save one; who carries more, less.
 _SECONDS_OF_MONEY = 12_000.0
@@ -203,11 +205,13 @@ class _Means:
                 continue
             ends = self.index.place_by_id[items[-1].place or ""], self.index.place_by_id[old[k + 1].place or ""]
             ride = self._best(resident, habits, ends, item)
-            if ride is None or not self._is_to_be_had(ride):
+            stays = ride is not None and self._may_stay(resident, items[-1], ride.set_out)
+            too_soon = ride is not None and not stays and self._would_idle(resident, ends, item, ride.mode)
+            if ride is None or too_soon or not self._is_to_be_had(ride):
                 items.append(item)
                 continue
             stay = items.pop()
-            set_out = clock_of(ride.set_out) if self._may_stay(resident, stay, ride.set_out) else item.start
+            set_out = clock_of(ride.set_out) if stays else item.start
             items += self._longer(stay, set_out)
             words = _words(ride.mode, ends[1], home=ends[1].id == resident.home)
             items.append(item.model_copy(update={"start": set_out, "mode": ride.mode, "activity": words}))
@@ -249,6 +253,12 @@ class _Means:
                 leave = max(seconds_of_day(way.start), math.floor((set_out - SOONER[mode]) / 60) * 60)
                 found.append(_Ride(mode, trip, cost, leave))
         return min(found, key=lambda ride: ride.cost, default=None)
+
+    def _would_idle(self, resident: Resident, ends: tuple[Place, Place], way: ScheduleItem, mode: Mode) -> bool:
+        """Return whether who sets out at once would be there so early that nobody plans like that."""
+        start, end = seconds_of_day(way.start), seconds_of_day(way.end)
+        there = first_ride(self.index, (ends[0].id, ends[1].id), mode, (start, end), resident.cash)
+        return end - start > SLACK * (there - start) + SPARE
 
     def _is_to_be_had(self, ride: _Ride) -> bool:
         """Take the bicycle for a ride; False where others have planned with it."""

@@ -17,7 +17,7 @@ from vico.community.hours import staffed
 from vico.community.jobs import job_of, jobs_at, works_at
 from vico.community.model import LAST, Community, Group, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import SPAWN_GAP, PlaceIndex
-from vico.community.rides import first_ride
+from vico.community.rides import SLACK, SPARE, first_ride
 from vico.community.staff import staff_capacity
 from vico.community.tags import TAGS_OF_TYPE
 from vico.community.validator_households import households_of
@@ -27,10 +27,6 @@ from vico.world.model import Category, Place
 from vico.world.world import World
 
 CASH = (100, 1000)
-
-# A walk may be planned with time to spare, but not with an hour of it.
-_SLACK = 2.0
-_SPARE = 10 * 60
 
 
 def check_community(community: Community, world: World) -> list[CommunityFinding]:
@@ -286,7 +282,7 @@ class _Check:
         taking = f"{given} s for the {what} {names}, which takes {needed:.0f} s"
         if given < needed:
             self.say(where, taking, f"allow {math.ceil(needed)} s or more")
-        elif given > _SLACK * needed + _SPARE:
+        elif given > SLACK * needed + SPARE:
             self.say(where, taking, "leave later or arrive earlier")
 
     def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
