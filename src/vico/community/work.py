@@ -307,10 +307,8 @@ def _working_hours(
 def within_reach(index: PlaceIndex, home: str, places: Sequence[Place]) -> Sequence[Place]:
     """Return the places that somebody walks to every day from a home; the nearest one where all are farther away."""
     far = index.metres_to(home, places)
-    near = np.flatnonzero(far <= _COMMUTE)
-    if len(near) == len(places):
-        return places
-    return [places[k] for k in near.tolist()] or [places[int(far.argmin())]]
+    near = [places[k] for k in np.flatnonzero(far <= _COMMUTE).tolist()]
+    return near or [places[int(far.argmin())]]
 
 
 def shift_on(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import Lock
 from typing import Generic, TypeVar
 
 K = TypeVar("K")
@@ -9,7 +10,7 @@ V = TypeVar("V")
 
 
 class Recent(Generic[K, V]):
-    """Keeps what was used last; what was not used longest is dropped.
+    """Keeps what was used last; what was not used longest is dropped. Threads may share it.
 
     Parameters
     ----------
@@ -20,17 +21,20 @@ class Recent(Generic[K, V]):
     def __init__(self, most: int) -> None:
         self._most = most
         self._kept: dict[K, V] = {}
+        self._lock = Lock()
 
     def get(self, key: K) -> V | None:
         """Return what is kept under a key; None if nothing is."""
-        value = self._kept.pop(key, None)
-        if value is not None:
-            self._kept[key] = value
-        return value
+        with self._lock:
+            value = self._kept.pop(key, None)
+            if value is not None:
+                self._kept[key] = value
+            return value
 
     def keep(self, key: K, value: V) -> None:
         """Keep a value, which is not None, under a key."""
-        self._kept.pop(key, None)
-        self._kept[key] = value
-        if len(self._kept) > self._most:
-            del self._kept[next(iter(self._kept))]
+        with self._lock:
+            self._kept.pop(key, None)
+            self._kept[key] = value
+            if len(self._kept) > self._most:
+                del self._kept[next(iter(self._kept))]
