@@ -42,10 +42,7 @@ class PlaceRooms:
     @classmethod
     def of(cls, world: World) -> PlaceRooms:
         """Return those of a world, counted once."""
-        known = world.derived.get(cls)
-        if not isinstance(known, cls):
-            world.derived[cls] = known = cls(world)
-        return known
+        return world.shared(cls, lambda: cls(world))
 
 
 def _beds(room: Room) -> int:

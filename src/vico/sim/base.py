@@ -66,10 +66,7 @@ class SimulationBase:
     @classmethod
     def of(cls, world: World) -> SimulationBase:
         """Return the base of a world; it is kept with the world."""
-        known = world.derived.get(cls)
-        if not isinstance(known, cls):
-            world.derived[cls] = known = cls(world)
-        return known
+        return world.shared(cls, lambda: cls(world))
 
     def require(self, world: World) -> None:
         """Refuse another world than the base's.

@@ -69,10 +69,7 @@ class DrawnDoors:
     @classmethod
     def of(cls, base: SimulationBase) -> DrawnDoors:
         """Return those of a world; they are kept with it."""
-        known = base.world.derived.get(cls)
-        if not isinstance(known, cls):
-            base.world.derived[cls] = known = cls(base)
-        return known
+        return base.world.shared(cls, lambda: cls(base))
 
     def draw(self, state: SimulationState) -> OpenDoors | None:
         """Return what is drawn of the doors that are not closed; None of none."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from vico.errors import MissingFileError
 from vico.geo.frame import LocalFrame
@@ -27,6 +27,8 @@ from vico.world.walkable import WalkableMap, read_walkable
 
 if TYPE_CHECKING:
     from vico.world.lanes import LaneGraph
+
+T = TypeVar("T")
 
 LAYERS = ("ground", "buildings", "roofs", "rooms", "collision")
 
@@ -49,8 +51,6 @@ class World:
     ----------
     manifest, frame, half
         The manifest, the local frame, and half the side of the square, metres.
-    derived
-        What others have made of the world and share, each under a key of its own.
     """
 
     def __init__(self, manifest: Manifest, path: Path | None = None, **parts: Any) -> None:
@@ -58,13 +58,20 @@ class World:
         self.path = path
         self.half = manifest.half
         self.frame = LocalFrame(**manifest.origin.model_dump())
-        self.derived: dict[object, object] = {}
+        self._derived: dict[object, object] = {}
         self._layers: dict[str, list[Surface]] = dict(parts.pop("layers", {}))
         known = {"height", "buildings", "places", "entrances", "rooms", "objects", "roads", "transit", "walkable"}
         if unknown := set(parts) - known - {"lanes", "models", "parking"}:
             raise TypeError(f"World: unknown parts {sorted(unknown)}")
         for name, value in parts.items():
             self.__dict__["_models" if name == "models" else name] = value
+
+    def shared(self, kind: type[T], make: Callable[[], T]) -> T:
+        """Return what others have made of the world and share, made the first time that it is asked for."""
+        known = self._derived.get(kind)
+        if not isinstance(known, kind):
+            self._derived[kind] = known = make()
+        return known
 
     def file(self, name: str) -> Path:
         """Path of one of the world's files."""
