@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,33 +11,17 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.world.clear_lines import Floats, Gaps, Interval, columns_within, sides_along, ways_through
 from vico.world.heights import HeightField
-
-Floats = NDArray[np.float64]
-Interval = tuple[float, float]
 
 BODY = 0.3
 """A walker's radius and a little air, metres."""
 
 _AIR = 0.06  # metres more from lines to solids
 _STEP = 0.5  # metres between the places at which a line is looked at
-_GRID = 0.1  # metres between the lines that are tried
-_ASIDE, _NARROW = 0.01, 0.05  # what it costs to be a metre aside at a place, and to have a metre too little room
-_MOVES = (0.0, 0.1, 0.6, 1.5)  # what it costs to move by so many lines from one place to the next
-_APART = 0.56  # metres of room that two need to pass each other
-_EACH_WAY = 2.0  # metres before and after a narrow place that are as narrow: walkers look so far ahead
 _AROUND, _TRIES = 0.6, 4  # metres left out of a line that leads through a solid, and how often that is tried
-_LEAST = 0.05
 _SAME = 0.02
 _OFF_EDGE = 0.3  # metres that walkers' middles stay from the edges of kerbs and quays, above them
-_WIDER = 0.4  # metres beyond its room that a line has on one side for what a kerb takes on the other
-_BELOW, _DEEPER, _DEEPEST = (
-    0.1,
-    0.4,
-    0.5,
-)  # what it costs at a place to be too near to an edge or below, by metre, and m
-_NEARER = 0.2  # metres that they come nearer to an edge where they have little room
-_ROUND = 0.05  # metres to which room is rounded that a kerb leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,138 +210,34 @@ def _free(blocked: list[Interval], reach: float) -> list[Interval]:
 def _depth(points: Floats, normals: Floats, room: float, ground: HeightField | None) -> Floats | None:
     """Return by how many metres each place across a line is too near to an edge, or below it; None: none is.
 
-    Shape ``(places, columns)``; the columns are those of `_columns`.
+    Shape ``(places, columns)``; the columns are those of `columns_within`.
     """
     if ground is None or ground.steps is None:
         return None
-    across = points[:, None, :] + _columns(room)[None, :, None] * normals[:, None, :]
+    across = points[:, None, :] + columns_within(room)[None, :, None] * normals[:, None, :]
     depth = _OFF_EDGE - ground.edge_distance(across)
     return depth if (depth > 0.0).any() else None
-
-
-def _columns(room: float) -> Floats:
-    """Return how far to the left of a line it is looked at, metres: a little beyond its room."""
-    steps = max(round((room + _WIDER) / _GRID), 1)
-    return np.asarray(np.arange(-steps, steps + 1) * _GRID, np.float64)
-
-
-def _above_edges(free: list[Interval], depth: Floats, columns: Floats, room: float) -> list[Interval]:
-    """Return the parts of free intervals that are above edges and far enough from them, within what a line may take."""
-    if not (depth > 0.0).any():
-        return free
-    good = np.concatenate([[False], depth <= 0.0, [False]])
-    begins, ends = np.flatnonzero(~good[:-1] & good[1:]), np.flatnonzero(good[:-1] & ~good[1:]) - 1
-    found = []
-    for a, b in zip(begins.tolist(), ends.tolist(), strict=True):
-        low = -np.inf if a == 0 else columns[a] - _GRID * depth[a] / (depth[a] - depth[a - 1])
-        high = np.inf if b == len(columns) - 1 else columns[b] + _GRID * depth[b] / (depth[b] - depth[b + 1])
-        # What a kerb takes on one side a walkway may have on the other.
-        least = -room - min(max(room - high, 0.0), _WIDER)
-        most = room + min(max(room + low, 0.0), _WIDER)
-        for begin, end in free:
-            part = max(low, begin, least), min(high, end, most)
-            if part[0] < part[1]:
-                found.append(part)
-    return found
 
 
 def _courses(line: _Line, free: list[list[Interval]], bend: float, depth: Floats | None) -> list[ClearCourse]:
     """Lead one line past its solids, no more than `bend` metres aside: in pieces, where there is no way."""
     along, room = line.along, line.room
-    good = sides_good = free
+    good = sides_good = gaps = Gaps.of(free)
     if depth is not None:
-        good = [_above_edges(gaps, row, _columns(bend), bend) for gaps, row in zip(free, depth, strict=True)]
+        good = gaps.above_edges(depth, columns_within(bend), bend)
         # Walkers keep to the line's own room, however far it bends.
-        own, more = _columns(room), (depth.shape[1] - len(_columns(room))) // 2
-        inner = depth[:, more : more + len(own)]
-        sides_good = [_above_edges(gaps, row, own, room) for gaps, row in zip(free, inner, strict=True)]
+        own = columns_within(room)
+        more = (depth.shape[1] - len(own)) // 2
+        sides_good = gaps.above_edges(depth[:, more : more + len(own)], own, room)
     found: list[ClearCourse] = []
-    for begin, aside in _ways_through(free, good, room, bend, depth):
+    for begin, aside in ways_through(gaps, good, room, bend, depth):
         here = slice(begin, begin + len(aside))
-        sides = np.array(
-            [_sides(free[begin + j], sides_good[begin + j], room, a) for j, a in enumerate(aside.tolist())]
-        )
-        near = np.abs(along[here][:, None] - along[here][None, :]) <= _EACH_WAY
-        sides = np.maximum(np.where(near[:, :, None], sides[None, :, :], np.inf).min(axis=1), _LEAST)
-        sides[:-1] = np.minimum(sides[:-1], sides[1:])  # from each point to the next
+        sides = sides_along(gaps, sides_good, along, aside, begin, room)
         moved = line.points[here] + aside[:, None] * line.normals[here]
         kept = _kept(aside, sides, line.normals[here])
         is_whole = len(aside) == len(along)
         found.append(ClearCourse(along[here][kept], moved[kept], sides[kept, :2], sides[kept, 2:], is_whole))
     return [course for course in found if len(course.points) > 1]
-
-
-def _sides(free: list[Interval], good: list[Interval], room: float, aside: float) -> tuple[float, float, float, float]:
-    """Return the room to the left and to the right of a line that is so far aside, and the same in need."""
-    low, high = next(gap for gap in free if gap[0] <= aside <= gap[1])
-    above = next((gap for gap in good if gap[0] <= aside <= gap[1]), None) if good is not free else None
-    if above is None:
-        return min(high, room) - aside, aside - max(low, -room), high - aside, aside - low
-    # On a strip too narrow to pass on walkers come nearer to its edges.
-    more = _NEARER if above[1] - above[0] < _APART else 0.0
-    left, right = min(above[1] + more, high) - aside, aside - max(above[0] - more, low)
-    left, right = (math.floor((side + 1e-9) / _ROUND) * _ROUND for side in (left, right))
-    return left, right, high - aside, aside - low
-
-
-def _ways_through(
-    free: list[list[Interval]], good: list[list[Interval]], room: float, bend: float, depth: Floats | None
-) -> list[tuple[int, Floats]]:
-    """Choose how far to the left of a line to go at each place: for each piece, its first place and those metres.
-
-    The way with the least cost: to go aside, to move sideways, to be where nobody can pass and below a kerb costs. Off
-    its own room it leads above edges alone.
-    """
-    most = bend if depth is None else bend + _WIDER
-    if all(any(low <= 0.0 <= high and min(high, most) - max(low, -most) >= _APART for low, high in g) for g in good):
-        return [(0, np.zeros(len(free)))]
-    steps = max(round(bend / _GRID), 1)
-    aside = np.linspace(-bend, bend, 2 * steps + 1)
-    costs = _costs(free, aside, bend)
-    if depth is not None:
-        # Where there is room above an edge, what is not above it costs, and how narrow it is there is the room's.
-        deep = np.stack([np.interp(aside, _columns(bend), row) for row in depth])
-        below = _BELOW + _DEEPER * np.clip(deep, 0.0, _DEEPEST)
-        costs = np.where(deep > 0.0, costs + below, np.minimum(_costs(good, aside, most), costs + below))
-        costs[(deep > 0.0) & (np.abs(aside) > room + 1e-9)] = np.inf
-    moves = np.arange(-(len(_MOVES) - 1), len(_MOVES))
-    prices = np.array(_MOVES)[np.abs(moves)][:, None]
-    columns = np.arange(len(aside))
-    beside = columns[None, :] + moves[:, None] + len(_MOVES) - 1
-    padded = np.full(len(aside) + 2 * len(_MOVES) - 2, np.inf)
-    pieces: list[tuple[int, Floats]] = []
-    begin, came = 0, [columns]
-    total = costs[0]
-    for place in range(1, len(costs) + 1):
-        padded[len(_MOVES) - 1 : len(_MOVES) - 1 + len(aside)] = total
-        ways = padded[beside] + prices
-        best = ways.argmin(axis=0)
-        onward = ways[best, columns] + costs[place] if place < len(costs) else np.full(len(aside), np.inf)
-        if np.isfinite(onward).any():
-            total = onward
-            came.append(columns + moves[best])
-            continue
-        if np.isfinite(total).any():
-            chain = [int(np.argmin(total))]
-            for back in came[:0:-1]:
-                chain.append(int(back[chain[-1]]))
-            pieces.append((begin, aside[chain[::-1]]))
-        if place < len(costs):
-            begin, came, total = place, [columns], costs[place]
-    return pieces
-
-
-def _costs(free: list[list[Interval]], aside: Floats, room: float) -> Floats:
-    """Return what it costs to be so far aside at each place, inf in solids, shape ``(places, len(aside))``."""
-    costs = np.full((len(free), len(aside)), np.inf)
-    place = np.repeat(np.arange(len(free)), [len(gaps) for gaps in free])
-    if not len(place):
-        return costs
-    low, high = np.array([gap for gaps in free for gap in gaps]).reshape(-1, 2).T[:, :, None]
-    narrow = np.maximum(0.0, _APART - (np.minimum(high, room) - np.maximum(low, -room)))
-    each = np.where((aside >= low) & (aside <= high), _ASIDE * np.abs(aside) + _NARROW * narrow, np.inf)
-    np.minimum.at(costs, place, each)
-    return costs
 
 
 def _kept(aside: Floats, sides: Floats, normals: Floats) -> NDArray[np.bool_]:

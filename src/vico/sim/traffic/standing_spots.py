@@ -5,8 +5,10 @@ Each spot leaves a lane of its walkway free, and is clear of doors, other walkwa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 import shapely
@@ -24,7 +26,10 @@ _LANE_LEFT = 0.65  # m that the middles of others can be apart who pass beside s
 _FROM_WALL = 0.65  # m from a window to who looks in
 _BESIDE_DOOR = (1.7, 2.6)  # m along the wall from a door to a window
 _WALL_WITHIN = (0.35, 0.9)  # m to the wall of who looks in
-_DOOR_FREE, _STOP_FREE = 1.0, 1.1  # m around doors and around where passengers wait that stay free
+# Metres around doors, around where passengers wait and around bicycle stations that stay free.
+_DOOR_FREE, _STOP_FREE, _STATION_FREE = 1.0, 1.1, 2.5
+_APART = 2 * _BODY + 0.1  # m between two who stand, at least
+_CELL = 2.5  # m along a cell by which round places are found: none is wider to a side
 _REACH = 6.0  # m from a walkway to a spot beside it
 _OTHER_WALKWAYS = 0.9  # m to them
 _PAIR_EVERY, _PAIR_APART = 30.0, 0.72  # m along a sidewalk between pairs, and between the two of a pair
@@ -38,16 +43,39 @@ _RAISED = 0.5  # m above the ground: on decks nobody stops
 _END = 1.5  # m at a walkway's ends that stay free
 
 
+class _Discs:
+    """Round places that stay free: a city has tens of thousands, so each is known by the cell its middle is in."""
+
+    def __init__(self) -> None:
+        self._by_cell: dict[tuple[int, int], list[tuple[float, float, float]]] = {}
+
+    def add(self, middle: Point2, radius: float) -> None:
+        """Add one; a radius is `_CELL` at most."""
+        self._by_cell.setdefault(self._cell(middle), []).append((*middle, radius))
+
+    def hold(self, point: Point2) -> bool:
+        """Return whether a point is in any of them."""
+        column, row = self._cell(point)
+        return any(
+            math.hypot(x - point[0], y - point[1]) < radius
+            for cell in product(range(column - 1, column + 2), range(row - 1, row + 2))
+            for x, y, radius in self._by_cell.get(cell, ())
+        )
+
+    @staticmethod
+    def _cell(point: Point2) -> tuple[int, int]:
+        return math.floor(point[0] / _CELL), math.floor(point[1] / _CELL)
+
+
 @dataclass
 class _Site:
     """What spots have to keep clear of."""
 
     walks: Walkways
     solids: shapely.STRtree
-    kept_free: NDArray[np.float64]
+    kept_free: _Discs
     usable: NDArray[np.bool_]
     rows: list[tuple[object, ...]] = field(default_factory=list)
-    taken: list[tuple[float, float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.lines = [shapely.LineString(self.walks.line(k)) for k in range(len(self.walks))]
@@ -95,10 +123,7 @@ class _Site:
         way = shapely.Polygon([*ends, point])
         if len(self.solids.query(way, predicate="dwithin", distance=_BODY)):
             return False
-        kept = self.kept_free
-        if len(kept) and (np.hypot(kept[:, 0] - point[0], kept[:, 1] - point[1]) < kept[:, 2]).any():
-            return False
-        return all(np.hypot(a - point[0], b - point[1]) > 2 * _BODY + 0.1 for a, b in self.taken)
+        return not self.kept_free.hold(point)
 
     def add(self, spots: Sequence[tuple[Point2, float, int, float]], kind: int, stop: int = NONE) -> None:
         """Add spots: point, yaw, walkway and metres along it; two of them are partners."""
@@ -106,7 +131,7 @@ class _Site:
         for k, ((x, y), yaw, walkway, offset) in enumerate(spots):
             partner = first + 1 - k if kind == TALK else NONE
             self.rows.append((x, y, yaw, walkway, offset, kind, partner, stop))
-            self.taken.append((x, y))
+            self.kept_free.add((x, y), _APART)
 
 
 def with_spots(
@@ -123,15 +148,18 @@ def with_spots(
     """
     if not len(walks):
         return network
-    kept = [(*entrance.approach, _DOOR_FREE) for entrance in world.entrances]
-    waits = [stop.wait for stop in world.transit.stops] + [stop.wait for stop in world.transit.tram_stops]
-    kept += [(*wait[:2], _STOP_FREE) for wait in waits]
-    kept += [(*station.position[:2], 2.5) for station in world.transit.bike_stations]
+    kept = _Discs()
+    for entrance in world.entrances:
+        kept.add(entrance.approach, _DOOR_FREE)
+    for wait in [stop.wait for stop in world.transit.stops] + [stop.wait for stop in world.transit.tram_stops]:
+        kept.add(wait[:2], _STOP_FREE)
+    for station in world.transit.bike_stations:
+        kept.add(station.position[:2], _STATION_FREE)
     on_ground = np.abs(walks.z - world.height(walks.points)) < _RAISED
     rows = np.repeat(np.arange(len(walks)), np.diff(walks.first))
     usable = np.bincount(rows, weights=~on_ground, minlength=len(walks)) == 0
     usable &= (walks.kind == SIDEWALK) & (walks.length >= _LEAST_LENGTH)
-    site = _Site(walks, shapely.STRtree(list(solids)), np.array(kept, np.float64).reshape(-1, 3), usable)
+    site = _Site(walks, shapely.STRtree(list(solids)), kept, usable)
     _add_stops(site, world)
     _add_windows(site, world)
     _add_pairs(site)
