@@ -77,9 +77,7 @@ def test_lamps_go_out_with_the_power_and_shops_with_their_windows(scene: Scene) 
     assert bright(scene, 2.5, 0.3) < dark + 2.0
     assert bright(scene, 4.5, 40.0) == shop
     scene.lighting = NIGHT
-    shares = np.ones((SHOP + 2, 2), np.float32)
-    shares[SHOP, 1] = 0.0
-    scene.light_windows(shares)
+    scene.light_windows([SHOP, HOUSE], [[1.0, 0.0], [1.0, 1.0]])
     assert bright(scene, 4.5, 40.0) < dark + 2.0
     assert bright(scene, 2.5, 0.3) == lit
     scene.light_windows(None)

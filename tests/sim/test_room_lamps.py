@@ -10,6 +10,7 @@ import pytest
 import toy_city
 from vico.assets.interior import WINDOW
 from vico.assets.shapes import box
+from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.records import UPPER_WINDOWS
 from vico.sim.config import SimConfig
@@ -112,7 +113,10 @@ def test_windows_of_a_home_shine_while_somebody_is_awake_in_it_and_shops_while_t
     for place, posture in ((0, Posture.STANDING), (0, Posture.LYING), (-1, Posture.STANDING), (1, Posture.STANDING)):
         people.place[:], people.posture[:] = place, posture
         lights.set(scene, sim.state)
-        seen.append(scene.arrays.windows[world.buildings[0].entity].tolist())
+        windows = scene.arrays.windows
+        assert windows["building"].tolist() == sorted(building.entity for building in world.buildings)
+        first = np.flatnonzero(windows["building"] == world.buildings[0].entity)[0]
+        seen.append(windows["shares"][first].tolist())
     home, asleep, away, shop = seen
     assert home[0] == 1.0 > 0.1 > asleep[0] == away[0] == shop[0]
     assert home[1] == asleep[1] == away[1] < 0.5 < shop[1]
@@ -120,19 +124,26 @@ def test_windows_of_a_home_shine_while_somebody_is_awake_in_it_and_shops_while_t
     assert lights.shares(11 * 3600.0, nobody)[0, 1] == 1.0
     scene.lighting = Lighting.at(12 * 3600.0)
     lights.set(scene, sim.state)
-    assert scene.arrays.windows.tolist() == [[1.0, 1.0]]
+    assert not len(scene.arrays.windows)
 
 
 def test_windows_of_one_building_go_out_and_those_of_another_stay() -> None:
     glass = Material("wall", np.full((4, 4, 4), 255, np.uint8), emission=1.0)
-    houses = [box((1, 4, 4), (8, y, 2)).of_entity(entity) for y, entity in ((2.5, 10), (-2.5, 11))]
+    number, beside = 80_000_010, 80_000_011
+    houses = [box((1, 4, 4), (8, y, 2)).of_entity(entity) for y, entity in ((2.5, number), (-2.5, beside))]
     made = Scene(
         [replace(house, material=glass, uv=house.positions[:, 1:]) for house in houses], lighting=Lighting.at(82_800.0)
     )
     made.arrays.textures.materials["windows"][made.material_names.index("wall")] = UPPER_WINDOWS
     camera = Cameras(np.array([[0.0, 0, 2]]), np.array([[1.0, 0, 0]]), width=64, height=64)
     before = render(made, camera).rgb[0].astype(int)
-    made.light_windows(np.array([[1.0, 1.0]] * 10 + [[0.0, 1.0], [1.0, 1.0]], np.float32))
-    after = render(made, camera).rgb[0].astype(int)
-    assert after[32, 22].mean() < 0.5 * before[32, 22].mean()
-    assert after[32, 42].tolist() == before[32, 42].tolist()
+    for given in ([number], [number, beside], [90_000_000, 3, number], [5, number, 70]):  # in any order, with others
+        made.light_windows(given, [[float(entity != number), 0.0 if entity != beside else 1.0] for entity in given])
+        after = render(made, camera).rgb[0].astype(int)
+        assert after[32, 22].mean() < 0.5 * before[32, 22].mean()
+        assert after[32, 42].tolist() == before[32, 42].tolist()
+    for none in ([], None, [9, 12]):
+        made.light_windows(none, np.zeros((len(none or []), 2)))
+        assert np.array_equal(render(made, camera).rgb[0], before)
+    with pytest.raises(InputError, match="shares of windows"):
+        made.light_windows([number, beside], [[1.0, 1.0]])

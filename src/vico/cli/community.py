@@ -30,6 +30,8 @@ from vico.world.world import World
 _LONGEST_ANSWER = 4096
 # What went wrong is told for so many items; the rest is in authorship.json.
 _MOST_TROUBLES = 8
+# So many residents are shown in a table.
+_TOLD = 40
 
 
 def build(options: CommunityBuildOptions) -> int:
@@ -63,13 +65,13 @@ def build(options: CommunityBuildOptions) -> int:
         print_json({**facts, "people": people, **({} if told is None else {"llm": told})})
         return 0
     print_table("Community", facts)
-    print_table(
-        "Residents",
-        {
-            str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
-            for p in people
-        },
-    )
+    rows = {
+        str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
+        for p in people[:_TOLD]
+    }
+    if len(people) > _TOLD:
+        rows["..."] = f"{len(people) - _TOLD:,} more; --json tells all"
+    print_table("Residents", rows)
     if told is not None:
         _print_authorship(told)
     return 0

@@ -301,6 +301,8 @@ class RunOptions:
         Of these pictures: plain, or fine (soft shadows, darker corners, smooth edges, mirroring glass).
     renderer
         What makes them: cpu, or gl for OpenGL (the extra "gl").
+    memory
+        Gigabytes that what cameras see of a city may take; the rest is read again when somebody looks there.
     assistants
         How many avatars take part that are nobody's resident: assistant_0, ...
     agent
@@ -366,6 +368,7 @@ class RunOptions:
     wear: CommaSeparated = ""
     quality: Literal["plain", "fine"] = "plain"
     renderer: Literal["cpu", "gl"] = "cpu"
+    memory: float = 2.0
     assistants: int = 0
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     talk: Literal["templates", "llm"] = "templates"

@@ -198,6 +198,7 @@ class Job:
             outputs=_names(options.outputs),
             quality=options.quality,
             renderer=options.renderer,
+            memory=options.memory,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
             worn=_worn(options.wear),
             periods={} if played is None else {played.agent: PERIOD},

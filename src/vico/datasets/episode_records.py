@@ -74,7 +74,7 @@ class Origin:
     gaps
         After how many frames more time passed than a frame lasts, such as at appointments.
     names
-        Kind and name of entities that the pictures may show.
+        Kind and name of entities that the pictures may show; the first that knows one names it.
     """
 
     world: Mapping[str, str]
@@ -82,7 +82,7 @@ class Origin:
     run: str
     producer: str
     gaps: int
-    names: Mapping[int, Mapping[str, str]]
+    names: Sequence[Mapping[int, Mapping[str, str]]]
 
 
 def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -> Origin:
@@ -94,15 +94,14 @@ def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -
         Names what the pictures show that is no body; without it, those have no name.
     """
     manifest = run.manifest
-    names: dict[int, Mapping[str, str]] = {} if world is None else dict(world.entities)
-    names |= {entity: {"kind": body.kind, "name": body.name} for entity, body in run.cast.items()}
+    cast = {entity: {"kind": body.kind, "name": body.name} for entity, body in run.cast.items()}
     return Origin(
         {"name": _world_name(run, world), "digest": manifest["world"]["digest"]},
         [] if world is None else [source.model_dump(mode="json") for source in world.manifest.sources],
         manifest["state_hash"],
         manifest["producer"],
         _gaps(demonstration, run),
-        names,
+        [cast] if world is None else [cast, world.entities],
     )
 
 
@@ -148,11 +147,11 @@ def _gaps(demonstration: Demonstration, run: Run) -> int:
     return int((np.diff(times) > 1.0 / demonstration.fps + 1e-6).sum())
 
 
-def _names(entities: Sequence[int], names: Mapping[int, Mapping[str, str]]) -> list[dict[str, Any]]:
+def _names(entities: Sequence[int], names: Sequence[Mapping[int, Mapping[str, str]]]) -> list[dict[str, Any]]:
     """Return kind and name of entities, as far as they are known."""
     unknown = {"kind": "unknown", "name": ""}
     found: list[dict[str, Any]] = []
     for entity in entities:
-        known = names.get(entity, unknown)
+        known = next((one[entity] for one in names if entity in one), unknown)
         found.append({"entity": entity, "kind": known["kind"], "name": known["name"]})
     return found

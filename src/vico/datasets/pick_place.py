@@ -112,15 +112,13 @@ def _demonstration(made: Demonstrated) -> Demonstration:
 
 
 def _origin(made: Demonstrated, world: World) -> Origin:
-    names: dict[int, Mapping[str, str]] = dict(world.entities)
-    names[ENTITY_TABLE] = {"kind": "table", "name": "table"}
     return Origin(
         {"name": world.manifest.name if world.path is None else world.path.name, "digest": world.digest},
         [source.model_dump(mode="json") for source in world.manifest.sources],
         "",
         f"vico {__version__}",
         int((np.diff(made.kept) > 1).sum()),
-        names,
+        [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, world.entities],
     )
 
 

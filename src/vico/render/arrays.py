@@ -135,8 +135,7 @@ class SceneArrays(NamedTuple):
     counts
         A `COUNTS` record.
     windows
-        Share of the light of buildings' windows that is on: upper floors, ground floor; by entity, float32, shape
-        ``(n, 2)``. The last row is for all entities beyond.
+        `LIT_WINDOWS`, ascending by building. All windows of buildings that are not among them are on.
     openings
         Doors that are not closed, `OPENING`.
     beams
@@ -151,7 +150,7 @@ class SceneArrays(NamedTuple):
     instances: Instances
     avatars: PosedAvatars
     counts: Any
-    windows: NDArray[np.float32]
+    windows: NDArray[np.void]
     openings: NDArray[np.void]
     beams: NDArray[np.void]
 

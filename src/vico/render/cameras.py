@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -71,6 +72,17 @@ class Cameras:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def of(self, rows: Sequence[int]) -> Cameras:
+        """Return some of the cameras."""
+        up, hidden = np.asarray(self.up, np.float64), np.asarray(self.hidden_entity)
+        return replace(
+            self,
+            position=self.position[rows],
+            forward=self.forward[rows],
+            up=up if up.ndim == 1 else up[rows],
+            hidden_entity=hidden[rows],
+        )
 
     @cached_property
     def rotation(self) -> NDArray[np.float64]:

@@ -45,13 +45,21 @@ MATERIAL = np.dtype(
         ("levels", i4),  # number of mip levels; 0: no texture
         ("flags", i4),  # bits CUTOUT and DOUBLE_SIDED
         ("emission", f4),  # light of its own, 1 = a white wall in full light
-        ("windows", i4),  # whose light it is: NO_WINDOWS, or a column of `SceneArrays.windows` and one
+        ("windows", i4),  # whose light it is: NO_WINDOWS, or a place in `LIT_WINDOWS`' shares and one
         ("storeys", i4),  # a facade's picture shows `BAYS` bays by so many storeys; 0: it is none
     ],
     align=True,
 )
 CUTOUT, DOUBLE_SIDED = 1, 2
 NO_WINDOWS, UPPER_WINDOWS, GROUND_WINDOWS = 0, 1, 2
+# How much of the light of a building's windows is on. As `surface.frag` reads it, too.
+LIT_WINDOWS = np.dtype(
+    [
+        ("building", i4),  # entity
+        ("shares", f4, (2,)),  # of upper floors and of the ground floor, 0..1
+    ],
+    align=True,
+)
 BAYS = 8
 
 # How many there are: instances in all, those of them that never move (they come first), and avatars; and vertices of

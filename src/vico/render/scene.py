@@ -35,17 +35,19 @@ from vico.render.lamps.beams import beams_of
 from vico.render.lamps.grid import NO_LAMPS, LampGrid, lamp_grid, shining
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
 from vico.render.limbs import LIMBS
+from vico.render.palette import Palette
 from vico.render.prototypes import prototypes_of
-from vico.render.records import COUNTS, LAMP, OPENING, ROOM, ROOM_FRONT, SPHERE
+from vico.render.records import COUNTS, LAMP, LIT_WINDOWS, OPENING, ROOM, ROOM_FRONT, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
 from vico.render.shadows.maps import built_tops, relief_map, shadow_map
-from vico.render.textures import pack_textures
+from vico.render.textures import Textures
 from vico.render.uniforms import Record, light_uniforms
 from vico.world.mesh import Material, Surface
 
 _SHADOW_METRES, _RELIEF_METRES = 0.4, 1.5
-_ALL_ON = np.ones((1, 2), np.float32)
+_ALL_ON = np.zeros(0, LIT_WINDOWS)
+_SKIN = Material("vico skin")
 NO_OPENINGS = np.zeros(0, OPENING)
 _NO_BEAMS = np.zeros(0, LAMP)
 
@@ -68,6 +70,10 @@ class Scene:
         Insides of vehicles that can be looked into, by the names of their models.
     lighting
         The light of the moment; assign `Scene.lighting` to change it.
+    far
+        Outdoor surfaces beyond the others, which get no shadows: maps of these end with the others.
+    palette
+        Keeps textures that scenes share; none: they are the scene's own.
 
     Attributes
     ----------
@@ -96,19 +102,22 @@ class Scene:
         rooms: ArrayLike | None = None,
         cabins: Mapping[str, Cabin] | None = None,
         lighting: Lighting | None = None,
+        far: Sequence[Surface] = (),
+        palette: Palette | None = None,
     ) -> None:
         models = dict(prototypes or {})
-        materials = _Materials()
+        materials = palette or Palette()
         linear = linear_table()
-        outside = soup_of(static, [materials.number(s.material) for s in static], linear)
+        outdoors = [*static, *far]
+        outside = soup_of(outdoors, [materials.number(s.material) for s in outdoors], linear)
         inside = soup_of(indoor, [materials.number(s.material) for s in indoor], linear)
         model_soups = [
             soup_of(surfaces, [materials.number(s.material) for s in surfaces], linear) for surfaces in models.values()
         ]
         # Avatars have no texture: their colour is in the vertices.
-        self._skin = materials.number(Material("vico skin"))
-        textures = pack_textures(materials.entries)
-        self.material_names = [material.name for material in materials.entries]
+        self._skin = materials.number(_SKIN)
+        textures = materials.packed()
+        self.material_names = materials.names
         outside, outer = clustered(outside, textures.double_sided)
         inside, inner = clustered(inside, textures.double_sided)
         _shift(inner.span, len(outside.triangles), len(outside.position))
@@ -135,12 +144,13 @@ class Scene:
         self.fronts = np.zeros(0, ROOM_FRONT)
         self.lamps = np.zeros(0, LAMP)
         self._grid: LampGrid | None = None
+        # What `windows` of the arrays were made of.
+        self._lit: tuple[ArrayLike | None, ArrayLike | None] = (None, None)
         self._beams = beams_of(models)
         self._shadow_key: tuple[float, ...] | None = None
         self._shadow: ShadowMap | None = None
         self._relief: ReliefMap | None = None
-        self._low = outer.low.min(axis=0).astype(np.float64) if len(outer.low) else np.zeros(3)
-        self._high = outer.high.max(axis=0).astype(np.float64) if len(outer.high) else np.ones(3)
+        self._low, self._high = _bounds(static)
         empty = Instances(
             np.zeros((0, 3, 4), np.float32),
             np.zeros(0, np.int32),
@@ -167,6 +177,15 @@ class Scene:
             _NO_BEAMS,
         )
         self.arrays.counts["fixed_vertices"] = max(widest(clusters.span), widest(placeable.levels.reshape(-1)))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the scene's own arrays: without textures, which scenes may share."""
+        return sum(_bytes_of(part) for name, part in self.arrays._asdict().items() if name != "textures")
+
+    def share_textures(self, other: Scene) -> None:
+        """Take the textures of a scene that was made later with the same palette, so that both have the same arrays."""
+        self._replace(textures=other.arrays.textures)
 
     @property
     def lighting(self) -> Lighting:
@@ -374,10 +393,22 @@ class Scene:
         self.rooms["lamp"] = lamp
         self.rooms["daylight"] = daylight * self.rooms["windows"]
 
-    def light_windows(self, shares: NDArray[np.float32] | None) -> None:
-        """Switch on shares of the light of buildings' windows, as ``SceneArrays.windows`` has them; None: all."""
-        windows = _ALL_ON if shares is None else np.ascontiguousarray(shares, np.float32)
-        if windows is not self.arrays.windows and not np.array_equal(windows, self.arrays.windows):
+    def light_windows(self, entities: ArrayLike | None, shares: ArrayLike | None = None) -> None:
+        """Switch on shares of the light of buildings' windows.
+
+        Parameters
+        ----------
+        entities
+            Buildings, each once, in any order, shape ``(n,)``; all windows of others are on. None: those of all are.
+            Passing the same arrays again is cheaper than passing equal ones; they must not be changed in between.
+        shares
+            Of upper floors and of the ground floor, 0..1, shape ``(n, 2)``; needed with `entities`.
+        """
+        if entities is self._lit[0] and shares is self._lit[1]:
+            return
+        self._lit = entities, shares
+        windows = _ALL_ON if entities is None else _lit_windows(entities, shares)
+        if not np.array_equal(windows, self.arrays.windows):
             self._replace(windows=windows)
             if self._light is not None:
                 self._light = self._light._replace(
@@ -437,22 +468,44 @@ class Scene:
         all_of.where[rows], all_of.sphere[rows] = moving.where, moving.sphere
         self.arrays.counts["instances"], self.arrays.counts["static_instances"] = fixed + count, fixed
 
-    def _replace(self, **changed: Mesh | Instances | PosedAvatars | NDArray[np.float32] | NDArray[np.void]) -> None:
+    def _replace(
+        self, **changed: Mesh | Textures | Instances | PosedAvatars | NDArray[np.float32] | NDArray[np.void]
+    ) -> None:
         self.arrays = self.arrays._replace(**changed)  # type: ignore[arg-type]
 
 
-class _Materials:
-    """Numbers for materials: equal objects share one."""
+def _bounds(surfaces: Sequence[Surface]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the corners of the box around some surfaces, in single precision as meshes have them."""
+    used = [surface.positions[_are_used(surface)] for surface in surfaces if len(surface.triangles)]
+    if not used:
+        return np.zeros(3), np.ones(3)
+    low = np.min([points.min(axis=0) for points in used], axis=0)
+    high = np.max([points.max(axis=0) for points in used], axis=0)
+    return low.astype(np.float32).astype(np.float64), high.astype(np.float32).astype(np.float64)
 
-    def __init__(self) -> None:
-        self.entries: list[Material] = []
-        self._known: dict[int, int] = {}
 
-    def number(self, material: Material) -> int:
-        if id(material) not in self._known:
-            self._known[id(material)] = len(self.entries)
-            self.entries.append(material)
-        return self._known[id(material)]
+def _bytes_of(part: Any) -> int:
+    """Return the bytes of an array, or of all arrays in a tuple."""
+    return sum(map(_bytes_of, part)) if isinstance(part, tuple) else int(getattr(part, "nbytes", 0))
+
+
+def _are_used(surface: Surface) -> NDArray[np.bool_]:
+    """Return which vertices of a surface a triangle has."""
+    used = np.zeros(len(surface.positions), np.bool_)
+    used[surface.triangles] = True
+    return used
+
+
+def _lit_windows(entities: ArrayLike, shares: ArrayLike | None) -> NDArray[np.void]:
+    """Return `LIT_WINDOWS` in their order."""
+    buildings = np.asarray(entities, np.int32).reshape(-1)
+    on = np.asarray([] if shares is None else shares, np.float32)
+    if on.shape != (len(buildings), 2):
+        raise InputError(f"scene: shares of windows have shape {on.shape}, not ({len(buildings)}, 2)")
+    order = np.argsort(buildings, kind="stable")
+    windows = np.zeros(len(buildings), LIT_WINDOWS)
+    windows["building"], windows["shares"] = buildings[order], on[order]
+    return windows
 
 
 def _rooms(boxes: NDArray[np.float64]) -> NDArray[np.void]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from vico.assets.vehicle_parts import Cabin
+    from vico.render.palette import Palette
     from vico.world.world import World
 
 # Beginnings of the names of materials with windows in them.
@@ -36,6 +37,8 @@ def scene_of(
     lighting: Lighting | None = None,
     prototypes: Mapping[str, Sequence[Surface]] | None = None,
     cabins: Mapping[str, Cabin] | None = None,
+    far: Sequence[Surface] = (),
+    palette: Palette | None = None,
 ) -> Scene:
     """Put a world's parts together.
 
@@ -45,7 +48,7 @@ def scene_of(
         Whether to take the rooms and the furniture in them.
     prototypes
         Further models that will move in the scene (vehicles, robots, goods), by name.
-    cabins
+    cabins, far, palette
         As in `Scene`.
     """
     static = [surface for layer in OUTDOOR_LAYERS for surface in world.surfaces(layer)]
@@ -57,7 +60,16 @@ def scene_of(
     is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
     for name in np.unique(world.objects.prototype[is_lamp]).tolist():
         models[name] = with_lit_heads(models[name])
-    scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), cabins=cabins, lighting=lighting)
+    scene = Scene(
+        static,
+        models,
+        indoor=indoor,
+        rooms=np.array(boxes).reshape(-1, 7),
+        cabins=cabins,
+        lighting=lighting,
+        far=far,
+        palette=palette,
+    )
     _tell_windows(scene)
     if rooms:
         scene.fronts = room_fronts(world)

@@ -70,6 +70,9 @@ class SimSettings:
         How carefully pictures are made: ``"plain"``, ``"fine"``, or switches of `vico.render.quality.RenderQuality`.
     renderer
         What makes pictures: ``"cpu"``, or ``"gl"`` for OpenGL (extra ``gl``); they agree but for rounding.
+    memory
+        Of cities: gigabytes that the scenes of all who look may take, or the least that one takes; others are made anew
+        when somebody looks from there again. Decides nothing else.
     date
         On which the first day is, YYYY-MM-DD.
     utc_offset
@@ -107,6 +110,7 @@ class SimSettings:
     worn: Mapping[str, str] = field(default_factory=dict)
     quality: str | Mapping[str, bool] = "plain"
     renderer: str = "cpu"
+    memory: float = 2.0
     date: str = "2026-06-21"
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
@@ -155,6 +159,8 @@ class SimConfig(SimSettings):
         RenderQuality.of(self.quality)
         if self.renderer not in RENDERERS:
             raise InputError(f"simulation: renderer {self.renderer!r}; it has to be one of {', '.join(RENDERERS)}")
+        if not 0.0 < self.memory < math.inf:
+            raise InputError(f"simulation: memory is {self.memory}; give gigabytes, such as 2")
         for record in self.cameras.values():
             Lens.of(record, side=self.image)
 

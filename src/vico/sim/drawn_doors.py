@@ -23,8 +23,10 @@ from vico.assets.house_doors import (
 from vico.render.records import OPENING
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import Drawn
+from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
 from vico.world.mesh import Surface
+from vico.world.model import Building
 from vico.world.world import World
 
 _CORNER = 0.1  # metres between a hall and the outside of its house
@@ -52,6 +54,8 @@ class DrawnDoors:
     ----------
     base
         The world, with its doors.
+    part
+        Of a city, outside of which no doors are drawn; none: all are.
 
     Attributes
     ----------
@@ -59,11 +63,13 @@ class DrawnDoors:
         Leaves and halls by name.
     """
 
-    def __init__(self, base: SimulationBase) -> None:
+    def __init__(self, base: SimulationBase, part: ScenePart | None = None) -> None:
         self._doors, self._world = base.house_doors, base.world
-        self._entity = {building.id: building.entity for building in base.world.buildings}
+        self._drawn = self._doors["kind"] >= 0
+        if part is not None:
+            self._drawn &= part.holds(np.column_stack([self._doors["x"], self._doors["y"]]))
         self._sizes: dict[int, int] = {}
-        self.prototypes = _shapes_of(self._doors, base.world)
+        self.prototypes = _shapes_of(self._doors[self._drawn], base.world if part is None else part.world)
         self._index = {name: k for k, name in enumerate(self.prototypes)}
 
     @classmethod
@@ -73,7 +79,7 @@ class DrawnDoors:
 
     def draw(self, state: SimulationState) -> OpenDoors | None:
         """Return what is drawn of the doors that are not closed; None of none."""
-        rows = [k for k, e in enumerate(state.leaves.entrance.tolist()) if self._doors["kind"][e] >= 0]
+        rows = [k for k, e in enumerate(state.leaves.entrance.tolist()) if self._drawn[e]]
         if not rows:
             return None
         names: list[str] = []
@@ -87,7 +93,7 @@ class DrawnDoors:
             here = [*leaf_names(door), hall_name(door, self._size(number), lit=lit)]
             names += here
             poses += [*leaf_poses(door, share), _base(door)]
-            owners += [self._entity[self._world.entrances[number].building]] * len(here)
+            owners += [self._building(number).entity] * len(here)
             openings.append(opening_of(door))
         index = np.array([self._index[name] for name in names], np.int32)
         shapes = Drawn(list(self.prototypes), index, np.array(poses, np.float32), np.array(owners, np.int32))
@@ -95,9 +101,11 @@ class DrawnDoors:
 
     def _size(self, number: int) -> int:
         if number not in self._sizes:
-            building = next(b for b in self._world.buildings if b.id == self._world.entrances[number].building)
-            self._sizes[number] = hall_size(self._doors[number], building.footprint)
+            self._sizes[number] = hall_size(self._doors[number], self._building(number).footprint)
         return self._sizes[number]
+
+    def _building(self, number: int) -> Building:
+        return self._world.building_by_id[self._world.entrances[number].building]
 
 
 def hall_size(door: NDArray[np.void], footprint: Sequence[Sequence[tuple[float, float]]]) -> int:
@@ -125,12 +133,12 @@ def _base(door: NDArray[np.void]) -> NDArray[np.float64]:
 
 
 def _shapes_of(doors: NDArray[np.void], world: World) -> dict[str, Sequence[Surface]]:
-    """Return every leaf and hall of a world's doors, equal ones once."""
+    """Return every leaf and hall of some of a world's doors, equal ones once."""
     shapes: dict[str, Sequence[Surface]] = {}
-    if not (doors["kind"] >= 0).any():
+    if not len(doors):
         return shapes
     material = next(s.material for s in world.surfaces("buildings") if s.material.name == DOOR_MATERIAL)
-    for door in doors[doors["kind"] >= 0]:
+    for door in doors:
         names = leaf_names(door)
         if names[0] not in shapes:
             shapes |= dict(zip(names, leaf_surfaces(door, material), strict=True))

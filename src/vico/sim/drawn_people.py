@@ -25,6 +25,8 @@ from vico.sim.passers_by import manner_of_pedestrian
 from vico.sim.simulation_state import SimulationState
 from vico.threads import in_order
 
+# Metres: of who has no body yet, whom nobody sees.
+_USUAL_HEIGHT = 1.7
 _Detail = Literal["far", "light", "full"]
 
 
@@ -59,24 +61,28 @@ class DrawnPeople:
         Of the bodies.
     far
         Whether a crowd has a second, coarser body each.
+    everybody
+        Whether all have a body; else those that `choose` is told, and at first nobody.
 
     Attributes
     ----------
+    rows
+        Who has a body: numbers of agents, and after them of pedestrians, ascending.
     batch
-        The bodies, and after them those for far away, as `vico.render.skinning.skin` takes them.
+        Their bodies, and after them those for far away, as `vico.render.skinning.skin` takes them.
     looks
         How everybody looks now.
     style
         A `STYLE` record each, shape ``(n,)``.
     height
-        Metres, float64, shape ``(n,)``.
+        Metres, float64, shape ``(n,)``; a usual one of those who never had a body.
     entities
         int32, shape ``(n,)``.
     habit
         How little each pedestrian minds rain, 0..1, float64.
     """
 
-    def __init__(self, sim: Cast, *, detail: Literal["light", "full"], far: bool) -> None:
+    def __init__(self, sim: Cast, *, detail: Literal["light", "full"], far: bool, everybody: bool = True) -> None:
         people, looks = sim.state.people, list(sim.looks)
         walkers = sim.state.traffic.walkers.entity.tolist() if sim.state.traffic is not None else []
         self._detail, self._seed = detail, sim.config.seed
@@ -86,16 +92,35 @@ class DrawnPeople:
         self.looks = looks
         self._worn = _worn_bodies(sim)
         self._names = [*people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
-        self._bodies = self._made(looks, detail)
-        self._far = self._made(looks, "far") if far and len(looks) >= CROWD else []
+        self._bodies: dict[int, SkinnedBody] = {}
+        self._far: dict[int, SkinnedBody] = {}
+        self._has_far = far and len(looks) >= CROWD
         self._being_made: dict[Appearance, Future[Any]] = {}
         self._maker: ThreadPoolExecutor | None = None
         self.entities = np.array([*people.entity.tolist(), *walkers], np.int32)
         self.habit = np.array([habit_of(self._seed, name) for name in self._names[len(people) :]], np.float64)
         self.style = np.zeros(len(looks), STYLE)
-        self.height = np.zeros(len(looks))
-        for i in range(len(looks)):
+        self.height = np.full(len(looks), _USUAL_HEIGHT)
+        self.rows = np.zeros(0, np.int64)
+        self._batch()
+        if everybody:
+            self.choose(np.arange(len(looks)))
+
+    def choose(self, rows: NDArray[np.int64]) -> None:
+        """Have bodies for some, by their numbers, ascending, and for nobody else."""
+        if np.array_equal(rows, self.rows):
+            return
+        wanted = set(rows.tolist())
+        for bodies in (self._bodies, self._far):
+            for i in bodies.keys() - wanted:
+                del bodies[i]
+        new = [i for i in rows.tolist() if i not in self._bodies]
+        self._bodies |= self._made(new, self._detail)
+        if self._has_far:
+            self._far |= self._made(new, "far")
+        for i in new:
             self._describe(i)
+        self.rows = rows.copy()
         self._batch()
 
     def follow(self, state: SimulationState) -> None:
@@ -103,7 +128,7 @@ class DrawnPeople:
         wanted = state.people.clothes[: len(self._own)]
         for i in np.flatnonzero(state.people.at_door()[: len(self._own)]).tolist():
             # Who is about to leave home: the body is made before it is needed.
-            if state.people.door[i] == state.homes[i] and state.people.room[i] >= 0:
+            if i in self._bodies and state.people.door[i] == state.homes[i] and state.people.room[i] >= 0:
                 self._prepare(self._look(i, state.weather_to_dress_for()))
         if np.array_equal(wanted, self._clothes):
             return
@@ -114,13 +139,14 @@ class DrawnPeople:
                 self.looks[i] = look
                 changed.append(i)
         self._clothes[:] = wanted
-        for i in changed:
+        drawn = [i for i in changed if i in self._bodies]
+        for i in drawn:
             near, far = self._body(self.looks[i])
             self._bodies[i] = near
-            if self._far:
+            if self._has_far:
                 self._far[i] = far
             self._describe(i)
-        if changed:
+        if drawn:
             self._batch()
 
     def _look(self, i: int, weather: NDArray[np.float64]) -> Appearance:
@@ -137,23 +163,24 @@ class DrawnPeople:
 
     def _make(self, look: Appearance) -> tuple[SkinnedBody, SkinnedBody]:
         near = body_of(look, detail=self._detail)
-        return near, body_of(look, detail="far") if self._far else near
+        return near, body_of(look, detail="far") if self._has_far else near
 
     def _body(self, look: Appearance) -> tuple[SkinnedBody, SkinnedBody]:
         """Return somebody's body from near and far, waiting for it if it is being made."""
         begun = self._being_made.pop(look, None)
         return self._make(look) if begun is None else begun.result()
 
-    def _made(self, looks: Sequence[Appearance], detail: _Detail) -> list[SkinnedBody]:
-        """Make everybody's body, those of a look once; who wears one of their own has it in any detail."""
-        kinds = list(dict.fromkeys(looks))
+    def _made(self, rows: Sequence[int], detail: _Detail) -> dict[int, SkinnedBody]:
+        """Make bodies, those of a look once; who wears one of their own has it in any detail."""
+        kinds = list(dict.fromkeys(self.looks[i] for i in rows))
         made = dict(zip(kinds, in_order(partial(body_of, detail=detail), kinds), strict=True))
-        bodies = [made[look] for look in looks]
+        bodies = {i: made[self.looks[i]] for i in rows}
         for name, path in self._worn.items():
             from vico.assets.people.worn import worn  # few wear anything of their own
 
             k = self._names.index(name)
-            bodies[k] = worn(made[looks[k]], path) if detail != "far" else self._bodies[k]
+            if k in bodies:
+                bodies[k] = worn(bodies[k], path) if detail != "far" else self._bodies[k]
         return bodies
 
     def _describe(self, i: int) -> None:
@@ -163,8 +190,10 @@ class DrawnPeople:
         self.height[i] = body.height
 
     def _batch(self) -> None:
-        entities = self.entities.tolist()
-        self.batch: BodyBatch = batch_bodies([*self._bodies, *self._far], entities * (2 if self._far else 1))
+        rows = self.rows.tolist()
+        bodies = [self._bodies[i] for i in rows] + [self._far[i] for i in rows if self._has_far]
+        entities = self.entities[self.rows].tolist()
+        self.batch: BodyBatch = batch_bodies(bodies, entities * (2 if self._has_far else 1))
 
 
 def _worn_bodies(sim: Cast) -> dict[str, Path]:

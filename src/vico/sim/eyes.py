@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,27 +53,19 @@ _OF_KIND = {
 }
 
 
-class _NamesEntities(Protocol):
-    @property
-    def world(self) -> World:
-        """Where it happens."""
-
-    def entity(self, entity: int) -> dict[str, str]:
-        """Kind and name of an entity."""
-
-
 class SemanticClasses:
     """Classes of what segmentation images show, by entity.
 
     Parameters
     ----------
-    sim
-        Whose entities they are.
+    world
+        Where it happens.
+    entity
+        Returns kind and name of what is not the world's, by entity.
     """
 
-    def __init__(self, sim: _NamesEntities) -> None:
-        self._world = sim.world
-        self._entity: Callable[[int], dict[str, str]] = sim.entity
+    def __init__(self, world: World, entity: Callable[[int], dict[str, str]]) -> None:
+        self._world, self._entity = world, entity
         self._indoor: set[int] | None = None
         self._known: dict[int, int] = {0: 0}
 

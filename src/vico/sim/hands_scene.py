@@ -34,10 +34,12 @@ _RAIN_MORE = 0.15
 
 
 class Holders(NamedTuple):
-    """Everybody who may have something in hand, one row a person; agents first, then pedestrians.
+    """Those who are drawn, one row a person; agents first, then pedestrians.
 
     Attributes
     ----------
+    number
+        Of each among all agents and, after them, all pedestrians, int64, shape ``(n,)``, ascending.
     joints, rotations, offsets
         As `vico.sim.animation.hand_frames` takes them.
     position, yaw
@@ -52,6 +54,7 @@ class Holders(NamedTuple):
         Shape ``(n,)``.
     """
 
+    number: NDArray[np.int64]
     joints: NDArray[np.float32]
     rotations: NDArray[np.float32]
     offsets: NDArray[np.float32]
@@ -121,7 +124,7 @@ def draw_in_hands(state: SimulationState, who: Holders) -> list[Drawn]:
 
 
 def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
-    """Return the umbrellas that are up, None without any; the first so many holders are agents."""
+    """Return the umbrellas that are up, None without any; the first so many of all are agents."""
     hold = who.hands.hold
     is_umbrella = (hold == int(Hold.UMBRELLA_LEFT)) | (hold == int(Hold.UMBRELLA_RIGHT))
     rows = np.flatnonzero(is_umbrella & (who.hands.share > 0.25))
@@ -143,12 +146,13 @@ def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     axes = np.stack([ahead * wide[:, None], np.cross(up, ahead) * wide[:, None], up * size[:, None]], axis=2)
     names = umbrellas()
-    number = np.where(rows < agents, FIRST_UMBRELLA + rows, FIRST_PEDESTRIAN_UMBRELLA + rows - agents)
+    person = who.number[rows]
+    entity = np.where(person < agents, FIRST_UMBRELLA + person, FIRST_PEDESTRIAN_UMBRELLA + person - agents)
     return Drawn(
         names,
-        (rows * 7 // 3 % len(names)).astype(np.int32),
+        (person * 7 // 3 % len(names)).astype(np.int32),
         _transforms(who, rows, axes, fist),
-        number.astype(np.int32),
+        entity.astype(np.int32),
     )
 
 
@@ -161,7 +165,8 @@ def draw_placards(who: Holders) -> Drawn | None:
     size = np.clip(who.height[rows] / _MADE_FOR, 0.65, 1.1) * np.clip((who.hands.share[rows] - 0.25) / 0.75, 0.05, 1.0)
     axes = np.eye(3) * size[:, None, None]
     names, entity = placards(), np.asarray(who.entity[rows], np.int32)
-    return Drawn(names, (rows * 5 // 2 % len(names)).astype(np.int32), _transforms(who, rows, axes, fist), entity)
+    look = (who.number[rows] * 5 // 2 % len(names)).astype(np.int32)
+    return Drawn(names, look, _transforms(who, rows, axes, fist), entity)
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -169,8 +174,8 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _meals(state: SimulationState, who: Holders) -> Drawn | None:
-    agents = len(state.people)
-    drinks, eats = np.isin(who.clip[:agents], _DRINKS), np.isin(who.clip[:agents], _EATS)
+    clip = who.clip[who.number < len(state.people)]
+    drinks, eats = np.isin(clip, _DRINKS), np.isin(clip, _EATS)
     rows = np.flatnonzero(drinks | eats)
     if not len(rows):
         return None
@@ -180,7 +185,8 @@ def _meals(state: SimulationState, who: Holders) -> Drawn | None:
     names, index = [], []
     axes = np.zeros((len(rows), 3, 3))
     for k, i in enumerate(rows.tolist()):
-        names.append(drink_of(i, state) if drinks[i] else food_of(i, state))
+        person = int(who.number[i])
+        names.append(drink_of(person, state) if drinks[i] else food_of(person, state))
         index.append(k)
         # Cups tip towards the face; food points at it.
         tip = -_TIP * float(raised[k]) if drinks[i] else 0.0
@@ -226,28 +232,38 @@ def food_of(i: int, state: SimulationState) -> str:
 
 def _objects(state: SimulationState, who: Holders) -> Drawn:
     """Return the movable objects: where they lie, or in the hand or the arms that hold them."""
-    objects, p = state.objects, state.people
+    objects = state.objects
     names = sorted(set(objects.prototypes))
     transforms = np.zeros((len(objects), 4, 4))
     transforms[:, :3, :3] = matrix_of(objects.orientation)
     transforms[:, 3, 3] = 1.0
     transforms[:, :3, 3] = objects.position
     for k in np.flatnonzero(objects.hand >= 0).tolist():
-        row = np.flatnonzero(p.entity == objects.holder[k])[:1]
+        row = np.flatnonzero(who.entity == objects.holder[k])[:1]
+        if not len(row):
+            continue  # who holds it is not drawn: far from where anybody looks
         transforms[k, :3, 3] = who.world(row, carried_at(k, int(row[0]), state, who)[None])[0]
     index = np.array([names.index(name) for name in objects.prototypes], np.int32)
     return Drawn(names, index, transforms.astype(np.float32), objects.entity)
 
 
 def carried_at(k: int, i: int, state: SimulationState, who: Holders) -> NDArray[np.float64]:
-    """Return where the middle of the underside of what a person carries is, body frame, metres, shape ``(3,)``."""
+    """Return where the middle of the underside of what is carried is, body frame, metres, shape ``(3,)``.
+
+    Parameters
+    ----------
+    k
+        Row of the object.
+    i
+        Row of who carries it among `who`.
+    """
     objects = state.objects
     size = objects.size[k]
     grip = movable_grip(objects.prototypes[k], size)
     palms = who.palms(np.array([i]))[0]
     mine = palms[objects.hand[k]]
     at = np.array([mine[0], mine[1], mine[2] - (0.5 if grip == "hand" else 1.0) * size[2]])
-    if state.people.hold[i] == int(Hold.BEFORE_CHEST):
+    if state.people.hold[who.number[i]] == int(Hold.BEFORE_CHEST):
         between = palms.mean(axis=0) - np.array([0.0, 0.0, 0.4 * size[2]])
         at += (between - at) * who.hands.share[i]
     at[2] = max(at[2], 0.02)

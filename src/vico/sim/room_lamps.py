@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from vico.clock import DAY
 from vico.community.hours import MINUTES, Span, is_within, open_spans
 from vico.community.usual_hours import usual_spans
+from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
 from vico.world.model import Category, Place
@@ -37,9 +38,13 @@ class RoomLamps:
         The world.
     weekday
         Of the first day, 0 Monday .. 6 Sunday.
+    part
+        Of a city, whose rooms are meant; none: all.
     """
 
-    def __init__(self, world: World, weekday: int) -> None:
+    def __init__(self, world: World, weekday: int, part: ScenePart | None = None) -> None:
+        self._rows = None if part is None else part.rooms
+        world = world if part is None else part.world
         number = {place.id: k for k, place in enumerate(world.places)}
         self._xy = np.array([room.centre[:2] for room in world.rooms], np.float64).reshape(-1, 2)
         self._place = np.array([number.get(room.place, -1) for room in world.rooms], np.int64)
@@ -58,7 +63,9 @@ class RoomLamps:
         are_open = np.append(self.are_open(state.second), False)  # the last one is for no place
         lit = self._shared | (are_open[self._place] & ~self._private)
         people = state.people
-        lit[people.room[(people.room >= 0) & (people.posture != Posture.LYING)]] = True
+        used = people.room[(people.room >= 0) & (people.posture != Posture.LYING)]
+        rows = used if self._rows is None else self._rows[used]
+        lit[rows[rows >= 0]] = True
         return lit & powered
 
     def are_open(self, second: float) -> NDArray[np.bool_]:

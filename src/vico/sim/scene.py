@@ -39,6 +39,7 @@ from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_
 from vico.sim.observations import Views
 from vico.sim.passers_by import pedestrian_motion
 from vico.sim.room_lamps import RoomLamps
+from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.sim.window_lights import WindowLights
@@ -51,6 +52,9 @@ _LIGHT_EVERY = 60.0
 # Feet of who sits reach so far below where they would be on a seat of one's own height, and above, metres.
 _FEET_HANG, _FEET_RISE = 0.1, 0.3
 _ICE_SHINES = 0.6  # as much as wet ground does
+# Of parts of a city: metres beside one within which all have bodies, and within which they get them when some come
+# there who have none; and of how many too many bodies it is worth to choose anew.
+_BESIDE, _SOON, _SPARE_BODIES = 2.0, 40.0, 100
 _OVERCAST = 0.45  # share of the daylight in rooms that a sky full of clouds takes
 
 
@@ -94,6 +98,13 @@ class _Motion(NamedTuple):
     rise_before: NDArray[np.float64]
     hands: Hands
 
+    def of(self, rows: NDArray[np.int64]) -> _Motion:
+        """Return how some of them move."""
+        after = Transition._make(None if part is None else part[rows] for part in self.after)
+        hands = Hands._make(part[rows] for part in self.hands)
+        plain = {name: getattr(self, name)[rows] for name in self._fields if name not in ("after", "hands")}
+        return _Motion(after=after, hands=hands, **plain)
+
 
 class RenderedSimulation(Cast, Protocol):
     """What the renderer asks of a simulation."""
@@ -119,33 +130,50 @@ class SceneRenderer:
         The simulation to render, complete with its movable objects.
     detail
         Of people's bodies: "light", or "full" for pictures to look at, which takes three times as long to skin.
+    part
+        Of a city, to which the scene is limited; none: the whole world.
     """
 
-    def __init__(self, sim: RenderedSimulation, *, detail: Literal["light", "full"] = "light") -> None:
-        self._detail = detail
+    def __init__(
+        self, sim: RenderedSimulation, *, detail: Literal["light", "full"] = "light", part: ScenePart | None = None
+    ) -> None:
+        self._detail, self._part = detail, part
         self._pictures: PictureSet | None = None
-        self._scene = _scene_of(sim)
+        self._doors = DrawnDoors.of(sim.state.base) if part is None else DrawnDoors(sim.state.base, part)
+        self._scene = self._made(sim)
         self._attach(sim)
 
     def rebind(self, sim: RenderedSimulation) -> SceneRenderer:
         """Return a renderer of another simulation: with this scene if it has all that is to be seen, else a new one."""
-        known = set(_shapes(sim)) <= set(self._scene.names)
+        known = set(_shapes(sim, self._doors)) <= set(self._scene.names)
         if sim.world is not self._sim.world or not known:
-            return SceneRenderer(sim, detail=self._detail)
+            return SceneRenderer(sim, detail=self._detail, part=self._part)
         self._attach(sim)
         return self
 
+    def _made(self, sim: RenderedSimulation) -> Scene:
+        """Return the scene of a run, with nothing that moves in its place yet."""
+        shapes, part = _shapes(sim, self._doors), self._part
+        mirrored = sim.state.traffic is not None and sim.state.traffic.lanes.lefthand
+        found = {name: cabin_of(name, mirrored=mirrored) for name in shapes}
+        cabins = {name: cabin for name, cabin in found.items() if cabin is not None}
+        if part is None:
+            scene = scene_of(sim.world, prototypes=shapes, cabins=cabins)
+        else:
+            scene = scene_of(part.world, prototypes=shapes, cabins=cabins, far=part.far, palette=part.palette)
+        scene.keep_detail(self._doors.prototypes)
+        return scene
+
     def _attach(self, sim: RenderedSimulation) -> None:
-        self._sim = sim
-        self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date).weekday())
-        self._window_lights = WindowLights(sim.world, sim.residents, self._room_lamps)
-        self._doors = DrawnDoors.of(sim.state.base)
+        self._sim, part = sim, self._part
+        self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date).weekday(), part)
+        self._window_lights = WindowLights(sim.world, sim.residents, self._room_lamps, part)
         self._lit: tuple[float, ...] = ()
         self.wait()
         self._viewers = Viewers(
             self._scene,
             sim.config.outputs,
-            SemanticClasses(sim).of_image,
+            SemanticClasses(sim.world if part is None else part.world, sim.entity).of_image,
             RenderQuality.of(sim.config.quality),
             sim.config.renderer,
         )
@@ -153,7 +181,7 @@ class SceneRenderer:
         self._usual_lens = Lens.of({}, side=sim.config.image)
         # Flow tells where each vertex has been: bodies keep their shape there.
         far = self._detail == "light" and "flow" not in self._viewers.outputs
-        self._people = DrawnPeople(sim, detail=self._detail, far=far)
+        self._people = DrawnPeople(sim, detail=self._detail, far=far, everybody=part is None)
 
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
@@ -165,6 +193,19 @@ class SceneRenderer:
         self._pictures = taken
         extrinsics = Cameras(poses[:, :3], poses[:, 3:]).extrinsics
         return Views(taken.pictures, extrinsics, taken.intrinsics, taken.wait_for)
+
+    @property
+    def glances(self) -> dict[int, Any]:
+        """How things were when viewers looked last, by the entity of each; for `remember`."""
+        return self._viewers.glances
+
+    def remember(self, glances: Mapping[int, Any]) -> None:
+        """Take over what `glances` of a renderer were with the same scene."""
+        self._viewers.glances.update(glances)
+
+    def forget(self, entity: int) -> None:
+        """Forget how a viewer saw things last: it has looked from elsewhere since."""
+        self._viewers.glances.pop(entity, None)
 
     def wait(self) -> None:
         """Wait for pictures that are still being worked on."""
@@ -218,17 +259,18 @@ class SceneRenderer:
         """Put everything that moves where it is now; people in less detail who are far from all that look at them."""
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
-            self._scene, self._lit = _scene_of(self._sim), ()
+            self._scene, self._lit = self._made(self._sim), ()
             self._viewers.scene = self._scene
             self._set_light(state)
         self._people.follow(state)
-        motion, bodies = self._motion(state), self._people.batch
-        people = len(motion.clip)
+        motion = self._motion(state)
+        people, bodies = len(motion.clip), self._people.batch
+        here = np.ones(people, np.bool_) if self._part is None else self._part.holds(motion.position)
         far = np.zeros(people, np.bool_)
         if sights is not None and len(bodies) > people:
-            far = far_from_all(sights, motion.position, self._people.height)
+            far = far_from_all(sights, motion.position, self._people.height[self._people.rows])
         rotations, offsets = self._poses(motion, state.second, roughly=far)
-        drawn = np.flatnonzero(np.concatenate([~far, far])[: len(bodies)])
+        drawn = np.flatnonzero(np.concatenate([here & ~far, here & far])[: len(bodies)])
         limbs = np.empty((len(bodies), len(LIMBS), 7), np.float32)
         vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw, drawn=drawn, limbs=limbs)
         shape = bodies.triangles, bodies.colour, bodies.entity
@@ -237,6 +279,8 @@ class SceneRenderer:
         if len(state.things):
             moving.append(state.things.draw())
         moving += draw_in_hands(state, self._holders(motion, rotations, offsets))
+        if self._part is not None:
+            moving = [self._part.drawn(shapes) for shapes in moving]
         doors = self._doors.draw(state) if len(state.leaves) else None
         moving += [] if doors is None else [doors.shapes]
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in moving]
@@ -249,20 +293,39 @@ class SceneRenderer:
         self._scene.set_openings(NO_OPENINGS if doors is None else doors.openings)
 
     def _motion(self, state: SimulationState) -> _Motion:
-        """Return how everybody on legs moves."""
+        """Return how everybody on legs moves who has a body here; in parts of a city, give bodies to who is there."""
+        if self._part is not None:
+            self._choose_bodies(state, self._part)
         motion = _motion_of_agents(state, self._sim.world.height)
-        return motion if state.traffic is None else _joined_motion(motion, self._motion_of_pedestrians(state))
+        if state.traffic is not None:
+            motion = _joined_motion(motion, self._motion_of_pedestrians(state))
+        return motion if self._part is None else motion.of(self._people.rows)
+
+    def _choose_bodies(self, state: SimulationState, part: ScenePart) -> None:
+        """Give bodies to all within a part, and to those who may come there soon: choosing anew takes a while."""
+        places = (
+            [state.people.position]
+            if state.traffic is None
+            else [
+                state.people.position,
+                state.traffic.walkers.position,
+            ]
+        )
+        position = np.concatenate(places)
+        here, had = np.flatnonzero(part.holds(position, _BESIDE)), self._people.rows
+        if len(np.setdiff1d(here, had, assume_unique=True)) or len(had) > 2 * len(here) + _SPARE_BODIES:
+            self._people.choose(np.flatnonzero(part.holds(position, _SOON)))
 
     def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
         place = motion.position, motion.yaw, motion.clip, motion.phase, motion.hands
-        return Holders(
-            self._people.batch.joints[: len(motion.clip)],
-            rotations,
-            offsets,
-            *place,
-            self._people.height,
-            self._people.entities,
-        )
+        people, rows = self._people, self._people.rows
+        joints = people.batch.joints[: len(rows)]
+        return Holders(rows, joints, rotations, offsets, *place, people.height[rows], people.entities[rows])
+
+    @property
+    def _style(self) -> NDArray[np.void]:
+        """Manner of who has a body."""
+        return self._people.style if self._part is None else self._people.style[self._people.rows]
 
     @property
     def scene(self) -> Scene:
@@ -293,7 +356,7 @@ class SceneRenderer:
             )
         )
         after = after._replace(ground=now if before is None else before)
-        moves = motion.clip, motion.phase, motion.speed, self._people.style
+        moves = motion.clip, motion.phase, motion.speed, self._style
         return pose(*moves, second=second, after=after, ground=now, hands=motion.hands)
 
     def _ground(
@@ -305,14 +368,14 @@ class SceneRenderer:
     ) -> NDArray[np.float64]:
         """Return the ground under everybody's feet in a motion: clip, phase and speed."""
         place = motion.position, motion.yaw
-        ground = ground_under_feet(*course, self._people.style, place, self._sim.world.height.footing, roughly=roughly)
+        ground = ground_under_feet(*course, self._style, place, self._sim.world.height.footing, roughly=roughly)
         ground[~motion.on_ground] = 0.0
         indoor = self._sim.state.indoor
         for k in np.flatnonzero(indoor.treads_under(motion.room) > 0):
             clip, phase, speed = (part[k : k + 1] for part in course)
             here = motion.position[k : k + 1], motion.yaw[k : k + 1]
             treads = indoor.rooms[int(motion.room[k])].treads_at
-            ground[k] = ground_under_feet(clip, phase, speed, self._people.style[k : k + 1], here, treads)[0]
+            ground[k] = ground_under_feet(clip, phase, speed, self._style[k : k + 1], here, treads)[0]
         # From high seats feet hang; a step is there for them on stools.
         ground[~motion.on_ground, :, :, 0] -= np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]
         return ground
@@ -395,25 +458,14 @@ def _nothing() -> None:
     pass
 
 
-def _scene_of(sim: RenderedSimulation) -> Scene:
-    """Return the scene of a run, with nothing that moves in its place yet."""
-    shapes = _shapes(sim)
-    mirrored = sim.state.traffic is not None and sim.state.traffic.lanes.lefthand
-    found = {name: cabin_of(name, mirrored=mirrored) for name in shapes}
-    scene = scene_of(sim.world, prototypes=shapes, cabins={k: cabin for k, cabin in found.items() if cabin is not None})
-    scene.keep_detail(DrawnDoors.of(sim.state.base).prototypes)
-    return scene
-
-
-def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:
+def _shapes(sim: RenderedSimulation, doors: DrawnDoors) -> dict[str, Sequence[Surface]]:
     """Return every shape that moves in a run, by name."""
     shapes: dict[str, Sequence[Surface]] = {}
     for system in (sim.state.traffic, sim.state.transit, sim.state.robots):
         if system is not None:
             shapes |= system.prototypes()
     in_hand = {name: model.surfaces for name, model in in_hand_models().items()}
-    shapes |= DrawnDoors.of(sim.state.base).prototypes
-    return shapes | in_hand | sim.state.things.prototypes() | dict(sim.shapes)
+    return shapes | doors.prototypes | in_hand | sim.state.things.prototypes() | dict(sim.shapes)
 
 
 def _joined(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDArray[Any]:

@@ -249,9 +249,9 @@ class Simulation:
     def renderer(self) -> ObservationRenderer:
         """The renderer; made when it is first needed, for it takes seconds and much memory."""
         if self._renderer is None:
-            from vico.sim.scene import SceneRenderer
+            from vico.sim.renderers import renderer_of
 
-            self._renderer = SceneRenderer(self)
+            self._renderer = renderer_of(self)
         elif not self._attached:
             self._renderer = self._renderer.rebind(self)
         self._attached = True

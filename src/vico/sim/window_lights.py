@@ -12,6 +12,7 @@ from vico.community.model import Resident
 from vico.render import Scene
 from vico.seeds import rng
 from vico.sim.room_lamps import HOME, RoomLamps
+from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
 from vico.world.model import Category, Place
@@ -40,12 +41,18 @@ class WindowLights:
         Who takes part.
     lamps
         Of its rooms.
+    part
+        Of a city, whose buildings are meant; none: all.
     """
 
-    def __init__(self, world: World, residents: Sequence[Resident], lamps: RoomLamps) -> None:
+    def __init__(
+        self, world: World, residents: Sequence[Resident], lamps: RoomLamps, part: ScenePart | None = None
+    ) -> None:
         self._lamps = lamps
+        self._rows = None if part is None else part.places
+        world = world if part is None else part.world
         row = {building.id: k for k, building in enumerate(world.buildings)}
-        self._entity = np.array([building.entity for building in world.buildings], np.int64)
+        self._entity = np.array([building.entity for building in world.buildings], np.int32)
         inside = [(k, place) for k, place in enumerate(world.places) if place.building in row]
         self._building = np.full(len(world.places), -1, np.int64)
         for k, place in inside:
@@ -60,7 +67,7 @@ class WindowLights:
         self._threshold = np.array([rng(0, "windows", world.places[k].id).random() for k in self._homes])
         self._unknown = np.array([rng(0, "windows", building.id).random() for building in world.buildings])
         self._known: tuple[float, bytes] = (-1.0, b"")
-        self._now: NDArray[np.float32] | None = None
+        self._now: NDArray[np.float64] | None = None
 
     def set(self, scene: Scene, state: SimulationState) -> None:
         """Switch on the windows of a scene as they are in a state; by day none is on."""
@@ -70,12 +77,13 @@ class WindowLights:
         people, moment = state.people, state.second // _LOOKED_UP_EVERY
         awake = (people.place >= 0) & (people.posture != Posture.LYING)
         used = np.zeros(len(self._building), bool)
-        used[people.place[awake]] = True
+        places = people.place[awake] if self._rows is None else self._rows[people.place[awake]]
+        used[places[places >= 0]] = True
         known = moment, used.tobytes()
         if known != self._known:
             self._known = known
-            self._now = self._table(moment * _LOOKED_UP_EVERY, used)
-        scene.light_windows(self._now)
+            self._now = self.shares(moment * _LOOKED_UP_EVERY, used)
+        scene.light_windows(self._entity, self._now)
 
     def shares(self, second: float, used: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return shares of the windows on upper floors and on the ground floor, shape ``(buildings, 2)``.
@@ -99,12 +107,6 @@ class WindowLights:
         total = np.bincount(building, values, count)
         number = np.bincount(building, minlength=count)
         return np.where(number > 0, total / np.maximum(number, 1), np.nan)
-
-    def _table(self, second: float, used: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """Return the shares by entity, with a last row of ones for all others."""
-        table = np.ones((int(self._entity.max(initial=0)) + 2, 2), np.float32)
-        table[self._entity] = self.shares(second, used)
-        return table
 
 
 def _numbers(places: Iterable[tuple[int, Place]], wanted: Callable[[Place], bool]) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ from vico.render.between import SceneMoment, moment_of, show_between
 from vico.render.film import FilmWriter
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import FINE, RenderQuality
+from vico.sim.renderers import renderer_of
 from vico.sim.scene import SceneRenderer
 from vico.sim.simulation_state import SimulationState
 from vico.viewer.follow import Angle, FollowCamera
@@ -163,10 +164,12 @@ def write_still(path: Path, repeated: RepeatedRun, settings: FilmSettings, step:
 
 
 def _watcher(repeated: RepeatedRun, settings: FilmSettings) -> Callable[[SimulationState], _Seen]:
-    renderer = SceneRenderer(repeated.sim, detail="full")
+    renderer = renderer_of(repeated.sim, detail="full")
 
     def look(state: SimulationState) -> _Seen:
-        return _Seen(moment_of(renderer.show(state), state.second), _target(state, settings))
+        target = _target(state, settings)
+        scene = renderer.show(state) if isinstance(renderer, SceneRenderer) else renderer.show(state, target.position)
+        return _Seen(moment_of(scene, state.second), target)
 
     return look
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import overload
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 from pydantic_core import from_json
 
@@ -62,6 +63,11 @@ class CityRooms(Sequence[Room]):
     def __iter__(self) -> Iterator[Room]:
         """Yield all rooms, without keeping them."""
         return map(self._read, range(len(self)))
+
+    def numbers_in(self, files: Sequence[int]) -> NDArray[np.int64]:
+        """Return the numbers of the rooms in some of the files, given by their places in the list."""
+        ranges = [np.arange(*self._first[k : k + 2], dtype=np.int64) for k in files]
+        return np.concatenate([np.zeros(0, np.int64), *ranges])
 
     @cached_property
     def numbers(self) -> dict[str, int]:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.geo.frame import LocalFrame
 from vico.io.arrays import mapped_array
 from vico.io.files import sha256_of
 from vico.world.city import CITY, City, CityTile
+from vico.world.city_entities import CityEntities
 from vico.world.city_files import COST, GATES, WHOLE
 from vico.world.city_gates import Gates
 from vico.world.city_ground import whole_ground, whole_walkable
@@ -24,13 +26,17 @@ from vico.world.city_routing import CityRouter
 from vico.world.city_walk_lengths import CityWalkLengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
-from vico.world.model import Building, Entrance, Manifest, Place
+from vico.world.model import Building, Entrance, Manifest, Place, Room
 from vico.world.moving import Shift
 from vico.world.objects import Objects
 from vico.world.street_model import ParkingSpot
+from vico.world.transit_model import Transit
 from vico.world.walk_lengths import CoarseWalkLengths, WalkLengths
 from vico.world.walkable import WalkableMap
-from vico.world.world import World
+from vico.world.world import World, named_ground, named_stops
+
+if TYPE_CHECKING:
+    from vico.world.lanes import LaneGraph
 
 T = TypeVar("T")
 
@@ -52,6 +58,7 @@ class CityWorld(World):
 
     def __init__(self, city: City) -> None:
         self.city = city
+        self._own = city.manifest.tiles
         self._materials = _Materials()
         super().__init__(_manifest(city), city.path)
 
@@ -66,11 +73,15 @@ class CityWorld(World):
 
     def _joined(self, read: Callable[[World, Shift], Iterable[T]]) -> list[T]:
         """Return what all tiles have, in their order."""
-        return [one for tile in self.city.manifest.tiles for one in read(*self._tile(tile))]
+        return [one for tile in self._own for one in read(*self._tile(tile))]
 
     def _tile(self, tile: CityTile) -> tuple[World, Shift]:
         place = tile.column, tile.row
         return self.city.world(place), Shift.of(self.city, place)
+
+    def part(self, tiles: Collection[tuple[int, int]]) -> CityPart:
+        """Return what is in some of the tiles, as a world of its own in the city's frame."""
+        return CityPart(self, tiles)
 
     @cached_property
     def height(self) -> HeightField:
@@ -95,7 +106,7 @@ class CityWorld(World):
     @cached_property
     def rooms(self) -> CityRooms:
         """Rooms of the places, each read when it is asked for."""
-        parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+        parts = (self._tile(tile) for tile in self._own)
         return CityRooms([(world.file("rooms.json"), shift) for world, shift in parts])
 
     @cached_property
@@ -111,8 +122,13 @@ class CityWorld(World):
     @cached_property
     def objects(self) -> Objects:
         """Things that stand outdoors and indoors."""
-        parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+        parts = (self._tile(tile) for tile in self._own)
         return Objects.joined(shift.objects(world.objects) for world, shift in parts)
+
+    @cached_property
+    def entities(self) -> CityEntities:
+        """Kind and name of everything that segmentation images can show, by entity; read tile by tile when asked."""
+        return CityEntities(self.city, named_ground() | named_stops(self.transit))
 
     @cached_property
     def walkable(self) -> WalkableMap:
@@ -137,7 +153,7 @@ class CityWorld(World):
     def surfaces(self, layer: str) -> list[Surface]:
         """Meshes of a layer of all tiles, ENU metres."""
         if layer not in self._layers:
-            parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+            parts = (self._tile(tile) for tile in self._own)
             self._layers[layer] = [
                 shift.surface(replace(one, material=self._materials.shared(one.material)))
                 for world, shift in parts
@@ -147,17 +163,94 @@ class CityWorld(World):
 
     def geometry(self, layer: str, material: str) -> list[Surface]:
         """Return the meshes of a layer of all tiles that are of one material, without its texture."""
-        parts = (self._tile(tile) for tile in self.city.manifest.tiles)
+        parts = (self._tile(tile) for tile in self._own)
         return [shift.surface(one) for world, shift in parts for one in world.geometry(layer, material)]
 
     @cached_property
     def _models(self) -> dict[str, list[Surface]]:
         found: dict[str, list[Surface]] = {}
-        for tile in self.city.manifest.tiles:
+        for tile in self._own:
             for name, surfaces in self._tile(tile)[0].prototypes().items():
                 if name not in found:
                     found[name] = [replace(one, material=self._materials.shared(one.material)) for one in surfaces]
         return dict(sorted(found.items()))
+
+
+class CityPart(CityWorld):
+    """Some tiles of a city: their things, under the city's numbers and names; ground and streets are the city's.
+
+    Parameters
+    ----------
+    whole
+        The city.
+    tiles
+        Columns and rows; those that the city does not have are left out.
+
+    Attributes
+    ----------
+    whole
+        The city.
+    """
+
+    def __init__(self, whole: CityWorld, tiles: Collection[tuple[int, int]]) -> None:
+        self.whole = whole
+        self.city = whole.city
+        self._own = [tile for tile in whole.city.manifest.tiles if (tile.column, tile.row) in tiles]
+        # Pictures that two parts have are in memory once.
+        self._materials = whole._materials
+        World.__init__(self, whole.manifest, whole.path)
+
+    @cached_property
+    def height(self) -> HeightField:
+        """Ground heights of the city."""
+        return self.whole.height
+
+    @cached_property
+    def walkable(self) -> WalkableMap:
+        """Where people can walk in the city."""
+        return self.whole.walkable
+
+    @cached_property
+    def router(self) -> CityRouter:
+        """Finds ways in the city."""
+        return self.whole.router
+
+    @cached_property
+    def transit(self) -> Transit:
+        """Stops, lines and stations of the city."""
+        return self.whole.transit
+
+    @cached_property
+    def lanes(self) -> LaneGraph:
+        """The lanes of the city."""
+        return self.whole.lanes
+
+    @property
+    def entities(self) -> Mapping[int, dict[str, str]]:  # type: ignore[override]
+        """Kind and name of everything in the city: parts show others from afar."""
+        return self.whole.entities
+
+    @cached_property
+    def rooms(self) -> list[Room]:  # type: ignore[override]
+        """Rooms of the places in these tiles."""
+        parts = (self._tile(tile) for tile in self._own)
+        return list(CityRooms([(world.file("rooms.json"), shift) for world, shift in parts]))
+
+    @cached_property
+    def room_by_id(self) -> dict[str, Room]:  # type: ignore[override]
+        """Rooms by id."""
+        return {room.id: room for room in self.rooms}
+
+    def forget(self) -> None:
+        """Forget what was read of the tiles: it is read anew where somebody asks."""
+        self._layers.clear()
+        for name in ("buildings", "places", "entrances", "rooms", "room_by_id", "parking", "objects", "_models"):
+            self.__dict__.pop(name, None)
+
+    @cached_property
+    def room_numbers(self) -> NDArray[np.int64]:
+        """Number of each room of `rooms` among those of the city."""
+        return self.whole.rooms.numbers_in([self.city.manifest.tiles.index(tile) for tile in self._own])
 
 
 class _Materials:

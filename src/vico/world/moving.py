@@ -65,6 +65,14 @@ class Shift:
         east, north = column * manifest.size, row * manifest.size
         return cls(east, north, _FIRST + number * _EACH, f"{column}_{row}")
 
+    @staticmethod
+    def tile_of(city: City, entity: int) -> tuple[int, int] | None:
+        """Return the tile of whose things a number in the city may be one; None: those of no tile have such a one."""
+        first, last = city.manifest.first, city.manifest.last
+        row, column = divmod((entity - _FIRST) // _EACH, last[0] - first[0] + 1)
+        row, column = row + first[1], column + first[0]
+        return (column, row) if entity >= _FIRST and row <= last[1] else None
+
     def point(self, xy: Point2) -> Point2:
         """Move a point."""
         return round(xy[0] + self.east, 3), round(xy[1] + self.north, 3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -191,26 +191,9 @@ class World:
         return path
 
     @cached_property
-    def entities(self) -> dict[int, dict[str, str]]:
+    def entities(self) -> Mapping[int, dict[str, str]]:
         """Kind and name of everything that segmentation images can show, by entity."""
-        found = {
-            model.ENTITY_GROUND: {"kind": "ground", "name": "ground"},
-            model.ENTITY_ROAD: {"kind": "road", "name": "road"},
-            model.ENTITY_WATER: {"kind": "water", "name": "water"},
-            model.ENTITY_GREEN: {"kind": "green", "name": "green"},
-            model.ENTITY_BACKDROP: {"kind": "backdrop", "name": "backdrop"},
-            model.ENTITY_WIRE: {"kind": "wire", "name": "contact wire"},
-        }
-        for b in self.buildings:
-            found[b.entity] = {"kind": "building", "name": b.name or b.id}
-        for room in self.rooms:
-            found[room.entity] = {"kind": "room", "name": f"{room.kind} {room.id}"}
-        for stop in self.transit.stops:
-            found[stop.entity] = {"kind": "bus_stop", "name": stop.name}
-        for tram_stop in self.transit.tram_stops:
-            found[tram_stop.entity] = {"kind": "tram_stop", "name": tram_stop.name}
-        for station in self.transit.bike_stations:
-            found[station.entity] = {"kind": "bike_station", "name": station.name}
+        found = named_ground() | named_buildings(self.buildings) | named_rooms(self.rooms) | named_stops(self.transit)
         objects = self.objects
         for entity, kind, name in zip(objects.entity.tolist(), objects.kind, objects.id, strict=True):
             found.setdefault(entity, {"kind": str(kind), "name": str(name)})
@@ -235,3 +218,32 @@ class World:
     def room_by_id(self) -> Mapping[str, Room]:
         """Rooms by id."""
         return {r.id: r for r in self.rooms}
+
+
+def named_ground() -> dict[int, dict[str, str]]:
+    """Return kind and name of what is drawn in every world, by entity."""
+    return {
+        model.ENTITY_GROUND: {"kind": "ground", "name": "ground"},
+        model.ENTITY_ROAD: {"kind": "road", "name": "road"},
+        model.ENTITY_WATER: {"kind": "water", "name": "water"},
+        model.ENTITY_GREEN: {"kind": "green", "name": "green"},
+        model.ENTITY_BACKDROP: {"kind": "backdrop", "name": "backdrop"},
+        model.ENTITY_WIRE: {"kind": "wire", "name": "contact wire"},
+    }
+
+
+def named_buildings(buildings: Iterable[Building]) -> dict[int, dict[str, str]]:
+    """Return kind and name of buildings, by entity."""
+    return {one.entity: {"kind": "building", "name": one.name or one.id} for one in buildings}
+
+
+def named_rooms(rooms: Iterable[Room]) -> dict[int, dict[str, str]]:
+    """Return kind and name of rooms, by entity."""
+    return {one.entity: {"kind": "room", "name": f"{one.kind} {one.id}"} for one in rooms}
+
+
+def named_stops(transit: Transit) -> dict[int, dict[str, str]]:
+    """Return kind and name of stops and stations, by entity."""
+    found = {stop.entity: {"kind": "bus_stop", "name": stop.name} for stop in transit.stops}
+    found |= {stop.entity: {"kind": "tram_stop", "name": stop.name} for stop in transit.tram_stops}
+    return found | {station.entity: {"kind": "bike_station", "name": station.name} for station in transit.bike_stations}

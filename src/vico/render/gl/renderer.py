@@ -155,6 +155,7 @@ class GlRenderer:
         self._kept["relief"].use(1)
         self._program.tell(view | shadows | self._told_light | {"closeness": 0, "relief": 1, "levels_each": LEVELS})
         counts = self.scene.arrays.counts
+        self._program.tell({"lit_count": len(self.scene.arrays.windows)})
         self._program.tell({"first_moving": int(counts["static_instances"]), "is_person": 0, "is_instance": 0})
         for start, end in cluster_ranges(self.scene.arrays, camera):
             self._render(start, end - start)
@@ -225,9 +226,6 @@ class GlRenderer:
             self._buffer("vertices", 0, mesh.vertex)
             self._buffer("triangles", 1, mesh.triangle)
             self._buffer("entities", 2, mesh.entity)
-            self._buffer("materials", 3, textures.materials)
-            self._buffer("starts", 4, textures.start.astype(np.int32))
-            self._buffer("texels", 5, textures.texels)
             self._buffer("cabins", 15, packed_cabins(arrays))
         elif int(arrays.counts["avatars"]):
             spans = arrays.avatars.span
@@ -238,6 +236,11 @@ class GlRenderer:
                 _bytes(mesh.triangle[first:last]), offset=first * mesh.triangle.itemsize
             )
             self._buffers["entities"][1].write(_bytes(mesh.entity[first:last]), offset=first * 4)
+        if self._uploaded.get("texels") is not textures.texels:
+            self._uploaded["texels"] = textures.texels
+            self._buffer("materials", 3, textures.materials)
+            self._buffer("starts", 4, textures.start.astype(np.int32))
+            self._buffer("texels", 5, textures.texels)
         if self._uploaded.get("windows") is not arrays.windows:
             self._uploaded["windows"] = arrays.windows
             self._buffer("windows", 11, arrays.windows)

@@ -3,7 +3,8 @@
 layout(std430, binding = 3) readonly buffer Materials { int materials[]; };  // MATERIAL: 4 whole numbers, 1 real, 2 whole
 layout(std430, binding = 4) readonly buffer Starts { int starts[]; };
 layout(std430, binding = 5) readonly buffer Texels { uint texels[]; };
-layout(std430, binding = 11) readonly buffer Windows { float windows[]; };  // shares of upper and ground floors
+struct LitWindows { int building; float shares[2]; };  // LIT_WINDOWS
+layout(std430, binding = 11) readonly buffer Windows { LitWindows windows[]; };  // ascending by building
 layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
 
 layout(std430, binding = 12) readonly buffer Casters { vec4 casters[]; };  // see `packed_casters`
@@ -22,7 +23,7 @@ uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half lengt
 uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
 uniform vec4 lamp_grid;  // corner, columns and rows of the cells
 uniform ivec2 lamp_parts;  // where lamps and what cells name of them begin
-uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count, opening_count, beam_count;
+uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count, opening_count, beam_count, lit_count;
 
 in vec3 place;
 in vec3 normal;
@@ -84,6 +85,17 @@ bool is_hole(int log2_width, int log2_height, int levels, vec2 dx, vec2 dy) {
     int columns = 1 << max(log2_width - level, 0), rows = 1 << max(log2_height - level, 0);
     vec2 at = floor(uv * vec2(columns, rows));
     return texel(starts[material * levels_each + level], columns, rows, int(at.x), int(at.y)).w < 128.0;
+}
+
+// How much of the light of a building's windows is on, upper ones or those on the ground floor.
+float windows_share(int floor_) {
+    int low = 0, high = lit_count;
+    while (low < high) {
+        int middle = (low + high) >> 1;
+        if (windows[middle].building < entity) low = middle + 1;
+        else high = middle;
+    }
+    return low < lit_count && windows[low].building == entity ? windows[low].shares[floor_] : 1.0;
 }
 
 float sky_share(vec3 at, vec3 n) {
@@ -329,7 +341,7 @@ void main() {
     int levels = materials[7 * material + 2], flags = materials[7 * material + 3];
     float emission = intBitsToFloat(materials[7 * material + 4]);
     int column = materials[7 * material + 5];
-    if (column > 0) emission *= windows[2 * min(entity, windows.length() / 2 - 1) + column - 1];
+    if (column > 0) emission *= windows_share(column - 1);
     bool both = (flags & 2) != 0;
     vec2 dx = dFdx(uv), dy = dFdy(uv);
     if (depth >= far || (hidden != 0 && entity == hidden) || (!gl_FrontFacing && !both)) discard;

@@ -107,10 +107,14 @@ def lamp_grid(lamps: NDArray[np.void], tops: Tops) -> LampGrid:
     return LampGrid(lamps, lamps["power"].copy(), start, named, x0, y0, columns, rows)
 
 
-def shining(grid: LampGrid, light: Lighting, windows: NDArray[np.float32]) -> LampGrid:
+def shining(grid: LampGrid, light: Lighting, windows: NDArray[np.void]) -> LampGrid:
     """Return the lamps as they shine in a light; `windows` are `SceneArrays.windows`."""
     lamps, (x, y, radius) = grid.lamps, light.unlit
-    share = np.where(lamps["entity"] > 0, windows[np.minimum(lamps["entity"], len(windows) - 1), 1], 1.0)
+    share = np.ones(len(lamps), np.float32)
+    if len(windows):
+        building = np.ascontiguousarray(windows["building"])
+        row = np.minimum(np.searchsorted(building, lamps["entity"]), len(building) - 1)
+        share = np.where(building[row] == lamps["entity"], windows["shares"][row, 1], share)
     if radius > 0.0:
         share[(lamps["x"] - x) ** 2 + (lamps["y"] - y) ** 2 <= radius**2] = 0.0
     power = lamps["power"] * share * (light.lamps * light.exposure)

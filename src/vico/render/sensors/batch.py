@@ -69,6 +69,8 @@ class Viewers:
         How carefully colours are made.
     renderer
         ``"cpu"``, or ``"gl"`` for OpenGL (`vico.render.gl`).
+    glances
+        Where each viewer was when it looked last, and where everything was, by the entity that it leaves out.
     """
 
     scene: Scene
@@ -78,7 +80,7 @@ class Viewers:
     renderer: str = "cpu"
     _gl: GlRenderer | None = None
     _caches: dict[Lens, ViewCache] = field(default_factory=dict)
-    _glances: dict[int, _Glance] = field(default_factory=dict)
+    glances: dict[int, _Glance] = field(default_factory=dict)
 
     def take(
         self,
@@ -168,8 +170,8 @@ class Viewers:
         found: list[tuple[PastPlaces, NDArray[np.float64] | None]] = []
         for k, entity in enumerate(own.tolist()):
             room = self.scene.room_number(position[k])
-            last = self._glances.get(entity)
-            self._glances[entity] = _Glance(second, now, position[k].copy(), rotation[k], room)
+            last = self.glances.get(entity)
+            self.glances[entity] = _Glance(second, now, position[k].copy(), rotation[k], room)
             # Through a door, or back in time, nothing is where it was.
             if last is None or last.room != room or not last.second < second:
                 found.append((past_places(now, now, position[k]), None))

@@ -63,9 +63,18 @@ def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: i
 @inlined
 def _windows_share(scene: Any, material: Any, entity: Any) -> Any:
     """Return the share of a material's light that is on in a building."""
-    if material.windows == NO_WINDOWS:
+    if material.windows == NO_WINDOWS or len(scene.windows) == 0:
         return np.float32(1.0)
-    return scene.windows[min(entity, len(scene.windows) - 1), material.windows - 1]
+    low, high = 0, len(scene.windows)
+    while low < high:
+        middle = (low + high) >> 1
+        if scene.windows[middle].building < entity:
+            low = middle + 1
+        else:
+            high = middle
+    if low == len(scene.windows) or scene.windows[low].building != entity:
+        return np.float32(1.0)
+    return scene.windows[low].shares[material.windows - 1]
 
 
 @inlined

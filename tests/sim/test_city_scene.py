@@ -1,0 +1,168 @@
+"""Pictures in a city: the tiles around a camera in full, the others from afar, whatever is in memory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vico.community.author import build_community
+from vico.community.model import Community
+from vico.errors import InputError
+from vico.render import Cameras
+from vico.sim import city_scene
+from vico.sim.city_scene import CityRenderer, Neighbourhood
+from vico.sim.config import SimConfig
+from vico.sim.simulation import Simulation
+from vico.world.city_world import CityWorld
+from vico.world.folder import read_world
+from vico.worldgen.city_build import build_city, city_request
+from vico.worldgen.sources import Sources
+
+EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
+LAT, LON = 60.1690, 24.9435
+# Metres in full around a camera: little enough that two tiles of 160 m do, and four in a row have three neighbourhoods.
+NEAR = 60.0
+CONFIG = SimConfig(cars=6, pedestrians=30, transit=False, image=64, outputs=("rgb", "segmentation", "flow"))
+
+
+def test_who_is_in_the_middle_of_a_tile_and_who_at_its_edge_see_as_far() -> None:
+    assert Neighbourhood.around(10.0, 10.0, 1.6, 400.0) == (0, 0, 1)
+    assert Neighbourhood.around(-10.0, 390.0, 1.6, 400.0) == (-1, 0, 1)
+    assert Neighbourhood.around(10.0, 10.0, 1.6, 400.0).tiles == [(0, 0), (1, 0), (0, 1), (1, 1)]
+    for x in np.linspace(-300.0, 300.0, 61).tolist():
+        for size in (160.0, 400.0, 800.0):
+            found = Neighbourhood.around(x, 0.0, 1.6, size)
+            west, east = ((found.column + side * found.rings + 0.5) * size for side in (-1, 1))
+            assert min(x - west, east - x) >= city_scene.NEAR
+
+
+def test_who_is_high_up_sees_more_tiles_in_full() -> None:
+    rings = [Neighbourhood.around(0.0, 0.0, height, 400.0).rings for height in (1.6, 25.0, 100.0, 300.0, 5000.0)]
+    assert rings == sorted(rings)
+    assert rings[0] == rings[1] == 1
+    assert rings[-1] == 3
+
+
+def test_a_budget_is_some_memory() -> None:
+    for memory in (0.0, -1.0, float("inf"), float("nan")):
+        with pytest.raises(InputError, match="memory"):
+            replace(CONFIG, memory=memory)
+
+
+@pytest.fixture(scope="module")
+def city(tmp_path_factory: pytest.TempPathFactory) -> CityWorld:
+    """Four tiles in a row."""
+    box = LON - 0.0055, LAT - 0.0005, LON + 0.0035, LAT + 0.0005
+    out = tmp_path_factory.mktemp("city") / "row"
+    build_city(city_request(Sources(EXTRACT), lat=LAT, lon=LON, extent=box, tile=160.0, out=out), workers=2)
+    world = read_world(out)
+    assert isinstance(world, CityWorld)
+    assert len(world.city.manifest.tiles) == 4
+    return world
+
+
+@pytest.fixture(scope="module")
+def people(city: CityWorld) -> Community:
+    return build_community(city, 6)
+
+
+@pytest.fixture(autouse=True)
+def _two_tiles_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(city_scene, "NEAR", NEAR)
+
+
+def _run(city: CityWorld, people: Community, steps: int = 12, **options: Any) -> tuple[list[Any], str]:
+    """Return what all see in a run, step by step, and the state's hash at its end."""
+    sim = Simulation(city, people, replace(CONFIG, **options))
+    seen = []
+    for _ in range(steps):
+        step = sim.step({})
+        told = {name: one for name, one in step.observations.items() if "rgb" in one}
+        seen.append({name: {output: np.array(one[output]) for output in CONFIG.outputs} for name, one in told.items()})
+    return seen, sim.state_hash()
+
+
+def _are_equal(a: list[Any], b: list[Any]) -> bool:
+    return all(
+        np.array_equal(one[name][output], other[name][output])
+        for one, other in zip(a, b, strict=True)
+        for name in other
+        for output in other[name]
+    )
+
+
+@pytest.mark.slow
+def test_what_is_seen_and_what_happens_depend_neither_on_the_budget_nor_on_who_looks(
+    city: CityWorld, people: Community
+) -> None:
+    seen, state = _run(city, people)
+    assert any(np.abs(one["flow"]).max() > 0.0 for one in seen[-1].values())
+    again, same = _run(city, people, memory=1e-6)
+    assert _are_equal(seen, again)
+    assert same == state
+    alone = "resident_2"
+    some, same = _run(city, people, observe=(alone,))
+    assert same == state
+    assert _are_equal(seen, [{alone: step[alone]} for step in some])
+    assert _run(city, people, observe=())[1] == state
+
+
+@pytest.fixture
+def renderer(city: CityWorld, people: Community) -> tuple[Simulation, CityRenderer]:
+    sim = Simulation(city, people, replace(CONFIG, memory=1e-6))
+    found = sim.renderer
+    assert isinstance(found, CityRenderer)
+    return sim, found
+
+
+def _camera(eye: tuple[float, float, float], ahead: tuple[float, float, float]) -> Cameras:
+    return Cameras(np.array([eye]), np.array([ahead]), width=160, height=90)
+
+
+@pytest.mark.slow
+def test_each_scene_has_the_tiles_around_in_full_and_the_others_as_silhouettes(
+    renderer: tuple[Simulation, CityRenderer], city: CityWorld
+) -> None:
+    sim, made = renderer
+    triangles = {}
+    for x in (-300.0, 0.0, 200.0):
+        eye = np.array([x, 0.0, float(city.height(np.array([[x, 0.0]]))[0]) + 1.6])
+        (where,) = made.neighbourhoods(eye[None])
+        scene = made.show(sim.state, eye)
+        shown = set(np.unique(scene.arrays.mesh.entity).tolist())
+        for tile in city.city.manifest.tiles:
+            part = city.part([(tile.column, tile.row)])
+            houses = {building.entity for building in part.buildings}
+            assert len(houses & shown) >= 0.9 * len(houses)
+            is_near = (tile.column, tile.row) in where.tiles
+            rooms = set(part.room_numbers.tolist())
+            assert (bool(rooms) and (len(scene.rooms) >= len(rooms)) == is_near) or not is_near
+        triangles[where] = len(scene.arrays.mesh.triangle)
+    assert len(triangles) == 3
+
+
+@pytest.mark.slow
+def test_people_have_bodies_where_they_are_near_and_nobody_else_has(
+    renderer: tuple[Simulation, CityRenderer], city: CityWorld
+) -> None:
+    sim, made = renderer
+    for x in (-300.0, 100.0):
+        eye = np.array([x, 0.0, 20.0])
+        (where,) = made.neighbourhoods(eye[None])
+        scene = made.show(sim.state, eye)
+        first = int(scene.arrays.avatars.span["first_triangle"].min(initial=2**30))
+        drawn = set(np.unique(scene.arrays.mesh.entity[first:]).tolist()) - {0}
+        west, east = ((where.column + side * where.rings + 0.5) * 160.0 for side in (-1, 1))
+        here: set[int] = set()
+        assert sim.state.traffic is not None
+        for lot in (sim.state.people, sim.state.traffic.walkers):
+            place: NDArray[np.float64] = lot.position
+            inside = (place[:, 0] >= west) & (place[:, 0] <= east) & (np.abs(place[:, 1]) <= 80.0)
+            here |= set(lot.entity[inside].tolist())
+        assert here
+        assert here <= drawn
