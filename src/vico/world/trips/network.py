@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
+
 from vico.rules import BIKE_SPEED, BUS_FARE, ride_price
 from vico.world.model import Point2
 from vico.world.timetable import LineTimes, TramTimes
@@ -72,7 +74,9 @@ class TripNetwork:
     stations
         The nodes that are bicycle stations.
     boardable
-        Nodes where a ride may begin.
+        Nodes where a ride may begin, int64, ascending.
+    returnable
+        Stations with a place for a bicycle, int64, ascending.
     top_speed
         Speed as the crow flies that no ride exceeds, m/s; 0 without any.
     """
@@ -108,9 +112,9 @@ class TripNetwork:
             first + k: Station(station.bikes > 0, station.bikes < station.capacity)
             for k, station in enumerate(stations)
         }
-        self.boardable = [
-            k for k in range(len(self)) if self._calls[k] or (k in self.stations and self.stations[k].gives)
-        ]
+        boardable = [k for k in range(len(self)) if self._calls[k] or (k in self.stations and self.stations[k].gives)]
+        self.boardable = np.array(boardable, np.int64)
+        self.returnable = np.array([k for k, station in self.stations.items() if station.takes], np.int64)
         self.top_speed = max(self._fastest_bus(), BIKE_SPEED if self.stations else 0.0)
 
     def __len__(self) -> int:

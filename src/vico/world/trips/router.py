@@ -52,7 +52,7 @@ class Trips:
         self.router = place.router
         self.transit = place.transit
         self.walk_speed = walk_speed
-        self._kept: dict[tuple[str, str], Way] = {}
+        self._kept: dict[str, dict[str, Way]] = {}
         self._networks: dict[tuple[bool, bool, bool], TripNetwork] = {}
         t = self.transit
         self._known = {r.id for part in (t.stops, t.lines, t.bike_stations, t.tram_stops, t.tram_lines) for r in part}

@@ -1,22 +1,26 @@
 """The search: least arrival, then price, then metres on foot, over stops, stations and the clock.
 
-Labels are settled in the order of arrival, as in Dijkstra's algorithm; one is dropped where another is no worse in all
-three. Ways on the ground begin as lower bounds. A trip that is best and consists of known ways alone is the best one;
-as long as it does not, its ways are found and the search is done again, so few of the many ways are ever looked for.
+Labels are settled in the order of the least arrival at the goal that is left to them (A*, by the bee line and the top
+speed); one is dropped where another at the same place is no worse in all three. Ways on the ground begin as lower
+bounds. A trip that is best and consists of known ways alone is the best one; as long as it does not, its ways are found
+and the search is done again, so few of the many ways are ever looked for.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from vico.world.trips.network import Ride, TripNetwork
 from vico.world.trips.ways import Ways
 
+# Seconds: arrivals that rounding tells apart may be one and the same.
+_ALIKE = 1e-6
 _ON_FOOT = Ride(-1, 0.0, 0.0, 0.0, -2)
 _Step = tuple[int, int, int, int]
+_Key = tuple[float, float, float, int, tuple[_Step, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +53,8 @@ class Label:
     trace: tuple[_Step, ...]
 
     @property
-    def key(self) -> tuple[float, float, float, int, tuple[_Step, ...]]:
-        """What labels are settled by: no two that differ are equal in it."""
+    def key(self) -> _Key:
+        """What labels at one place are ordered by: no two that differ are equal in it."""
         return self.arrive, self.price, self.metres, len(self.trace), self.trace
 
     def chain(self) -> list[Label]:
@@ -127,32 +131,51 @@ def _settle(question: Question, depart: float) -> list[Label]:
     goal = question.goal
     settled: dict[tuple[int, bool], list[Label]] = {}
     first = Label(depart, 0.0, 0.0, question.start, False, None, _ON_FOOT, ())
-    queue = [(first.key, first)]
+    queue: list[tuple[float, _Key, Label]] = [(depart, first.key, first)]
+    waiting: dict[tuple[int, bool], list[Label]] = {}
     at_goal = settled.setdefault((goal, True), [])
     limit = question.latest
     while queue:
-        _, label = heapq.heappop(queue)
+        least, _, label = heapq.heappop(queue)
+        if at_goal and not question.all_good and least > at_goal[0].arrive + _ALIKE:
+            break
         others = settled.setdefault((label.node, label.walked), [])
         if _is_no_better(label.arrive, label.price, label.metres, others):
             continue
         others.append(label)
         if label.node == goal:
-            if not question.all_good:
-                return [label]
             continue
         for after, left in _steps(question, label, limit):
             if after.price > question.cash or after.arrive + left > limit:
+                continue
+            place = after.node, after.walked
+            if _is_no_better(after.arrive, after.price, after.metres, settled.get(place, ())):
                 continue
             if question.all_good:
                 if _is_no_better(after.arrive + left, after.price, after.metres, at_goal):
                     continue
             elif after.node == goal:
                 limit = min(limit, after.arrive)
-            heapq.heappush(queue, (after.key, after))
-    return at_goal
+            ahead = waiting.setdefault(place, [])
+            if _is_worse(after, ahead):
+                continue
+            ahead.append(after)
+            heapq.heappush(queue, (after.arrive + left, after.key, after))
+    return at_goal if question.all_good else sorted(at_goal, key=lambda label: label.key)[:1]
 
 
-def _is_no_better(arrive: float, price: float, metres: float, others: list[Label]) -> bool:
+def _is_worse(label: Label, others: list[Label]) -> bool:
+    """Return whether one of the labels is at least as good in everything, and better in something."""
+    return any(
+        o.arrive <= label.arrive
+        and o.price <= label.price
+        and o.metres <= label.metres
+        and (o.arrive < label.arrive or o.price < label.price or o.metres < label.metres)
+        for o in others
+    )
+
+
+def _is_no_better(arrive: float, price: float, metres: float, others: Sequence[Label]) -> bool:
     """Return whether one of the labels is at least as good in everything."""
     return any(o.arrive <= arrive and o.price <= price and o.metres <= metres for o in others)
 
@@ -172,16 +195,17 @@ def _steps(question: Question, label: Label, limit: float) -> Iterator[tuple[Lab
         return
     metres, seconds, _ = ways.leaving(node)
     if seconds[question.goal] < math.inf and (question.direct or label.parent is not None):
-        yield _on_foot(label, question.goal, seconds[question.goal], metres[question.goal]), 0.0
+        straight = _on_foot(label, question.goal, float(seconds[question.goal]), float(metres[question.goal]))
+        yield straight, 0.0
         if not question.all_good:
-            limit = min(limit, label.arrive + seconds[question.goal])
-    for to in network.boardable:
+            limit = min(limit, straight.arrive)
+    for to in ways.reached(node, network.boardable, limit - label.arrive, top):
         left = ways.bee_line[to] / top
         if to == node:
             # Changing where one got off costs no way.
             yield _on_foot(label, to, 0.0, 0.0), left
         elif label.arrive + seconds[to] + left <= limit and seconds[to] < math.inf:
-            yield _on_foot(label, to, seconds[to], metres[to]), left
+            yield _on_foot(label, to, float(seconds[to]), float(metres[to])), left
 
 
 def _rides(question: Question, label: Label, limit: float) -> Iterator[Ride]:
@@ -190,11 +214,11 @@ def _rides(question: Question, label: Label, limit: float) -> Iterator[Ride]:
     yield from network.bus_rides(node, label.arrive)
     if node in network.stations and network.stations[node].gives:
         seconds, top = ways.leaving(node).ride, max(network.top_speed, ways.walk_speed)
-        for to, station in network.stations.items():
-            if to == node or not station.takes or seconds[to] == math.inf:
+        for to in ways.reached(node, network.returnable, limit - label.arrive, top, by_bicycle=True):
+            if to == node or seconds[to] == math.inf:
                 continue
             if label.arrive + seconds[to] + ways.bee_line[to] / top <= limit:
-                yield network.bike_ride(to, label.arrive, seconds[to])
+                yield network.bike_ride(to, label.arrive, float(seconds[to]))
 
 
 def _on_foot(label: Label, to: int, seconds: float, metres: float) -> Label:

@@ -55,12 +55,12 @@ class From(NamedTuple):
     Attributes
     ----------
     metres, walk, ride
-        Metres, seconds on foot and by bicycle; lower bounds until a way is known.
+        Metres, seconds on foot and by bicycle, float64; lower bounds until a way is known.
     """
 
-    metres: list[float]
-    walk: list[float]
-    ride: list[float]
+    metres: NDArray[np.float64]
+    walk: NDArray[np.float64]
+    ride: NDArray[np.float64]
 
 
 class Ways:
@@ -75,7 +75,7 @@ class Ways:
     names
         A name for each point under which its ways are kept for later; None for points nobody will come back to.
     kept
-        Ways by names of their ends, shared between searches.
+        Ways by the name of where they begin, then where they end, shared between searches.
     walk_speed
         Metres a second on foot.
     blocked
@@ -92,7 +92,7 @@ class Ways:
         router: Router,
         points: Sequence[Point2],
         names: Sequence[str | None],
-        kept: dict[tuple[str, str], Way],
+        kept: dict[str, dict[str, Way]],
         *,
         walk_speed: float,
         blocked: NDArray[np.bool_] | None = None,
@@ -103,7 +103,9 @@ class Ways:
         self._xy = np.array(self.points, np.float64).reshape(-1, 2)
         sure = router.walkable.is_connected(self._xy) if blocked is None else np.zeros(len(self._xy), bool)
         self._off = np.where(sure, 0.0, _SNAP)
-        self.bee_line: list[float] = self._bounds(len(self.points) - 1).tolist()
+        self._to_goal = self._bounds(len(self.points) - 1)
+        self.bee_line: list[float] = self._to_goal.tolist()
+        self._number = {name: k for k, name in enumerate(self._names) if name is not None}
         self._from: dict[int, From] = {}
         self._found: dict[tuple[int, int], Way] = {}
 
@@ -111,14 +113,26 @@ class Ways:
         """Return the ways from a point, made when they are first asked for: there are many points in a large city."""
         if a not in self._from:
             metres = self._bounds(a)
-            row = From(metres.tolist(), (metres / self.walk_speed).tolist(), (metres / BIKE_SPEED).tolist())
-            self._from[a] = row
-            if self._blocked is None:
-                for b in range(len(self.points)):
-                    way = self._remembered(a, b)
-                    if way is not None:
+            self._from[a] = From(metres, metres / self.walk_speed, metres / BIKE_SPEED)
+            name = self._names[a]
+            if self._blocked is None and name is not None:
+                for other, way in self._kept.get(name, {}).items():
+                    b = self._number.get(other)
+                    if b is not None:
                         self._note(a, b, way)
         return self._from[a]
+
+    def reached(
+        self, a: int, points: NDArray[np.int64], seconds: float, top_speed: float, *, by_bicycle: bool = False
+    ) -> list[int]:
+        """Return to which of some points one may go and still be at the goal in a time, at a speed from there on.
+
+        No point is missing for want of a known way; a hundredth of a second is left for rounding.
+        """
+        row = self.leaving(a)
+        there = (row.ride if by_bicycle else row.walk)[points] + self._to_goal[points] / top_speed
+        found: list[int] = points[there <= seconds + 0.01].tolist()
+        return found
 
     def _bounds(self, a: int) -> NDArray[np.float64]:
         """Return metres that ways between a point and each have at least."""
@@ -137,13 +151,9 @@ class Ways:
             way = find_way(self._router, self.points[a], self.points[b], self._blocked)
             first, second = self._names[a], self._names[b]
             if self._blocked is None and first is not None and second is not None:
-                way = self._kept.setdefault((first, second), way)
+                way = self._kept.setdefault(first, {}).setdefault(second, way)
             self._note(a, b, way)
         return self._found[a, b]
-
-    def _remembered(self, a: int, b: int) -> Way | None:
-        first, second = self._names[a], self._names[b]
-        return None if first is None or second is None else self._kept.get((first, second))
 
     def _note(self, a: int, b: int, way: Way) -> None:
         self._found[a, b] = way
