@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +23,8 @@ from vico.worldgen.transit.stage import transit_from_osm
 
 EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 400.0
+# West, south, east and north of a rectangle in that window, as of tiles in a row.
+STRIP = (-390.0, -20.0, 300.0, 240.0)
 # Centres of the extracts beside the checkout, degrees.
 PLACES = {
     "monaco": (43.73384, 7.41813),
@@ -63,9 +65,15 @@ def lanes_of(network: RoadNetwork) -> LaneGraph:
 
 
 @cache
-def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435, half: float = HALF) -> RoadCity:
+def road_city(
+    path: Path = EXTRACT,
+    lat: float = 60.1690,
+    lon: float = 24.9435,
+    half: float = HALF,
+    edges: tuple[float, float, float, float] | None = None,
+) -> RoadCity:
     """Roads, lanes and transit of 800 m x 800 m; central Helsinki where nothing else is asked for."""
-    osm = read_osm(path, LocalFrame(lat, lon), half)
+    osm = replace(read_osm(path, LocalFrame(lat, lon), half), edges=edges)
     network = network_of(osm)
     lanes = lanes_of(network)
     solids = [

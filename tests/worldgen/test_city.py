@@ -29,6 +29,7 @@ from vico.world.world import World
 from vico.worldgen.city_build import bare_ground, build_city, city_request, divide_map
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import HALO, TileGrid, grid_of, grid_over, tile_name
@@ -36,6 +37,7 @@ from vico.worldgen.seams.heights import blended, cropped
 from vico.worldgen.seams.join import seamless
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import kept_product
+from vico.worldgen.streets.roads import streets_from_osm
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 CENTRE = (60.1690, 24.9435)
@@ -50,6 +52,16 @@ def test_a_grid_covers_what_is_asked_for_with_as_few_tiles_as_can_be(extent: flo
     assert len(list(grid)) == len(grid) == side * side
     assert side * size >= extent
     assert side == 1 or (side - 2) * size < extent
+
+
+@given(*[st.integers(-9, 0)] * 2, *[st.integers(0, 9)] * 2, st.sampled_from([160.0, 408.0]))
+def test_the_edges_of_a_grid_are_those_of_its_tiles(west: int, south: int, east: int, north: int, size: float) -> None:
+    grid = TileGrid(size, (west, south), (east, north))
+    assert grid.edges == shapely.union_all([grid.box(tile) for tile in grid]).bounds
+    assert max(map(abs, grid.edges)) == grid.half
+    reach = grid.reach
+    square = TileGrid(size, (-reach, -reach), (reach, reach))
+    assert square.edges == (-grid.half, -grid.half, grid.half, grid.half)
 
 
 def _covers(grid: TileGrid, west: float, south: float, east: float, north: float) -> bool:
@@ -137,6 +149,14 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> CityRequest:
     for tile in PAIR:
         plan(request, tile)
     return request
+
+
+def test_streets_of_a_city_end_where_its_tiles_do(planned: CityRequest) -> None:
+    data = divide_map(planned)
+    assert (data.half, data.box) == (PAIR.half, (-80.0, -80.0, 240.0, 80.0))
+    lines = [street.line for street in streets_from_osm(site_facts(data))]
+    low, high = np.concatenate(lines).min(axis=0), np.concatenate(lines).max(axis=0)
+    assert [*low, *high] == pytest.approx(data.box, abs=1e-6)
 
 
 def test_streets_and_kerbs_of_two_tiles_are_the_same_at_their_border(planned: CityRequest) -> None:

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 
-from road_city import HALF, PLACES, lanes_of, network_of, road_city, roads_of
+from road_city import HALF, PLACES, STRIP, lanes_of, network_of, road_city, roads_of
 from vico.errors import MissingExtraError
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmArea, OsmData, OsmWay
+from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.worldgen.facts.driving_side import drives_left, keeps_left
 from vico.worldgen.facts.expendable import listening
 from vico.worldgen.facts.levels import OVER_A_STREET
@@ -97,6 +99,100 @@ def _map(*ways: OsmWay, lat: float = 60.169, lon: float = 24.9435, country: str 
     house = shapely.box(-5, 30, 5, 40)
     areas = [OsmArea("w900", house, {"building": "yes", "addr:country": country})] if country else []
     return OsmData(frame, 150.0, 60.0, [], list(ways), areas, [])
+
+
+_numbers = st.integers(-160, 160).map(float)
+_corners = st.lists(st.tuples(_numbers, _numbers), min_size=2, max_size=12)
+_rectangles = st.tuples(*[st.integers(-150, -10)] * 2, *[st.integers(10, 150)] * 2).map(
+    lambda sides: tuple(map(float, sides))
+)
+
+
+def _within(edges: tuple[float, float, float, float], corners: list[tuple[float, float]]) -> tuple[float, int]:
+    """Metres of a line within a rectangle and runs of it there; segments that only pass through have no node in it."""
+    box = shapely.box(*edges)
+    inside = [bool(box.covers(shapely.Point(xy))) for xy in corners]
+    metres = sum(
+        shapely.LineString([a, b]).intersection(box).length
+        for a, b, here, there in zip(corners, corners[1:], inside, inside[1:], strict=False)
+        if here or there
+    )
+    return metres, sum(here and not before for before, here in zip([False, *inside], inside, strict=False))
+
+
+@given(_corners, _rectangles)
+def test_ways_are_cut_at_the_edges_of_a_rectangle(
+    corners: list[tuple[float, float]], edges: tuple[float, float, float, float]
+) -> None:
+    streets = streets_from_osm(site_facts(replace(_map(_street(1, corners)), edges=edges)))
+    metres, runs = _within(edges, corners)
+    # Pieces of half a metre are none.
+    assert metres - 0.5 * runs - 1e-6 <= sum(shapely.LineString(s.line).length for s in streets) <= metres + 1e-6
+    west, south, east, north = edges
+    for street in streets:
+        assert (street.line >= np.array([west, south]) - 1e-9).all()
+        assert (street.line <= np.array([east, north]) + 1e-9).all()
+        for node, (x, y) in zip(street.nodes, street.line, strict=True):
+            new = node < 0
+            assert new or (x, y) == corners[node - 100]
+            assert not new or min(abs(x - west), abs(x - east), abs(y - south), abs(y - north)) < 1e-9
+
+
+@given(_corners, st.sampled_from([0.0, 5.0, 7.3]), st.integers(10, 160).map(float))
+def test_a_rectangle_with_the_window_s_own_sides_is_the_window(
+    corners: list[tuple[float, float]], inset: float, half: float
+) -> None:
+    square = replace(_map(_street(1, corners)), half=half)
+    same = replace(square, edges=(-half, -half, half, half))
+    points = np.array([*corners, (half, 0.0), (half - inset, 1.0), (inset - half, half - inset)])
+    for osm in (square, same):
+        assert osm.box == (-half, -half, half, half)
+        assert osm.holds(points, inset=inset).tolist() == (np.abs(points).max(axis=1) <= half - inset).tolist()
+        strict = np.abs(points).max(axis=1) < half - inset
+        assert osm.holds(points, inset=inset, edge=False).tolist() == strict.tolist()
+    one, other = (streets_from_osm(site_facts(osm)) for osm in (square, same))
+    assert [(s.part, s.nodes, s.line.tolist()) for s in one] == [(s.part, s.nodes, s.line.tolist()) for s in other]
+    # As ever: a segment that leaves is cut where the first of the four sides is met.
+    for street in one:
+        for node, xy in zip(street.nodes, street.line, strict=True):
+            assert node > 0 or np.abs(xy).max() == pytest.approx(half, abs=1e-9)
+
+
+def test_junctions_and_crossings_beyond_a_rectangle_are_left_out() -> None:
+    ways = [_street(k, [(-100.0, y), (0.0, y), (100.0, y)]) for k, y in ((1, 0.0), (2, 40.0))] + [
+        replace(_street(3, [(0.0, -90.0), (0.0, 0.0), (0.0, 40.0), (0.0, 90.0)]), nodes=[301, 101, 201, 304])
+    ]
+    nodes = [OsmNode(100 * k + 1, np.array([0.0, y]), {"highway": "crossing"}) for k, y in ((1, 0.0), (2, 40.0))]
+    nodes.append(OsmNode(9, np.array([-99.0, 0.0]), {"highway": "crossing"}))
+    osm = replace(_map(*ways), nodes=nodes)
+    whole, part = roads_of(osm), roads_of(replace(osm, edges=(-50.0, -20.0, 120.0, 20.0)))
+    assert sorted(j.position for j in whole.junctions) == [(0.0, 0.0), (0.0, 40.0)]
+    assert sorted(whole.crossings) == [(-99.0, 0.0), (0.0, 0.0), (0.0, 40.0)]
+    assert [j.position for j in part.junctions] == [(0.0, 0.0)]
+    assert part.crossings == [(0.0, 0.0)]
+    assert sorted({xy for road in part.roads for xy in road.line}) == [
+        (-50.0, 0.0), (0.0, -20.0), (0.0, 0.0), (0.0, 20.0), (100.0, 0.0),
+    ]  # fmt: skip
+
+
+def test_the_network_of_a_rectangle_lies_in_it() -> None:
+    city, whole = road_city(edges=STRIP), road_city()
+    west, south, east, north = STRIP
+    points = np.array([xy for road in roads_of(city.osm).roads for xy in road.line])
+    assert (points.min(axis=0) >= [west - 1e-3, south - 1e-3]).all()
+    assert (points.max(axis=0) <= [east + 1e-3, north + 1e-3]).all()
+    assert 50 < len(city.lanes) < len(whole.lanes) / 2
+    # Lanes and pavements lie beside the middles of streets.
+    walks = np.concatenate([city.lanes.walks.line(k) for k in range(len(city.lanes.walks))])
+    for lines in (city.lanes.points, walks):
+        assert (lines.min(axis=0) > [west - 20.0, south - 20.0]).all()
+        assert (lines.max(axis=0) < [east + 20.0, north + 20.0]).all()
+    near = shapely.box(*STRIP).buffer(-25.0)
+    there, here = (
+        shapely.MultiLineString([c.lanes.line(k) for k in range(len(c.lanes))]).intersection(near)
+        for c in (whole, city)
+    )
+    assert here.length == pytest.approx(there.length, rel=0.05)
 
 
 def test_ways_are_closed_for_a_reason_that_the_report_names() -> None:

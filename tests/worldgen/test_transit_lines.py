@@ -96,7 +96,7 @@ def test_buses_leave_when_the_timetable_says() -> None:
 
 def test_every_route_of_the_map_is_driven_or_left_out_with_a_reason() -> None:
     city = road_city()
-    routes, untold = routes_from_osm(city.osm, HALF)
+    routes, untold = routes_from_osm(city.osm)
     driven = {name for line in city.transit.lines for name in line.name.split("/")}
     told = {what.id for what in city.transit.left_out}
     assert {what.id for what in untold} <= told
@@ -114,7 +114,7 @@ def test_stops_of_the_old_schema_make_two_runs() -> None:
         [("n", node.id, "forward_stop" if node.id < 20 else "backward_stop") for node in nodes],
         {"type": "route", "route": "bus", "ref": "99", "colour": "#abc", "interval": "00:15"},
     )
-    (route,), _ = routes_from_osm(replace(city.osm, nodes=nodes, relations=[made]), HALF)
+    (route,), _ = routes_from_osm(replace(city.osm, nodes=nodes, relations=[made]))
     assert (route.name, route.colour, route.interval) == ("99", "#aabbcc", 900)
     assert [pole.key for pole in route.there] == ["n10", "n11", "n12"]
     assert [pole.key for pole in route.back] == ["n22", "n21", "n20"]

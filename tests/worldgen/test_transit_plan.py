@@ -6,12 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 
-from road_city import HALF, PLACES, road_city
+from road_city import HALF, PLACES, STRIP, lanes_of, road_city
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.transit_model import Line, Transit
 from vico.worldgen.facts.site import site_facts
+from vico.worldgen.streets.netconvert import empty_network
+from vico.worldgen.transit.plan import as_many, times_as_wide
 from vico.worldgen.transit.stage import BUS_LENGTH, transit_from_osm
 
 
@@ -67,6 +71,56 @@ def test_departures_run_from_five_to_eleven_at_night_every_six_to_ten_minutes() 
         assert 22.8 * 3600 < line.departures[-1] <= 23 * 3600
         assert len(gaps) == 1
         assert 360 <= gaps.pop() <= 600
+
+
+def test_stops_stations_and_tracks_of_a_rectangle_lie_in_it() -> None:
+    city, whole = road_city(edges=STRIP), road_city()
+    _check(city.transit, city.lanes)
+    assert len(city.transit.stops) < len(whole.transit.stops)
+    stations = [station.position[:2] for station in city.transit.bike_stations]
+    mapped = [s.position[:2] for s in whole.transit.bike_stations if city.osm.holds(s.position[:2], inset=6.0)]
+    assert mapped
+    assert set(mapped) <= set(stations)
+    assert city.osm.holds(np.array(stations)).all()
+    tracks = [np.array(line.track) for line in city.transit.tram_lines]
+    assert tracks
+    for track in tracks:
+        assert city.osm.holds(track, inset=-0.01).all()
+        # In at one edge and out at another.
+        assert not city.osm.holds(track[[0, -1]], inset=3.0).any()
+    # People wait beside lanes and tracks.
+    waits = np.array([stop.wait[:2] for stop in (*city.transit.stops, *city.transit.tram_stops)])
+    assert city.osm.holds(waits, inset=-8.0).all()
+
+
+def test_planned_racks_stand_in_a_rectangle_as_many_as_its_area_takes() -> None:
+    osm = road_city().osm
+    nodes = [node for node in osm.nodes if node.tags.get("amenity") != "bicycle_rental"]
+    areas = [area for area in osm.areas if area.tags.get("amenity") != "bicycle_rental"]
+    strip = road_city(edges=STRIP)
+    site = site_facts(replace(osm, nodes=nodes, areas=areas, edges=STRIP))
+    transit = transit_from_osm(site, strip.lanes, HeightField.flat(HALF))
+    assert transit.origin["bike_stations"] == "planned"
+    assert len(transit.bike_stations) == round(690.0 * 260.0 / 40_000.0) == 4
+    spots = np.array([station.position[:2] for station in transit.bike_stations])
+    assert site.osm.holds(spots, inset=5.0, edge=False).all()
+    # And on footways where there are no streets.
+    paths = replace(site.osm, ways=[way for way in osm.ways if way.tags.get("highway") == "footway"])
+    bare = transit_from_osm(site_facts(paths), lanes_of(empty_network(osm.frame, HALF)), HeightField.flat(HALF))
+    spots = np.array([station.position[:2] for station in bare.bike_stations])
+    assert len(spots) == 4
+    assert site.osm.holds(spots, inset=5.0, edge=False).all()
+
+
+@given(st.floats(10.0, 9_000.0), st.floats(10.0, 9_000.0))
+def test_places_have_lines_by_their_area_as_long_as_their_longer_side_asks_for(wide: float, high: float) -> None:
+    half = max(wide, high)
+    osm = replace(road_city().osm, half=half, edges=(-half, 10.0 - high, wide - half, 10.0))
+    assert times_as_wide(osm) == pytest.approx(max(1.0, max(wide, high) / 1200.0))
+    assert as_many(3, osm) == pytest.approx(max(3.0, 3.0 * wide * high / 1200.0**2), abs=0.51)
+    square = replace(osm, edges=None)
+    assert times_as_wide(square) == max(1.0, half / 600.0)
+    assert as_many(3, square) == round(3 * times_as_wide(square) ** 2)
 
 
 def test_a_window_with_one_street_has_a_line_up_and_down() -> None:

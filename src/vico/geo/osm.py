@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -121,6 +121,9 @@ class OsmData:
         (ISO 8601; None where neither has).
     broken
         Id and what is wrong with it, of each object that was left out or mended.
+    edges
+        West, south, east and north of a rectangle in the window, metres, where streets and transit end; None where they
+        end at the window's own sides.
     """
 
     frame: LocalFrame
@@ -133,6 +136,37 @@ class OsmData:
     sha256: str = ""
     timestamp: str | None = None
     broken: list[tuple[str, str]] = field(default_factory=list)
+    edges: tuple[float, float, float, float] | None = None
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """West, south, east and north of where streets and transit end, metres."""
+        return (-self.half, -self.half, self.half, self.half) if self.edges is None else self.edges
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """How wide and how high that box is, metres."""
+        west, south, east, north = self.box
+        return east - west, north - south
+
+    def holds(
+        self, xy: Sequence[float] | NDArray[np.float64], *, inset: float = 0.0, edge: bool = True
+    ) -> NDArray[np.bool_]:
+        """Return which points lie in the box.
+
+        Parameters
+        ----------
+        xy
+            Metres, shape ``(..., 2)``.
+        inset
+            How much smaller the box is to be on each side, metres.
+        edge
+            Whether points on its sides do.
+        """
+        points, (west, south, east, north) = np.asarray(xy), self.box
+        low, high = np.array([west + inset, south + inset]), np.array([east - inset, north - inset])
+        inside = (low <= points) & (points <= high) if edge else (low < points) & (points < high)
+        return np.asarray(inside.all(axis=-1))
 
 
 def means_area(tags: Mapping[str, str]) -> bool:

@@ -115,7 +115,8 @@ class SimulationBase:
     @cached_property
     def streets(self) -> TrafficNetwork:
         """What traffic moves on."""
-        network = TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles, self.world.height)
+        world = self.world
+        network = TrafficNetwork.of(world.lanes, self.solids, self._signal_poles, world.height, world.edges)
         driven = with_stopping_places(network.driven, network.lanes, network.walks, self.world, self.solids)
         walked = with_spots(network.walked, network.walks, self.world, self.solids)
         return replace(network, driven=driven, walked=walked)

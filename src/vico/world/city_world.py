@@ -62,6 +62,15 @@ class CityWorld(World):
         self._materials = _Materials()
         super().__init__(_manifest(city), city.path)
 
+    @property
+    def edges(self) -> tuple[float, float, float, float] | None:
+        """Where a city ends whose tiles fill no square around its middle, metres."""
+        known = self.city.manifest
+        (west, south), (east, north) = (
+            [(k + side) * known.size for k in corner] for corner, side in ((known.first, -0.5), (known.last, 0.5))
+        )
+        return None if {-west, -south, east, north} == {self.half} else (west, south, east, north)
+
     def file(self, name: str) -> Path:
         """Path of one of the files that the city has as a whole."""
         return self.city.path / WHOLE / name

@@ -73,6 +73,11 @@ class World:
             self._derived[kind] = known = make()
         return known
 
+    @property
+    def edges(self) -> tuple[float, float, float, float] | None:
+        """Where it ends, west, south, east and north, metres, if it is no square of `half`."""
+        return None
+
     def file(self, name: str) -> Path:
         """Path of one of the world's files."""
         if self.path is None:

@@ -209,7 +209,7 @@ def divide_map(request: CityRequest) -> OsmData:
             part = parts.within(half=half, margin=whole.margin, east=east, north=north)
             keep_product(request.plans / tile_name(tile), MAP, replace(part, sha256="", timestamp=None))
         write_json(known, key)
-    return replace(whole, half=request.grid.half, margin=whole.margin + HALO)
+    return replace(whole, half=request.grid.half, margin=whole.margin + HALO, edges=request.grid.edges)
 
 
 def bare_ground(request: CityRequest) -> None:

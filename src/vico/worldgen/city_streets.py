@@ -90,7 +90,7 @@ def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
         write_json(known, {"key": both})
     stages = Stages(request.plans / STREETS)
     given = stages.given
-    data = given(data, f"{data.sha256} {data.frame} {data.half}")
+    data = given(data, f"{data.sha256} {data.frame} {data.half} {data.box}")
     with stages.timed("facts"):
         site = given(site_facts(data), f"facts {stages.digest(data)}")
     levels = given(whole_ground(whole, data.half), f"levels {both}")

@@ -54,11 +54,14 @@ class EventSites:
             self.place(event.place)
         if event.street and not self.street(event).length:
             raise InputError(f"events: {event.kind}: no part of {event.street!r} lies in its region; make that larger")
-        if event.region is not None and max(abs(event.region[0]), abs(event.region[1])) > self._world.half:
-            raise InputError(
-                f"events: {event.kind}: region {list(event.region)} lies off the map, which reaches "
-                f"{self._world.half:g} m from its middle"
-            )
+        if event.region is not None:
+            half = self._world.half
+            west, south, east, north = self._world.edges or (-half, -half, half, half)
+            if not (west <= event.region[0] <= east and south <= event.region[1] <= north):
+                raise InputError(
+                    f"events: {event.kind}: region {list(event.region)} lies off the map, which reaches from "
+                    f"x {west:g}, y {south:g} to x {east:g}, y {north:g}"
+                )
 
     def place(self, wanted: str) -> Place:
         """Return a place by its id, or by its name if one alone has it.

@@ -19,6 +19,9 @@ from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
 
+#: Of a map: west, south, east, north, metres.
+Edges = tuple[float, float, float, float]
+
 _U_TURN, _TURN = 2.6, 0.6  # rad
 _BORDER = 6.0  # how far from the outermost point of the streets the map's edge counts as reached, m
 _LEAST_WALK = 60.0  # m of connected sidewalk that are worth walking along
@@ -59,6 +62,7 @@ class TrafficNetwork:
         solids: Sequence[shapely.Polygon] = (),
         poles: Objects | None = None,
         ground: HeightField | None = None,
+        edges: Edges | None = None,
     ) -> TrafficNetwork:
         """Make the network of a world's lanes.
 
@@ -70,12 +74,14 @@ class TrafficNetwork:
             Objects on which signals are seen.
         ground
             The ground with its kerbs, above whose edges people walk where they can; None for none.
+        edges
+            Where the map ends: west, south, east and north, metres; None for a square, which ends where the outermost
+            of its streets do.
         """
         walks = connected_walkways(lanes.walks.clear_of(list(solids), ground))
-        driven = _lane_network(lanes, walks)
-        return cls(
-            lanes, walks, driven, walkway_network(walks), *lanes_to_start_on(lanes, driven), poles or Objects.none()
-        )
+        driven = _lane_network(lanes, walks, edges)
+        starts = lanes_to_start_on(lanes, driven, edges)
+        return cls(lanes, walks, driven, walkway_network(walks), *starts, poles or Objects.none())
 
     @cached_property
     def conflicts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -112,10 +118,10 @@ class TrafficNetwork:
         )
 
 
-def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
+def _lane_network(lanes: LaneGraph, walks: Walkways, edges: Edges | None) -> LaneNetwork:
     """Return the lanes as kernels take them; `walks` have the crossings they run over."""
     crossings_first, crossings, cleared = _crossings_of_lanes(lanes, walks)
-    leaves = (lanes.inside < 0) & _at_border(lanes, lanes.first[1:] - 1)
+    leaves = (lanes.inside < 0) & _at_border(lanes, lanes.first[1:] - 1, edges)
     n = np.arange(len(lanes))
     turn = lanes.at(n, lanes.length)[:, 2] - lanes.at(n, 0.0)[:, 2]
     turn = (turn + np.pi) % (2 * np.pi) - np.pi
@@ -202,12 +208,14 @@ def connected_walkways(walks: Walkways) -> Walkways:
     return walks.without(size[part[walks.ends[:, 0]]] < _LEAST_WALK)
 
 
-def lanes_to_start_on(lanes: LaneGraph, net: LaneNetwork) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+def lanes_to_start_on(
+    lanes: LaneGraph, net: LaneNetwork, edges: Edges | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Return the lanes cars can stand on at the start, and those they come back in on: where the map begins."""
     usable = (lanes.inside < 0) & ~net.lanes["closed"] & (np.diff(lanes.next_first) > 0) & (lanes.length > 12.0)
     usable &= ~net.lanes["leaves"]
     starts = np.flatnonzero(usable & (lanes.zone < 0))
-    entries = np.flatnonzero(usable & _at_border(lanes, lanes.first[:-1])).astype(np.int32)
+    entries = np.flatnonzero(usable & _at_border(lanes, lanes.first[:-1], edges)).astype(np.int32)
     return starts, entries if len(entries) else starts.astype(np.int32)
 
 
@@ -240,10 +248,15 @@ def _closed_to_cars(lanes: LaneGraph, leaves: NDArray[np.bool_], u_turn: NDArray
     return closed[:n]
 
 
-def _at_border(lanes: LaneGraph, point: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _at_border(lanes: LaneGraph, point: NDArray[np.int32], edges: Edges | None) -> NDArray[np.bool_]:
     """Return which points (one a lane) lie where the map cuts the streets off."""
-    reach = np.abs(lanes.points).max(initial=0.0)
-    return np.asarray(np.abs(lanes.points[point]).max(axis=1) > reach - _BORDER)
+    x, y = lanes.points[point, 0], lanes.points[point, 1]
+    if edges is None:
+        reach = np.abs(lanes.points).max(initial=0.0)
+        edges = -reach, -reach, reach, reach
+    west, south, east, north = edges
+    inside = (x >= west + _BORDER) & (y >= south + _BORDER) & (x <= east - _BORDER) & (y <= north - _BORDER)
+    return np.asarray(~inside, np.bool_)
 
 
 def _crossings_of_lanes(

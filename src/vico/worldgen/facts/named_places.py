@@ -41,7 +41,7 @@ class NamedPlace:
 
 
 def named_places(osm: OsmData) -> list[NamedPlace]:
-    """Everything with a name and a category, within the square."""
+    """Everything with a name and a category, within the map's box."""
     found: list[NamedPlace] = []
     rows = [(f"n{n.id}", n.xy, n.tags, None) for n in osm.nodes]
     for area in osm.areas:
@@ -50,7 +50,7 @@ def named_places(osm: OsmData) -> list[NamedPlace]:
             rows.append((area.id, centre, area.tags, area.polygon))
     for key, xy, tags, shape in rows:
         name = tags.get("name") or tags.get("brand") or (tags.get("operator") if "shop" in tags else None)
-        if not name or np.abs(xy).max() > osm.half:
+        if not name or not osm.holds(xy):
             continue
         what = category_of(tags, shape is not None)
         if what is not None:

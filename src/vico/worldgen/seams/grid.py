@@ -62,6 +62,13 @@ class TileGrid:
         """Half the side of the square around the middle tile that holds all tiles, metres."""
         return (self.reach + 0.5) * self.size
 
+    @property
+    def edges(self) -> tuple[float, float, float, float]:
+        """West, south, east and north of all tiles, metres from the middle one's middle."""
+        (west, south), (east, north) = self.first, self.last
+        reach = self.size / 2
+        return west * self.size - reach, south * self.size - reach, east * self.size + reach, north * self.size + reach
+
     def place(self, tile: Tile) -> Tile:
         """Return which column and row of that square a tile is, counted from its south-western corner."""
         return tile[0] + self.reach, tile[1] + self.reach

@@ -194,9 +194,9 @@ def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64])
     )
 
 
-def _cut(way: OsmWay, half: float, new_id: int) -> tuple[list[tuple[list[int], NDArray[np.float64]]], int]:
+def _cut(way: OsmWay, osm: OsmData, new_id: int) -> tuple[list[tuple[list[int], NDArray[np.float64]]], int]:
     """Cut a way to its pieces inside the window; where the edge cuts a segment a new node replaces the rest."""
-    inside = np.abs(way.line).max(axis=1) <= half
+    inside = osm.holds(way.line)
     if inside.all():
         return [(list(way.nodes), way.line)], new_id
     pieces: list[tuple[list[int], NDArray[np.float64]]] = []
@@ -212,24 +212,26 @@ def _cut(way: OsmWay, half: float, new_id: int) -> tuple[list[tuple[list[int], N
     for i in range(len(way.nodes)):
         if inside[i]:
             if not nodes and i > 0:
-                nodes, points = [new_id], [_crossing(way.line[i], way.line[i - 1], half)]
+                nodes, points = [new_id], [_crossing(way.line[i], way.line[i - 1], osm.box)]
                 new_id -= 1
             nodes.append(way.nodes[i])
             points.append(way.line[i])
         elif nodes:
             nodes.append(new_id)
-            points.append(_crossing(way.line[i - 1], way.line[i], half))
+            points.append(_crossing(way.line[i - 1], way.line[i], osm.box))
             new_id -= 1
             close()
     close()
     return pieces, new_id
 
 
-def _crossing(inner: NDArray[np.float64], outer: NDArray[np.float64], half: float) -> NDArray[np.float64]:
-    """Where the segment from a point inside the square to one outside leaves it."""
-    step = outer - inner
+def _crossing(
+    inner: NDArray[np.float64], outer: NDArray[np.float64], box: tuple[float, float, float, float]
+) -> NDArray[np.float64]:
+    """Where the segment from a point inside a box to one outside leaves it."""
+    step, low, high = outer - inner, np.array(box[:2]), np.array(box[2:])
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(step > 0, (half - inner) / step, np.where(step < 0, (-half - inner) / step, np.inf))
+        shares = np.where(step > 0, (high - inner) / step, np.where(step < 0, (low - inner) / step, np.inf))
     return np.asarray(inner + step * float(shares.min()))
 
 
@@ -258,7 +260,7 @@ def streets_from_osm(
     for way in site.osm.ways:
         if "highway" not in way.tags:
             continue
-        pieces, new_id = _cut(way, site.osm.half, new_id)
+        pieces, new_id = _cut(way, site.osm, new_id)
         with expendable(f"w{way.id}"):
             found = _parts(way, pieces, site, standing)
             streets += [_opened(street) if way.id in usable else street for street in found]
@@ -420,7 +422,7 @@ def _crossings(osm: OsmData, streets: list[NetworkStreet]) -> list[tuple[float, 
         for node in osm.nodes
         if (node.tags.get("highway") == "crossing" or "crossing" in node.tags)
         and node.tags.get("crossing") != "no"
-        and np.abs(node.xy).max() <= osm.half
+        and osm.holds(node.xy)
     ]
     if not roads or not points:
         return []

@@ -25,6 +25,7 @@ _CAPACITY = 12
 _EACH = 40_000.0  # square metres of window for each planned station
 _FEWEST, _MOST = 2, 6
 _APART = 80.0
+_INSIDE = 5.0  # metres from the window's edge
 _ASIDE = 2.2  # metres from the middle of a footway
 _FOOTWAYS = ("pedestrian", "footway", "living_street", "path", "cycleway")
 
@@ -43,7 +44,7 @@ def bike_stations(
             continue
         with expendable(key):
             xy = np.array(shape.centroid.coords[0])
-            if np.abs(xy).max() <= osm.half - 5.0:
+            if osm.holds(xy, inset=_INSIDE):
                 size = re.match(r"\d{1,4}", tags.get("capacity", ""))
                 capacity = int(np.clip(int(size.group()) if size else _CAPACITY, 2, 60))
                 name = tags.get("name") or f"Bike station {len(found) + 1}"
@@ -68,11 +69,12 @@ def bike_stations(
 
 def _planned(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.float64]]:
     """Points of long stretches of sidewalk (of footways where there is none), nearest to where people go."""
-    osm, half = site.osm, site.osm.half
+    osm = site.osm
     stretches = [shapely.LineString(walks.line(int(i))) for i in np.flatnonzero(walks.kind == SIDEWALK)]
     stretches = [line for line in stretches if line.length > 15.0]
     if not stretches:
-        window = shapely.box(5.0 - half, 5.0 - half, half - 5.0, half - 5.0)
+        west, south, east, north = osm.box
+        window = shapely.box(west + _INSIDE, south + _INSIDE, east - _INSIDE, north - _INSIDE)
         for way in osm.ways:
             if way.tags.get("highway") in _FOOTWAYS and len(way.line) > 1:
                 # Beside the way, not on it.
@@ -86,8 +88,9 @@ def _planned(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.flo
     spots = np.concatenate(
         [shapely.get_coordinates(line.interpolate(np.arange(6.0, line.length - 5.0, 4.0))) for line in stretches]
     )
-    spots = spots[np.abs(spots).max(axis=1) < half - 5.0]
-    count = int(np.clip(round((2 * half) ** 2 / _EACH), _FEWEST, _MOST))
+    spots = spots[osm.holds(spots, inset=_INSIDE, edge=False)]
+    wide, high = osm.sides
+    count = int(np.clip(round(wide * high / _EACH), _FEWEST, _MOST))
     wanted = where_people_go(site)
     chosen: list[NDArray[np.float64]] = []
     for centre in k_means(wanted if len(wanted) else spots, count, rng(seed, "transit", "racks")):

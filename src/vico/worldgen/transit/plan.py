@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geo.osm import OsmData
 from vico.seeds import rng
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
@@ -15,16 +16,23 @@ from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs
 
 MIN_STOPS, MAX_STOPS = 4, 12
 MAX_LOOP = 4500.0
-_DISTRICT = 600.0  # metres: half the side of the largest window that these suit
+_DISTRICT = 1200.0  # metres: the side of the largest window that these suit
 
 _PLANNED = 8
 _FEW = 12  # fewer named places than this say little about where people go: buildings count too
 _APART = 60.0  # metres between two stops of a planned line
 
 
-def times_as_wide(half: float) -> float:
+def times_as_wide(osm: OsmData) -> float:
     """Return how many times as wide as a district a place is, at least 1: so much longer may its lines be."""
-    return max(1.0, half / _DISTRICT)
+    return max(1.0, max(osm.sides) / _DISTRICT)
+
+
+def as_many(each: int, osm: OsmData) -> int:
+    """Return how many lines a place may have, of so many in a district: by its area."""
+    wide, high = osm.sides
+    times = max(1.0, math.sqrt(wide * high) / _DISTRICT)
+    return round(each * times * times)
 
 
 def where_people_go(site: SiteFacts) -> NDArray[np.float64]:
@@ -36,7 +44,7 @@ def where_people_go(site: SiteFacts) -> NDArray[np.float64]:
                 with expendable(area.id):
                     points.append(np.array(area.polygon.representative_point().coords[0]))
     xy = np.array(points).reshape(-1, 2)
-    return xy[np.abs(xy).max(axis=1, initial=0.0) < site.osm.half]
+    return xy[site.osm.holds(xy, edge=False)]
 
 
 def k_means(xy: NDArray[np.float64], count: int, random: np.random.Generator) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ from vico.world.transit_model import TramLine, TramStop
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import is_bridge, on_the_ground
-from vico.worldgen.transit.plan import times_as_wide
+from vico.worldgen.transit.plan import as_many
 from vico.worldgen.transit.routes import interval_of
 
 _ROUTES = {"tram": "tram", "light_rail": "light_rail", "train": "rail"}
@@ -89,7 +89,7 @@ def trams_from_osm(
     """
     left_out: list[Dropped] = []
     routes = _routes(site, left_out)
-    chosen = _chosen(routes, site.osm.half, left_out)
+    chosen = _chosen(routes, site.osm, left_out)
     stops: dict[str, TramStop] = {}
     lines: list[TramLine] = []
     for number, route in enumerate(chosen):
@@ -144,7 +144,7 @@ def _routes(site: SiteFacts, left_out: list[Dropped]) -> list[_Route]:
             continue
         with expendable(f"r{relation.id}"):
             pieces = _pieces(relation, ways)
-            runs = [run for piece in pieces for run in _within(piece, osm.half)]
+            runs = [run for piece in pieces for run in _within(piece, osm)]
             name = tags.get("ref") or tags.get("name") or "Tram"
             if not runs:
                 continue
@@ -200,12 +200,12 @@ def _pieces(relation: OsmRelation, ways: Mapping[int, OsmWay]) -> list[NDArray[n
     return pieces
 
 
-def _within(line: NDArray[np.float64], half: float) -> list[NDArray[np.float64]]:
+def _within(line: NDArray[np.float64], osm: OsmData) -> list[NDArray[np.float64]]:
     """Stretches of a line inside the window, a point a metre."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     s = np.arange(0.0, along[-1], 1.0)
     points = np.column_stack([np.interp(s, along, line[:, k]) for k in (0, 1)])
-    inside = np.abs(points).max(axis=1) <= half
+    inside = osm.holds(points)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     runs = [points[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]
     return [shapely.get_coordinates(shapely.LineString(run).simplify(0.04)) for run in runs]
@@ -215,7 +215,7 @@ def _length(line: NDArray[np.float64]) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-def _chosen(routes: Sequence[_Route], half: float, left_out: list[Dropped]) -> list[_Route]:
+def _chosen(routes: Sequence[_Route], osm: OsmData, left_out: list[Dropped]) -> list[_Route]:
     """Choose lines that together run on the most track, each with its longest route of either direction.
 
     Where none of them is a railway one more is chosen that is and leads through the window.
@@ -232,14 +232,14 @@ def _chosen(routes: Sequence[_Route], half: float, left_out: list[Dropped]) -> l
         lines.append([first, *back[:1]])
     chosen: list[list[_Route]] = []
     covered = shapely.Polygon()
-    most = round(_MOST_LINES * times_as_wide(half) ** 2)
+    most = as_many(_MOST_LINES, osm)
     while lines and len(chosen) < most:
         ways = [shapely.MultiLineString([route.line for route in line]) for line in lines]
         fresh = [round(way.difference(covered).length) for way in ways]
         best = max(range(len(lines)), key=lambda k: (fresh[k], ways[k].length, -k))
         covered = covered.union(ways[best].buffer(_SAME_TRACK))
         chosen.append(lines.pop(best))
-    trains = [line for line in lines if line[0].kind == "rail" and all(_leads_through(r, half) for r in line)]
+    trains = [line for line in lines if line[0].kind == "rail" and all(_leads_through(r, osm) for r in line)]
     if trains and not any(line[0].kind == "rail" for line in chosen):
         # A railway is in no street: one goes beside as many trams.
         best_train = max(trains, key=lambda line: (sum(route.track.length for route in line), line[0].id))
@@ -252,9 +252,9 @@ def _chosen(routes: Sequence[_Route], half: float, left_out: list[Dropped]) -> l
     return [route for line in chosen for route in line]
 
 
-def _leads_through(route: _Route, half: float) -> bool:
+def _leads_through(route: _Route, osm: OsmData) -> bool:
     """Return whether a route comes into the window at its edge and goes out there."""
-    return bool(np.abs(route.line[[0, -1]]).max(axis=1).min() > half - _EDGE)
+    return not osm.holds(route.line[[0, -1]], inset=_EDGE).any()
 
 
 def _find_stops(route: _Route, osm: OsmData, feeds: Sequence[Feed]) -> None:

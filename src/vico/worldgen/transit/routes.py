@@ -65,7 +65,7 @@ class Route:
     hours: tuple[int, int] | None = None
 
 
-def routes_from_osm(osm: OsmData, half: float) -> tuple[list[Route], list[Dropped]]:
+def routes_from_osm(osm: OsmData) -> tuple[list[Route], list[Dropped]]:
     """Routes of the map's relations (both schemas of public transport) with two stops or more in the window."""
     spots = _spots(osm)
     lines = {way.id: way.line for way in osm.ways}
@@ -78,7 +78,7 @@ def routes_from_osm(osm: OsmData, half: float) -> tuple[list[Route], list[Droppe
         if any(tags.get(key) == "yes" for key in _GONE) or tags.get("state") in ("proposed", "abandoned"):
             continue
         with expendable(f"r{relation.id}"):
-            for run in _runs(relation, spots, half):
+            for run in _runs(relation, spots, osm):
                 grouped[name, tags.get("network", "") or tags.get("operator", "")].append((relation, run))
     routes: list[Route] = []
     dropped: list[Dropped] = []
@@ -209,7 +209,7 @@ def _spot(tags: Tags) -> tuple[str, int, bool]:
 
 
 def _runs(
-    relation: OsmRelation, spots: dict[str, tuple[str, tuple[float, float], int, bool]], half: float
+    relation: OsmRelation, spots: dict[str, tuple[str, tuple[float, float], int, bool]], osm: OsmData
 ) -> list[list[Pole]]:
     """List the stops of a relation in order; two runs where an old relation has both directions in it."""
     both: tuple[list[tuple[Pole, int]], list[tuple[Pole, int]]] = ([], [])
@@ -219,7 +219,7 @@ def _runs(
         if key not in spots:
             continue
         name, xy, rank, is_stop = spots[key]
-        if not (is_stop or "stop" in role or "platform" in role) or max(abs(xy[0]), abs(xy[1])) > half:
+        if not (is_stop or "stop" in role or "platform" in role) or not osm.holds(xy):
             continue
         for run, other in zip(both, ("backward", "forward"), strict=True):
             if role.startswith(other) or (run is both[1] and not split):

@@ -26,6 +26,7 @@ from vico.worldgen.transit.plan import (
     MAX_LOOP,
     MAX_STOPS,
     MIN_STOPS,
+    as_many,
     planned_berths,
     planned_loop,
     times_as_wide,
@@ -137,11 +138,11 @@ def transit_from_osm(
     kerbs = Kerbs(lanes, height)
     mapped = _mapped_berths(osm, kerbs)
     timed, left_out = routes_from_gtfs(feeds)
-    drawn, untold = routes_from_osm(osm, osm.half)
+    drawn, untold = routes_from_osm(osm)
     known = {route.name for route in timed}
     left_out += [what for what in untold if not known]
     routes = timed + [route for route in drawn if route.name not in known]
-    chosen = _driven(routes, kerbs, mapped, left_out, times_as_wide(osm.half))
+    chosen = _driven(routes, kerbs, mapped, left_out, osm)
     names = "osm" if mapped else "planned"
     if timed and any(line.route is not None and line.route.origin == "gtfs" for line in chosen):
         names = "osm and gtfs" if mapped else "gtfs"
@@ -239,7 +240,7 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
             and (tags.get("bus") == "yes" or key[0] == "n")
             and "railway" not in tags
         )
-        if not stop or np.abs(xy).max() > osm.half:
+        if not stop or not osm.holds(xy):
             continue
         with expendable(key):
             near = kerbs.near(xy, _REACH)
@@ -251,12 +252,12 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
 
 
 def _driven(
-    routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped], wide: float
+    routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped], osm: OsmData
 ) -> list[_Chosen]:
     """Choose some routes that can be driven as closed rounds: timetables first, then the longest on the map."""
     fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
     ways: list[tuple[set[int], int]] = []
-    most = round(_MOST_LINES * wide * wide)
+    most, wide = as_many(_MOST_LINES, osm), times_as_wide(osm)
     for route in routes:
         with expendable(route.id):
             fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)], wide)
