@@ -98,8 +98,10 @@ class CityRenderer:
         self._looked: dict[int, Neighbourhood] = {}
         self._glances: dict[Neighbourhood, dict[int, Any]] = {}
 
-    def rebind(self, sim: RenderedSimulation) -> CityRenderer:
+    def rebind(self, sim: RenderedSimulation) -> CityRenderer | SceneRenderer:
         """Return a renderer of another simulation, with the scenes of this one if its world is the same."""
+        if not isinstance(sim.world, CityWorld):
+            return SceneRenderer(sim, detail=self._detail)
         if sim.world is not self._city:
             return CityRenderer(sim, detail=self._detail)
         self._sim = sim
@@ -180,14 +182,13 @@ class CityRenderer:
         """Let go of the scenes that were looked at longest ago until there is room for another."""
         sizes = {where: scene.scene.nbytes for where, scene in self._scenes.items()}
         largest = max(sizes.values(), default=0)
-        for where, size in sizes.items():
+        for where in sizes:
             if sum(sizes[one] for one in self._scenes) + largest <= self._sim.config.memory * _GIGABYTE:
                 return
             gone = self._scenes.pop(where)
             gone.wait()
             # Where everything was for those who looked last from there: their flow is the same as if it had stayed.
             self._glances[where] = {k: glance for k, glance in gone.glances.items() if self._looked.get(k) == where}
-            del gone, size
 
     def _part(self, where: Neighbourhood) -> ScenePart:
         size = self._city.city.manifest.size

@@ -262,20 +262,26 @@ def find_rest(
         near = [k for k in seats.near(point, -1, lies=lies, reach=_BENCH).tolist() if not taken[k]]
         seat = next((k for k in near if has_room(k)), None)
         return None if seat is None else Rest(int(seats.entity[seat]), "", _triple(seats.before(seat)))
-    free = (seats.lies == lies) & ~taken
-    in_rooms = free & ~indoor.is_passage[seats.room]
-    found = _rest_in(here, in_rooms, seats, indoor, has_room)
-    return _rest_in(here, free, seats, indoor, has_room) if found is None else found
+
+    def wanted(here: slice) -> NDArray[np.bool_]:
+        # Of one room at a time: a city has a hundred thousand seats.
+        return (seats.lies[here] == lies) & ~taken[here]
+
+    def in_rooms(here: slice) -> NDArray[np.bool_]:
+        return wanted(here) & ~indoor.is_passage[seats.room[here]]
+
+    found = _rest_in((point, room), in_rooms, seats, indoor, has_room)
+    return _rest_in((point, room), wanted, seats, indoor, has_room) if found is None else found
 
 
 def _rest_in(
     here: tuple[ArrayLike, int],
-    wanted: NDArray[np.bool_],
+    wanted: Callable[[slice], NDArray[np.bool_]],
     seats: Seats,
     indoor: Indoor,
     has_room: Callable[[int], bool],
 ) -> Rest | None:
-    """Return the same among some of the seats."""
+    """Return the same among the seats that are wanted; `wanted` says so of those from one number to another."""
     _, room = here
     found = _nearest_in(here, wanted, seats, indoor, has_room)
     if found is not None:
@@ -301,7 +307,7 @@ def _rest_in(
 
 def _nearest_in(
     here: tuple[ArrayLike, int],
-    wanted: NDArray[np.bool_],
+    wanted: Callable[[slice], NDArray[np.bool_]],
     seats: Seats,
     indoor: Indoor,
     has_room: Callable[[int], bool],
@@ -309,7 +315,7 @@ def _nearest_in(
     """Return the wanted seat of a room nearest to a point that can be reached, and where one stands before it."""
     point, room = here
     inside = seats.in_room(room)
-    free = wanted[inside].nonzero()[0]
+    free = wanted(inside).nonzero()[0]
     if not len(free):
         return None
     x, y = np.asarray(point, np.float64)[:2]
