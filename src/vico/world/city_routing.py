@@ -49,8 +49,9 @@ class CityRouter(Router):
         self._cost, self._clearance, self._free = cost, walkable.clearance, walkable.connected
         self.graph = GateGraph(gates, walkable.n, side)
         self._side = side
-        self._ends: Recent[int, Ints] = Recent(_ENDS)
-        self._legs: Recent[tuple[int, int], tuple[NDArray[np.int32], NDArray[np.int32]]] = Recent(_LEGS)
+        # By the room that is needed beside one.
+        self._ends: Recent[tuple[float, int], Ints] = Recent(_ENDS)
+        self._legs: Recent[tuple[float, int, int], tuple[NDArray[np.int32], NDArray[np.int32]]] = Recent(_LEGS)
         self._shut = np.zeros(cost.shape, np.bool_)
         self._nothing = np.zeros((0, 0), np.bool_)
         self._lock = Lock()
@@ -128,24 +129,24 @@ class CityRouter(Router):
     def _to_gates(self, ask: _Ask, cell: int) -> tuple[Ints, Ints]:
         """Return the gates of the tile that a cell lies in, and what walks from the cell to them cost."""
         gates = self.graph.of_tile(ask.tile(cell))
-        known = self._ends.get(cell) if ask.usual else None
+        known = self._ends.get((ask.room, cell)) if ask.usual else None
         if known is None:
             known = ask.window(ask.square(cell)).costs(cell, self.graph.cells[gates])
             if ask.usual:
-                self._ends.keep(cell, known)
+                self._ends.keep((ask.room, cell), known)
         return gates, known
 
     def _leg(self, ask: _Ask, a: int, b: int, *, kept: bool) -> tuple[Ints, Ints] | None:
         """Return the walk between two cells of a tile; that between gates is kept for others."""
         if not (kept and ask.usual):
             return ask.window(ask.square(a)).walk(a, b)
-        known = self._legs.get((a, b))
+        known = self._legs.get((ask.room, a, b))
         if known is None:
             found = ask.window(ask.square(a)).walk(a, b)
             if found is None:
                 return None
             known = found[0].astype(np.int32), found[1].astype(np.int32)
-            self._legs.keep((a, b), known)
+            self._legs.keep((ask.room, a, b), known)
         return known[0].astype(np.int64), known[1].astype(np.int64)
 
     def distance_field(self, goal: ArrayLike, *, blocked: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
@@ -170,8 +171,10 @@ class _Ask:
 
     Attributes
     ----------
+    room
+        What is needed beside one, metres.
     usual
-        Whether all may be walked on that can be, so that what is found is found again.
+        Whether all may be walked on that has the room, so that what is found is found again.
     """
 
     def __init__(
@@ -184,8 +187,8 @@ class _Ask:
         *,
         closing: bool,
     ) -> None:
-        self._cost, self._clearance, self._blocked, self._room, self._side = cost, clearance, blocked, room, side
-        self.usual = blocked is None and not room and not closing
+        self._cost, self._clearance, self._blocked, self.room, self._side = cost, clearance, blocked, room, side
+        self.usual = blocked is None and not closing
         self._windows: dict[tuple[int, int, int, int], Window] = {}
 
     def tile(self, cell: int) -> tuple[int, int]:
@@ -206,7 +209,7 @@ class _Ask:
             cost = np.ascontiguousarray(self._cost[part])
             if self._blocked is not None:
                 cost = np.where(self._blocked[part], np.int32(0), cost)
-            if self._room:
-                cost = np.where(self._clearance[part] < self._room, np.int32(0), cost)
+            if self.room:
+                cost = np.where(self._clearance[part] < self.room, np.int32(0), cost)
             self._windows[key] = Window(cost, rows.start, columns.start, self._cost.shape[1])
         return self._windows[key]

@@ -22,7 +22,7 @@ HEADROOM = 2.0
 be under such a deck, or above such a floor."""
 
 _ENDS = 0.5  # metres that a deck goes on beyond its ends, so that no gap is left in bends and at joints
-
+_CELL = 16.0  # metres; of the grid by which pieces are found
 _SLACK = 1e-3  # metres by which the box around a piece of a strip is larger than that, for rounding
 
 Floats = NDArray[np.float64]
@@ -86,11 +86,14 @@ class Decks:
 
     @cached_property
     def _strips(self) -> tuple[NDArray[Any], ...]:
-        """The strips as the kernel takes them: with the box around all of them, and around each of their pieces."""
-        start, end = self.points[:-1, :2], self.points[1:, :2]
-        reach = (np.repeat(self.half_width, np.diff(self.first))[:-1] + _ENDS + _SLACK)[:, None]
+        """The strips as the kernel takes them: with the box around all of them, and the pieces that reach each cell."""
+        strip = np.repeat(np.arange(len(self)), np.diff(self.first) - 1)
+        piece = np.delete(np.arange(len(self.points)), self.first[1:] - 1)
+        start, end = self.points[piece, :2], self.points[piece + 1, :2]
+        reach = (self.half_width[strip] + _ENDS + _SLACK)[:, None]
         boxes = np.column_stack([np.minimum(start, end) - reach, np.maximum(start, end) + reach])
-        return self.first, self.points, self.half_width, self.pavement, self.rise, self.box, boxes
+        first, pieces = _by_cell(self.box, boxes)
+        return self.points, self.half_width, self.pavement, self.rise, self.box, strip, piece, boxes, first, pieces
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return them as named arrays, for a file."""
@@ -113,37 +116,54 @@ class Decks:
         return cls(first, points, *sizes)
 
 
+def _by_cell(box: Floats, boxes: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the boxes begin that reach each cell of a grid over a box, row by row, and these in their order."""
+    columns, rows = (max(int(np.ceil((box[k + 2] - box[k]) / _CELL)), 1) for k in (0, 1))
+    low = np.clip(np.floor((boxes[:, :2] - box[:2]) / _CELL).astype(np.int64), 0, [columns - 1, rows - 1])
+    high = np.clip(np.floor((boxes[:, 2:] - box[:2]) / _CELL).astype(np.int64), 0, [columns - 1, rows - 1])
+    found: list[tuple[int, int]] = []
+    for k, ((west, south), (east, north)) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+        found += [(row * columns + column, k) for row in range(south, north + 1) for column in range(west, east + 1)]
+    table = np.array(sorted(found), np.int64).reshape(-1, 2)
+    first = np.searchsorted(table[:, 0], np.arange(columns * rows + 1))
+    return first.astype(np.int64), np.ascontiguousarray(table[:, 1])
+
+
 @compiled
 def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
     """Replace `ground` by the height of the strip nearest to each place, where one is nearer."""
-    first, points, half_width, pavement, rise, box, boxes = strips
+    points, half_width, pavement, rise, box, strip, piece, boxes, first, pieces = strips
+    columns = max(int(np.ceil((box[2] - box[0]) / _CELL)), 1)
+    rows = (len(first) - 1) // columns
     for k in range(len(places)):
         px, py, pz = places[k, 0], places[k, 1], places[k, 2]
         if px < box[0] or py < box[1] or px > box[2] or py > box[3]:
             continue
         best, low = ground[k], ground[k]
         found = abs(pz - best)
-        for s in range(len(half_width)):
-            for m in range(first[s], first[s + 1] - 1):
-                if px < boxes[m, 0] or py < boxes[m, 1] or px > boxes[m, 2] or py > boxes[m, 3]:
-                    continue
-                ax, ay = points[m, 0], points[m, 1]
-                dx, dy = points[m + 1, 0] - ax, points[m + 1, 1] - ay
-                length = np.sqrt(dx * dx + dy * dy)
-                if length < 1e-6:
-                    continue
-                along = ((px - ax) * dx + (py - ay) * dy) / length
-                across = abs((px - ax) * dy - (py - ay) * dx) / length
-                if across > half_width[s] or along < -_ENDS or along > length + _ENDS:
-                    continue
-                t = min(max(along / length, 0.0), 1.0)
-                height = points[m, 2] + t * (points[m + 1, 2] - points[m, 2])
-                if across > pavement[s]:
-                    height += rise[s]
-                # Nobody is between the ground and a deck that lies low above it, nor above the floor of an open cut.
-                away = 0.0 if 0.0 <= height - low < HEADROOM and pz < height else abs(pz - height)
-                if 0.0 < low - height < HEADROOM and pz < low + HEADROOM:
-                    away = -1.0
-                if away < found or (away == found and height > best):
-                    best, found = height, away
+        row, column = min(int((py - box[1]) / _CELL), rows - 1), min(int((px - box[0]) / _CELL), columns - 1)
+        cell = row * columns + column
+        for p in pieces[first[cell] : first[cell + 1]]:
+            s, m = strip[p], piece[p]
+            if px < boxes[p, 0] or py < boxes[p, 1] or px > boxes[p, 2] or py > boxes[p, 3]:
+                continue
+            ax, ay = points[m, 0], points[m, 1]
+            dx, dy = points[m + 1, 0] - ax, points[m + 1, 1] - ay
+            length = np.sqrt(dx * dx + dy * dy)
+            if length < 1e-6:
+                continue
+            along = ((px - ax) * dx + (py - ay) * dy) / length
+            across = abs((px - ax) * dy - (py - ay) * dx) / length
+            if across > half_width[s] or along < -_ENDS or along > length + _ENDS:
+                continue
+            t = min(max(along / length, 0.0), 1.0)
+            height = points[m, 2] + t * (points[m + 1, 2] - points[m, 2])
+            if across > pavement[s]:
+                height += rise[s]
+            # Nobody is between the ground and a deck that lies low above it, nor above the floor of an open cut.
+            away = 0.0 if 0.0 <= height - low < HEADROOM and pz < height else abs(pz - height)
+            if 0.0 < low - height < HEADROOM and pz < low + HEADROOM:
+                away = -1.0
+            if away < found or (away == found and height > best):
+                best, found = height, away
         ground[k] = best
