@@ -303,15 +303,8 @@ class SceneRenderer:
 
     def _choose_bodies(self, state: SimulationState, part: ScenePart) -> None:
         """Give bodies to all within a part, and to those who may come there soon: choosing anew takes a while."""
-        places = (
-            [state.people.position]
-            if state.traffic is None
-            else [
-                state.people.position,
-                state.traffic.walkers.position,
-            ]
-        )
-        position = np.concatenate(places)
+        walkers = [] if state.traffic is None else [state.traffic.walkers.position]
+        position = np.concatenate([state.people.position, *walkers])
         here, had = np.flatnonzero(part.holds(position, _BESIDE)), self._people.rows
         if len(np.setdiff1d(here, had, assume_unique=True)) or len(had) > 2 * len(here) + _SPARE_BODIES:
             self._people.choose(np.flatnonzero(part.holds(position, _SOON)))

@@ -116,7 +116,8 @@ class Ways:
             self._from[a] = From(metres, metres / self.walk_speed, metres / BIKE_SPEED)
             name = self._names[a]
             if self._blocked is None and name is not None:
-                for other, way in self._kept.get(name, {}).items():
+                # A copy: another thread may find a way meanwhile.
+                for other, way in self._kept.get(name, {}).copy().items():
                     b = self._number.get(other)
                     if b is not None:
                         self._note(a, b, way)
