@@ -16,7 +16,7 @@ from vico.io.arrays import mapped_array
 from vico.world.city_files import COST, REACHED, ROOM, SURFACES
 from vico.world.city_gates import Gates, border_gates, tile_gates
 from vico.world.city_ground import whole_walkable
-from vico.world.city_routing import CityRouter, _Ask
+from vico.world.city_routing import CityRouter
 from vico.world.city_walk_lengths import CityWalkLengths
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
@@ -172,10 +172,41 @@ def test_walks_begin_and_end_in_gates_too(town: WalkableMap, router: CityRouter)
     far = max(gates.tolist(), key=lambda cell: cell % n + cell // n)
     near = min(gates.tolist(), key=lambda cell: cell % n + cell // n)
     ends = [town.centre_of([cell % n, cell // n]) for cell in (near, far)]
-    ask = _Ask(router._cost, router._clearance, None, 0.0, SIDE, closing=False)
+    ask = router._ask(None, 0.0, ())
     found = router._far(ask, near, far)
     assert found is not None
     assert (found[0][0], found[0][-1]) == (near, far)
     assert len(found[0]) == len(found[1])
     assert (np.diff(found[1]) > 0).all()
     assert router.path(*ends) is not None
+
+
+def test_walks_that_need_room_begin_and_end_where_there_is_room(town: WalkableMap, router: CityRouter) -> None:
+    whole, rng, far = Router(town), np.random.default_rng(11), 0
+    for _ in range(12):
+        a, b = town.random_point(rng), town.random_point(rng)
+        exact, found = whole.path(a, b, room=0.9), router.path(a, b, room=0.9)
+        assert exact is not None
+        assert found is not None
+        assert np.linalg.norm(found[0] - exact[0]) < 1e-9
+        assert np.linalg.norm(found[-1] - exact[-1]) < 1e-9
+        assert _length(found) <= _length(exact) * 1.06 + 20.0
+        assert np.array_equal(found, router.path(a, b, room=0.9))
+        far += bool(np.abs(a - b).max() > 200.0)
+    assert far >= 3
+
+
+def test_exits_are_chosen_by_all_that_is_left_to_go(town: WalkableMap, router: CityRouter) -> None:
+    """The walk out of a tile is the one that the costs of all its cells to all gates say is cheapest."""
+    rng = np.random.default_rng(4)
+    for _ in range(8):
+        a, b = (router._nearest_cell(town.random_point(rng), router._free, 6.0) for _ in range(2))
+        ask = router._ask(None, 0.0, ())
+        walk = router._far(ask, a, b)
+        (leave, leaving), (arrive, arriving) = router._to_gates(ask, a), router._to_gates(ask, b)
+        gates = router.graph.cheapest((leave, leaving), (arrive, arriving), b)
+        if ask.tile(a) == ask.tile(b) or walk is None:
+            continue
+        told = [router.graph.cost(*pair) for pair in pairwise(gates)]
+        ends = leaving[leave.tolist().index(gates[0])], arriving[arrive.tolist().index(gates[-1])]
+        assert walk[1][-1] == sum(told) + sum(ends)

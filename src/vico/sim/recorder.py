@@ -311,10 +311,12 @@ class Recorder:
         self._cast.watch(step, bodies)
         self._samples.take(bodies, self._hash, result, actions)
         watch = time.perf_counter()
-        pictures = {name: seen["rgb"] for name, seen in observations.items() if "rgb" in seen}
+        # Observations are made when they are asked for: those without pictures are not.
+        looking = {name: observations[name] for i in sim.seeing if (name := sim.agents[i]) in observations}
+        pictures = {name: seen["rgb"] for name, seen in looking.items() if "rgb" in seen}
         arrays = {
             name: {output: seen[output] for output in self._keep if output in seen}
-            for name, seen in (observations.items() if self._keep else ())
+            for name, seen in (looking.items() if self._keep else ())
         }
         self._films.add(step, pictures, sim.picture_waiter(), {name: kept for name, kept in arrays.items() if kept})
         seconds = sim.metrics.seconds

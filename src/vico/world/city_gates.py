@@ -17,7 +17,19 @@ from numpy.typing import NDArray
 
 from vico.errors import SchemaError
 from vico.io.npz import read_npz
-from vico.world.grid_search import CELL, RING, STRAIGHT, SearchMemory, backtrack, pull, search
+from vico.world.grid_search import (
+    CELL,
+    EVERYWHERE,
+    RING,
+    STRAIGHT,
+    Goals,
+    SearchMemory,
+    backtrack,
+    goal_at,
+    goals_at,
+    pull,
+    search,
+)
 from vico.world.routing import WEIGHTS
 from vico.world.walkable import ROADWAY
 
@@ -93,6 +105,22 @@ class Reached(NamedTuple):
     corners: Ints
 
 
+class Scratch:
+    """Working memory that searches use one after the other: to fetch it anew takes as long as a short one."""
+
+    def __init__(self) -> None:
+        self._memory = SearchMemory(np.zeros(0, CELL), np.empty(RING, np.int32))
+        # Even; of the last search. It counts on when the memory grows, so that stamps of any search differ.
+        self.generation = 0
+
+    def begin(self, cells: int) -> SearchMemory:
+        """Return memory for a search of so many cells; what the last one found is lost."""
+        if len(self._memory.cells) < cells:
+            self._memory = SearchMemory(np.zeros(cells, CELL), self._memory.head)
+        self.generation += 2
+        return self._memory
+
+
 class Window:
     """Searches the cells of a rectangle of a map.
 
@@ -104,13 +132,17 @@ class Window:
         Of its south-western cell in the map.
     width
         Of the map, cells.
+    scratch
+        Shared with other windows, used by one of them at a time.
     """
 
-    def __init__(self, cost: NDArray[np.int32], row: int, column: int, width: int) -> None:
+    def __init__(
+        self, cost: NDArray[np.int32], row: int, column: int, width: int, scratch: Scratch | None = None
+    ) -> None:
         self._cost, self._row, self._column, self._width = cost, row, column, width
-        self._memory = SearchMemory(np.zeros(cost.size, CELL), np.empty(RING, np.int32))
+        self._scratch = scratch or Scratch()
+        self._memory = self._scratch.begin(0)
         self._landmarks = np.zeros((cost.size, 0), np.int32)
-        self._generation = 0
 
     def own(self, cells: Ints) -> Ints:
         """Return the numbers in the window of cells of the map."""
@@ -119,9 +151,9 @@ class Window:
 
     def costs(self, start: int, goals: Ints) -> Ints:
         """Return what walks from a cell of the map to others cost; -1 where there is none."""
-        self._search(start, -1)
+        self._search(start, EVERYWHERE)
         own = self.own(goals)
-        final = self._memory.cells["stamp"][own] == self._generation + 1
+        final = self._memory.cells["stamp"][own] == self._scratch.generation + 1
         return np.where(final, self._memory.cells["g"][own], -1).astype(np.int64)
 
     def reached(self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float) -> Reached:
@@ -148,28 +180,43 @@ class Window:
         """Return how long the cheapest walk between two cells of the map is, and its corners; None if there is none."""
         if start == goal:
             return 0.0, 0
-        if not self._search(start, goal):
-            return None
         first, last = self.own(np.array([start, goal])).tolist()
+        if self._search(start, goal_at(last, self._cost.shape[1])) < 0:
+            return None
         return self._length(first, last, clearance, cell)
 
     def walk(self, start: int, goal: int) -> tuple[Ints, Ints] | None:
         """Return the cells of the cheapest walk between two cells of the map, and its cost up to each."""
-        if not self._search(start, goal):
+        last = int(self.own(np.array([goal]))[0])
+        return self._walk_to(start, goal_at(last, self._cost.shape[1]))
+
+    def walk_out(self, start: int, exits: Ints, onward: Ints) -> tuple[Ints, Ints] | None:
+        """Return the walk from a cell of the map to that of several others by which it is cheapest to go on.
+
+        Parameters
+        ----------
+        start, exits
+            Numbers of cells in the map; exits rising.
+        onward
+            What it costs to go on from each exit, shape ``(len(exits),)``.
+        """
+        return self._walk_to(start, goals_at(self.own(exits), onward, self._cost.shape[1]))
+
+    def _walk_to(self, start: int, goals: Goals) -> tuple[Ints, Ints] | None:
+        last = self._search(start, goals)
+        if last < 0:
             return None
-        first, last = self.own(np.array([start, goal])).tolist()
-        cells, costs = self._found(first, last)
+        cells, costs = self._found(int(self.own(np.array([start]))[0]), last)
         side = self._cost.shape[1]
         return (cells // side + self._row) * self._width + cells % side + self._column, costs
 
-    def _search(self, start: int, goal: int) -> bool:
-        self._generation += 2
-        first, last = self.own(np.array([start, max(goal, 0)])).tolist()
-        last = last if goal >= 0 else -1
-        return bool(search(self._cost, self._memory, first, last, self._generation, self._landmarks))
+    def _search(self, start: int, goals: Goals) -> int:
+        self._memory = self._scratch.begin(self._cost.size)
+        first = int(self.own(np.array([start]))[0])
+        return int(search(self._cost, self._memory, first, goals, self._scratch.generation, self._landmarks))
 
     def _found(self, first: int, last: int) -> tuple[Ints, Ints]:
-        known = self._memory.cells["g"], self._memory.cells["stamp"], self._generation + 1
+        known = self._memory.cells["g"], self._memory.cells["stamp"], self._scratch.generation + 1
         cells = backtrack(self._cost, known, first, last)
         return cells, self._memory.cells["g"][cells].astype(np.int64)
 

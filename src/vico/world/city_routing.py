@@ -7,6 +7,7 @@ tile.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from threading import Lock
@@ -15,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.io.recent import Recent
-from vico.world.city_gates import Gates, Ints, Window
+from vico.world.city_gates import Gates, Ints, Scratch, Window
 from vico.world.gate_graph import GateGraph
-from vico.world.grid_search import STRAIGHT
+from vico.world.grid_search import STRAIGHT, nearest_free
 from vico.world.routing import SNAP, Router
 from vico.world.walkable import WalkableMap
 
@@ -25,8 +26,10 @@ from vico.world.walkable import WalkableMap
 _NEAR, _AROUND = 800, 300
 # How often a walk is looked for anew where something closed is in the way of the last.
 _TRIES = 40
-# Kept: costs from so many ends to the gates around them, and so many walks between gates, 8 bytes a cell.
-_ENDS, _LEGS = 4096, 1024
+# Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks that begin at a gate, 8 a cell.
+_ENDS, _LEGS = 8192, 8192
+_FAR = np.int64(1) << 60
+_NO_WALK = np.zeros(0, np.int32), np.zeros(0, np.int32)
 
 
 class CityRouter(Router):
@@ -54,6 +57,7 @@ class CityRouter(Router):
         self._legs: Recent[tuple[float, int, int], tuple[NDArray[np.int32], NDArray[np.int32]]] = Recent(_LEGS)
         self._shut = np.zeros(cost.shape, np.bool_)
         self._nothing = np.zeros((0, 0), np.bool_)
+        self._scratch = Scratch()
         self._lock = Lock()
 
     def learn_landmarks(self) -> None:
@@ -74,15 +78,32 @@ class CityRouter(Router):
         """Find a walk; as `Router.path`."""
         a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
         with self._lock, self._closed(closed):
-            first, last = (self._nearest_cell(point, self._free, SNAP) for point in (a, b))
+            ask = self._ask(blocked, room, closed)
+            first, last = (self._end_near(ask, point) for point in (a, b))
             if first < 0 or last < 0:
                 return None
-            ask = _Ask(self._cost, self._clearance, blocked, room, self._side, closing=bool(closed))
             walk = self._near(ask, first, last) or self._far(ask, first, last)
             if walk is None:
                 return None
             shut = self._shut if blocked is None else blocked | self._shut
             return self._pulled(a, b, first, last, walk, shut if closed or blocked is not None else None)
+
+    def _end_near(self, ask: _Ask, point: NDArray[np.float64]) -> int:
+        """Return the nearest cell within reach that this walk may begin or end in; -1 if there is none."""
+        cell, n, reach = self.walkable.cell, self.walkable.n, math.ceil(SNAP / self.walkable.cell)
+        x, y = ((float(k) + self.walkable.half) / cell for k in point)
+        column, row = (min(max(int(k), 0), n - 1) - reach for k in (x, y))
+        rows, columns = (slice(max(k, 0), min(k + 2 * reach + 1, n)) for k in (row, column))
+        free = np.zeros((2 * reach + 1, 2 * reach + 1), np.bool_)
+        free[rows.start - row : rows.stop - row, columns.start - column : columns.stop - column] = (
+            ask.costs((rows, columns)) > 0
+        )
+        found = int(nearest_free(free, x - column, y - row, reach))
+        if found < 0:
+            return -1
+        below, left = divmod(found, len(free))
+        away = math.hypot(left + column + 0.5 - x, below + row + 0.5 - y) * cell
+        return (row + below) * n + column + left if away <= SNAP else -1
 
     def _near(self, ask: _Ask, first: int, last: int) -> tuple[Ints, Ints] | None:
         """Look for a walk on all cells around its ends, if these are near each other."""
@@ -93,61 +114,99 @@ class CityRouter(Router):
         part = tuple(slice(max(0, min(k) - _AROUND), max(k) + _AROUND + 1) for k in (rows, columns))
         return ask.window((part[0], part[1])).walk(first, last)
 
+    def _ask(
+        self, blocked: NDArray[np.bool_] | None, room: float, closed: Sequence[tuple[float, float, float]]
+    ) -> _Ask:
+        return _Ask(self._cost, self._clearance, blocked, room, self._side, self._tiles_of(closed), self._scratch)
+
+    def _tiles_of(self, closed: Sequence[tuple[float, float, float]]) -> set[tuple[int, int]]:
+        """Return the rows and columns of the tiles in which squares lie."""
+        found = set()
+        for x, y, reach in closed:
+            rows, columns = self._square(x, y, reach)
+            for row in range(rows.start // self._side, (rows.stop - 1) // self._side + 1):
+                found |= {(row, k) for k in range(columns.start // self._side, (columns.stop - 1) // self._side + 1)}
+        return found
+
     def _far(self, ask: _Ask, first: int, last: int) -> tuple[Ints, Ints] | None:
         """Look for a walk from gate to gate; where what is closed makes one dearer than it was, anew."""
-        ends = self._to_gates(ask, first), self._to_gates(ask, last)
+        leaving, arriving = self.graph.of_tile(ask.tile(first)), self._to_gates(ask, last)
+        window = ask.window(ask.square(first))
         changed: dict[tuple[int, int], int] = {}
-        for _ in range(_TRIES):
-            gates = self.graph.cheapest(*ends, last, changed)
-            if not gates:
+        for attempt in range(_TRIES):
+            onward = self.graph.onward(first, leaving, arriving, changed)
+            # From others the way leads to one of these.
+            exits = leaving[(onward.cost[leaving] >= 0) & ~np.isin(onward.then[leaving], leaving)]
+            begun = None
+            if attempt == 0:
+                begun = window.walk_out(first, self.graph.cells[exits], onward.cost[exits])
+                gate = -1 if begun is None else int(np.searchsorted(self.graph.cells, begun[0][-1]))
+            else:
+                # Where the first is not the cheapest others often aren't: what all of them cost is found once.
+                gate = self._cheapest_exit(ask, first, exits, onward.cost[exits])
+            if gate < 0:
                 return None
-            cells = [first, *self.graph.cells[gates].tolist(), last]
-            parts, costs, so_far, dearer = [np.array([first])], [np.array([0])], 0, False
-            for k, (a, b) in enumerate(pairwise(cells)):
-                told = self.graph.cost(*gates[k - 1 : k + 1]) if 0 < k < len(gates) else -1
-                if ask.tile(a) == ask.tile(b):
-                    found = self._leg(ask, a, b, kept=told >= 0)
-                    if told >= 0 and (found is None or found[1][-1] > told):
-                        cost = -1 if found is None else int(found[1][-1])
-                        changed[gates[k - 1], gates[k]] = changed[gates[k], gates[k - 1]] = cost
-                        dearer = True
-                        break
-                    if found is None:
-                        return None
-                    # Of a walk that begins in a gate nothing is left here.
-                    parts.append(found[0][1:])
-                    costs.append(found[1][1:] + so_far)
-                    so_far += int(found[1][-1])
-                else:
-                    so_far += told
-                    parts.append(np.array([b]))
-                    costs.append(np.array([so_far]))
-            if not dearer:
-                return np.concatenate(parts).astype(np.int64), np.concatenate(costs)
+            walk = self._from_gate(ask, onward.gates(gate), last, changed)
+            if walk is not None:
+                begun = begun or window.walk(first, int(self.graph.cells[gate]))
+                assert begun is not None
+                # Of a walk that begins at a gate nothing is left here.
+                (cells, costs), (more, dearer) = begun, walk
+                return np.concatenate([cells, more[1:]]), np.concatenate([costs, dearer[1:] + costs[-1]])
         return None
+
+    def _cheapest_exit(self, ask: _Ask, first: int, exits: Ints, onward: Ints) -> int:
+        """Return the gate by which it is cheapest to leave the tile of a cell; -1 if there is none."""
+        gates, known = self._to_gates(ask, first)
+        costs = known[np.searchsorted(gates, exits)]
+        costs = np.where(costs < 0, _FAR, costs + onward)
+        return int(exits[costs.argmin()]) if len(costs) and costs.min() < _FAR else -1
+
+    def _from_gate(
+        self, ask: _Ask, gates: list[int], last: int, changed: dict[tuple[int, int], int]
+    ) -> tuple[Ints, Ints] | None:
+        """Return the walk over gates to a cell; None, and `changed`, where a part of it costs more than was thought."""
+        cells = [*self.graph.cells[gates].tolist(), last]
+        parts, costs, so_far = [np.array(cells[:1])], [np.array([0])], 0
+        for k, (a, b) in enumerate(pairwise(cells)):
+            between = gates[k : k + 2]
+            told = self.graph.cost(*between) if len(between) == 2 else -1
+            if ask.tile(a) != ask.tile(b):
+                so_far += told
+                parts.append(np.array([b]))
+                costs.append(np.array([so_far]))
+                continue
+            found = self._leg(ask, a, b)
+            if told >= 0 and (found is None or found[1][-1] > told):
+                cost = -1 if found is None else int(found[1][-1])
+                changed[between[0], between[1]] = changed[between[1], between[0]] = cost
+                return None
+            assert found is not None, "only gates that the goal was reached from lead to it"
+            parts.append(found[0][1:])
+            costs.append(found[1][1:] + so_far)
+            so_far += int(found[1][-1])
+        return np.concatenate(parts).astype(np.int64), np.concatenate(costs)
 
     def _to_gates(self, ask: _Ask, cell: int) -> tuple[Ints, Ints]:
         """Return the gates of the tile that a cell lies in, and what walks from the cell to them cost."""
-        gates = self.graph.of_tile(ask.tile(cell))
-        known = self._ends.get((ask.room, cell)) if ask.usual else None
+        gates, usual = self.graph.of_tile(ask.tile(cell)), ask.is_usual(cell)
+        known = self._ends.get((ask.room, cell)) if usual else None
         if known is None:
             known = ask.window(ask.square(cell)).costs(cell, self.graph.cells[gates])
-            if ask.usual:
+            if usual:
                 self._ends.keep((ask.room, cell), known)
         return gates, known
 
-    def _leg(self, ask: _Ask, a: int, b: int, *, kept: bool) -> tuple[Ints, Ints] | None:
-        """Return the walk between two cells of a tile; that between gates is kept for others."""
-        if not (kept and ask.usual):
+    def _leg(self, ask: _Ask, a: int, b: int) -> tuple[Ints, Ints] | None:
+        """Return the walk from a gate to another cell of its tile, and keep it for others."""
+        if not ask.is_usual(a):
             return ask.window(ask.square(a)).walk(a, b)
         known = self._legs.get((ask.room, a, b))
         if known is None:
             found = ask.window(ask.square(a)).walk(a, b)
-            if found is None:
-                return None
-            known = found[0].astype(np.int32), found[1].astype(np.int32)
+            known = _NO_WALK if found is None else (found[0].astype(np.int32), found[1].astype(np.int32))
             self._legs.keep((ask.room, a, b), known)
-        return known[0].astype(np.int64), known[1].astype(np.int64)
+        return (known[0].astype(np.int64), known[1].astype(np.int64)) if len(known[0]) else None
 
     def distance_field(self, goal: ArrayLike, *, blocked: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
         """Cost of the walk to `goal` from every cell within some hundred metres of it; infinite beyond."""
@@ -158,7 +217,7 @@ class CityRouter(Router):
             row, column = divmod(first, n)
             part = tuple(slice(max(0, k - _NEAR), min(n, k + _NEAR + 1)) for k in (row, column))
             with self._lock:
-                ask = _Ask(self._cost, self._clearance, blocked, 0.0, self._side, closing=False)
+                ask = self._ask(blocked, 0.0, ())
                 cells = (np.arange(n)[part[0], None] * n + np.arange(n)[None, part[1]]).ravel()
                 costs = ask.window((part[0], part[1])).costs(first, cells)
             metre = self.walkable.cell / (100 * STRAIGHT)
@@ -173,8 +232,6 @@ class _Ask:
     ----------
     room
         What is needed beside one, metres.
-    usual
-        Whether all may be walked on that has the room, so that what is found is found again.
     """
 
     def __init__(
@@ -184,11 +241,13 @@ class _Ask:
         blocked: NDArray[np.bool_] | None,
         room: float,
         side: int,
-        *,
-        closing: bool,
+        closed: set[tuple[int, int]],
+        scratch: Scratch,
     ) -> None:
         self._cost, self._clearance, self._blocked, self.room, self._side = cost, clearance, blocked, room, side
-        self.usual = blocked is None and not closing
+        self._scratch = scratch
+        # Whether what is found in a tile is found again: nothing is closed there.
+        self._usual = dict.fromkeys(closed, False)
         self._windows: dict[tuple[int, int, int, int], Window] = {}
 
     def tile(self, cell: int) -> tuple[int, int]:
@@ -196,20 +255,31 @@ class _Ask:
         row, column = divmod(cell, self._cost.shape[1])
         return row // self._side, column // self._side
 
+    def is_usual(self, cell: int) -> bool:
+        """Return whether all may be walked on in the tile of a cell that has the room."""
+        tile = self.tile(cell)
+        if tile not in self._usual:
+            self._usual[tile] = self._blocked is None or not self._blocked[self.square(cell)].any()
+        return self._usual[tile]
+
     def square(self, cell: int) -> tuple[slice, slice]:
         """Return the rows and columns of the tile that a cell lies in."""
         row, column = (k * self._side for k in self.tile(cell))
         return slice(row, row + self._side), slice(column, column + self._side)
+
+    def costs(self, part: tuple[slice, slice]) -> NDArray[np.int32]:
+        """Return the costs of the cells of a part of the map for this walk; 0 where it may not lead."""
+        cost = np.ascontiguousarray(self._cost[part])
+        if self._blocked is not None:
+            cost = np.where(self._blocked[part], np.int32(0), cost)
+        if self.room:
+            cost = np.where(self._clearance[part] < self.room, np.int32(0), cost)
+        return cost
 
     def window(self, part: tuple[slice, slice]) -> Window:
         """Return what searches a part of the map."""
         rows, columns = part
         key = rows.start, rows.stop, columns.start, columns.stop
         if key not in self._windows:
-            cost = np.ascontiguousarray(self._cost[part])
-            if self._blocked is not None:
-                cost = np.where(self._blocked[part], np.int32(0), cost)
-            if self.room:
-                cost = np.where(self._clearance[part] < self.room, np.int32(0), cost)
-            self._windows[key] = Window(cost, rows.start, columns.start, self._cost.shape[1])
+            self._windows[key] = Window(self.costs(part), rows.start, columns.start, self._cost.shape[1], self._scratch)
         return self._windows[key]

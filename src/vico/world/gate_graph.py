@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,28 @@ from vico.world.city_gates import Gates, Ints
 from vico.world.grid_search import DIAGONAL, STRAIGHT
 
 _FAR = np.int64(1) << 60
+
+
+class Onward(NamedTuple):
+    """The cheapest ways from gates to a goal.
+
+    Attributes
+    ----------
+    cost
+        Of that from each gate by number, int64; -1 where none was found.
+    then
+        The next gate on it, int64; -1 where it leads to the goal itself.
+    """
+
+    cost: Ints
+    then: Ints
+
+    def gates(self, first: int) -> list[int]:
+        """Return the gates of the way that begins in one."""
+        way = [first]
+        while self.then[way[-1]] >= 0:
+            way.append(int(self.then[way[-1]]))
+        return way
 
 
 class GateGraph:
@@ -74,6 +97,14 @@ class GateGraph:
         k = self.edge(a, b)
         return float(self._metres[k]), int(self._corners[k])
 
+    def _costs_with(self, changed: Mapping[tuple[int, int], int]) -> Ints:
+        costs = self._costs.copy() if changed else self._costs
+        for (a, b), cost in changed.items():
+            k = self.edge(a, b)
+            if k >= 0:
+                costs[k] = cost
+        return costs
+
     def cheapest(
         self,
         leaving: tuple[Ints, Ints],
@@ -98,16 +129,31 @@ class GateGraph:
         list of int
             Empty if there is no way.
         """
-        costs = self._costs
-        if changed:
-            costs = costs.copy()
-            for (a, b), cost in changed.items():
-                k = self.edge(a, b)
-                if k >= 0:
-                    costs[k] = cost
-        graph = self.cells, self._first, self._ends, costs
+        graph = self.cells, self._first, self._ends, self._costs_with(changed or {})
         found: NDArray[np.int64] = _cheapest(graph, *leaving, *arriving, goal, self._width)
         return found.tolist()
+
+    def onward(
+        self,
+        start: int,
+        leaving: Ints,
+        arriving: tuple[Ints, Ints],
+        changed: Mapping[tuple[int, int], int] | None = None,
+    ) -> Onward:
+        """Return what it costs from the gates of one tile to a goal.
+
+        Parameters
+        ----------
+        start
+            A cell among the gates `leaving`, by which the search is led.
+        leaving
+            Gates by number.
+        arriving, changed
+            As in `cheapest`.
+        """
+        graph = self.cells, self._first, self._ends, self._costs_with(changed or {})
+        costs, then = _onward(graph, *arriving, leaving, start, self._width)
+        return Onward(costs, then)
 
 
 @compiled
@@ -156,3 +202,35 @@ def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # 
         way.append(np.int64(last))
         last = came[last]
     return np.array(way[::-1], np.int64)
+
+
+@compiled
+def _onward(graph, arrive, arrive_costs, leave, start, width):  # type: ignore[no-untyped-def]
+    """Run A* from the goal to all gates of a tile; of ways that cost the same, those over lower numbers are taken."""
+    cells, first, ends, costs = graph
+    count = len(cells)
+    best, then = np.full(count, _FAR), np.full(count, -1)
+    done, wanted = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    wanted[leave] = True
+    left = len(leave)
+    queue = [(np.int64(0), np.int64(-1))]
+    queue.pop()
+    for k in range(len(arrive)):
+        if 0 <= arrive_costs[k] < best[arrive[k]]:
+            best[arrive[k]] = arrive_costs[k]
+            heapq.heappush(queue, (arrive_costs[k] + _least(cells[arrive[k]], start, width), arrive[k]))
+    while len(queue) > 0 and left > 0:
+        _, node = heapq.heappop(queue)
+        if done[node]:
+            continue
+        done[node] = True
+        left -= wanted[node]
+        for k in range(first[node], first[node + 1]):
+            other = ends[k]
+            if costs[k] < 0 or done[other]:
+                continue
+            value = best[node] + costs[k]
+            if value < best[other]:
+                best[other], then[other] = value, node
+                heapq.heappush(queue, (value + _least(cells[other], start, width), other))
+    return np.where(done, best, -1), then

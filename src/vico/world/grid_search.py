@@ -19,6 +19,8 @@ _IN_RING = RING - 1
 # Learned cost of cells to which there is no way: no sum of costs makes it that of another cell.
 NEVER = -(1 << 30)
 
+_NEVER_SO_FAR = np.int64(1) << 60
+
 # Directions 0 to 3 lead east, west, north and south, 4 to 7 diagonally.
 _FIRST_DIAGONAL = 4
 
@@ -53,6 +55,38 @@ class SearchMemory(NamedTuple):
 
     cells: NDArray[np.void]
     head: NDArray[np.int32]
+
+
+class Goals(NamedTuple):
+    """Where a search may end; without any it goes everywhere.
+
+    Attributes
+    ----------
+    cells
+        Numbers of cells, rising, int64, shape ``(n,)``.
+    columns, rows
+        Of the cells, int64, shape ``(n,)``.
+    onward
+        What is still to be paid from each, int64, shape ``(n,)``.
+    """
+
+    cells: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    onward: NDArray[np.int64]
+
+
+def goals_at(cells: NDArray[np.int64], onward: NDArray[np.int64], width: int) -> Goals:
+    """Return cells of a grid as goals."""
+    return Goals(cells, cells % width, cells // width, onward)
+
+
+def goal_at(cell: int, width: int) -> Goals:
+    """Return one cell of a grid as the goal."""
+    return goals_at(np.array([cell], np.int64), np.zeros(1, np.int64), width)
+
+
+EVERYWHERE = goals_at(np.zeros(0, np.int64), np.zeros(0, np.int64), 1)
 
 
 @compiled(inline="always")
@@ -96,19 +130,36 @@ def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-
 
 
 @compiled(inline="always")
-def _least_cost(node, goal, width, landmarks, from_goal):  # type: ignore[no-untyped-def]
-    """Return a cost that no walk between two cells is below, what A* goes by; 0 without a goal.
+def _least_cost(node, goals, width, landmarks, from_goal):  # type: ignore[no-untyped-def]
+    """Return a cost that no walk to the goals is below, what A* goes by; 0 without a goal.
 
-    The larger of two: the walk if all were sidewalk without walls; and, by the triangle inequality, what the two cells'
-    costs from a landmark differ by (`from_goal` are the goal's).
+    The larger of two: the walk to one of them if all were sidewalk without walls, and what is to be paid from there;
+    and, by the triangle inequality, what the two cells' costs from a landmark differ by (`from_goal` are the goal's).
     """
-    if goal < 0:
-        return 0
-    dx, dy = abs(node % width - goal % width), abs(node // width - goal // width)
-    least = 100 * (STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy))
+    if len(goals.cells) == 0:
+        return np.int64(0)
+    x, y = node % width, node // width
+    least = _NEVER_SO_FAR
+    for k in range(len(goals.cells)):
+        dx, dy = abs(x - goals.columns[k]), abs(y - goals.rows[k])
+        walk = 100 * (STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy))
+        least = min(least, walk + goals.onward[k])
     for k in range(landmarks.shape[1]):
         least = max(least, abs(landmarks[node, k] - from_goal[k]))
     return least
+
+
+@compiled(inline="always")
+def _left_from(node, goals):  # type: ignore[no-untyped-def]
+    """Return what is left to go from a cell if it is a goal, else -1."""
+    low, high = 0, len(goals.cells)
+    while low < high:
+        middle = (low + high) // 2
+        if goals.cells[middle] < node:
+            low = middle + 1
+        else:
+            high = middle
+    return goals.onward[low] if low < len(goals.cells) and goals.cells[low] == node else np.int64(-1)
 
 
 @compiled(inline="always")
@@ -132,8 +183,10 @@ def _open_sides(flat, node, width, height):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def search(cost, work, start, goal, generation, landmarks):  # type: ignore[no-untyped-def]
-    """Run A* from `start`, or Dijkstra where `goal` is -1, with circular buckets; return whether the goal was met.
+def search(cost, work, start, goals, generation, landmarks):  # type: ignore[no-untyped-def]
+    """Run A* from `start` with circular buckets; return the goal that the cheapest walk leads to, -1 if there is none.
+
+    Without goals it is Dijkstra's search of all cells. Landmarks are for searches with one goal.
 
     All cells of all cheapest walks are made final, not those of the first one found alone: so `backtrack` chooses
     among them the same way whatever the landmarks. The stamp of a cell becomes `generation` where it was seen,
@@ -142,26 +195,27 @@ def search(cost, work, start, goal, generation, landmarks):  # type: ignore[no-u
     cells, head = work.cells, work.head
     height, width = cost.shape
     flat = cost.ravel()
-    from_goal = landmarks[max(goal, 0)].copy()
+    from_goal = landmarks[goals.cells[0] if len(goals.cells) else 0].copy()
     head[:] = -1
     first = cells[start]
     first.g, first.stamp = 0, generation
-    first.rest = _least_cost(start, goal, width, landmarks, from_goal)
+    first.rest = _least_cost(start, goals, width, landmarks, from_goal)
     level = np.int64(first.rest)
     _link(start, first, level & _IN_RING, work)
-    left, met, goal_cost = 1, False, np.int64(0)
+    left, met, goal_cost = 1, np.int64(-1), np.int64(0)
     while left > 0:
         while head[level & _IN_RING] < 0:
             level += 1
-        if met and level > goal_cost:
-            return True
+        if met >= 0 and level > goal_cost:
+            return met
         node = np.int64(head[level & _IN_RING])
         cell = cells[node]
         _unlink(cell, level & _IN_RING, work)
         left -= 1
         cell.stamp = generation + 1
-        if node == goal:
-            met, goal_cost = True, cell.g
+        onward = _left_from(node, goals)
+        if onward >= 0 and (met < 0 or cell.g + onward < goal_cost):
+            met, goal_cost = node, cell.g + onward
         east, west, north, south = _open_sides(flat, node, width, height)
         for direction in range(8):
             step_x, step_y = _step(direction)
@@ -182,7 +236,7 @@ def search(cost, work, start, goal, generation, landmarks):  # type: ignore[no-u
                 _unlink(near, (near.g + near.rest) & _IN_RING, work)
             else:
                 near.stamp = generation
-                near.rest = _least_cost(other, goal, width, landmarks, from_goal)
+                near.rest = _least_cost(other, goals, width, landmarks, from_goal)
                 left += 1
             near.g = value
             _link(other, near, (value + near.rest) & _IN_RING, work)

@@ -14,12 +14,14 @@ from scipy import ndimage
 
 from vico.world.grid_search import (
     CELL,
+    EVERYWHERE,
     NEVER,
     RING,
     STRAIGHT,
     Costs,
     SearchMemory,
     backtrack,
+    goal_at,
     nearest_free,
     pull,
     search,
@@ -260,7 +262,8 @@ class Router:
 
     def _run(self, cost: NDArray[np.int32], first: int, last: int, landmarks: NDArray[np.int32]) -> bool:
         self._generation += 2
-        return bool(search(cost, self._work, first, last, self._generation, landmarks))
+        goals = goal_at(last, self.walkable.n) if last >= 0 else EVERYWHERE
+        return int(search(cost, self._work, first, goals, self._generation, landmarks)) >= 0
 
     @property
     def _is_final(self) -> NDArray[np.bool_]:
