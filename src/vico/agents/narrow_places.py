@@ -57,7 +57,9 @@ def way_out(walkable: WalkableMap, position: Sequence[float], heading: float) ->
     actions: list[Action] = []
     for (ax, ay, before), (bx, by, after) in pairwise(found):
         if before == after:
-            actions.append({"type": "move_forward", "distance": math.hypot(bx - ax, by - ay)})
+            # Whole steps: by rounding alone the longest would be a little more than is allowed.
+            steps = round(math.hypot(bx - ax, by - ay) / _METRES)
+            actions.append({"type": "move_forward", "distance": steps * _METRES})
         else:
             turn = ((after - before) * _DEGREES + 180) % 360 - 180
             actions.append({"type": "turn_left" if turn > 0 else "turn_right", "degrees": float(abs(turn))})

@@ -130,15 +130,16 @@ def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-
 
 
 @compiled(inline="always")
-def _least_cost(node, goals, width, landmarks, from_goal):  # type: ignore[no-untyped-def]
+def _least_cost(node, x, y, aim):  # type: ignore[no-untyped-def]
     """Return a cost that no walk to the goals is below, what A* goes by; 0 without a goal.
 
     The larger of two: the walk to one of them if all were sidewalk without walls, and what is to be paid from there;
-    and, by the triangle inequality, what the two cells' costs from a landmark differ by (`from_goal` are the goal's).
+    and, by the triangle inequality, what the two cells' costs from a landmark differ by. `aim` are the goals, the costs
+    from landmarks, and the goal's among them.
     """
+    goals, landmarks, from_goal = aim
     if len(goals.cells) == 0:
         return np.int64(0)
-    x, y = node % width, node // width
     least = _NEVER_SO_FAR
     for k in range(len(goals.cells)):
         dx, dy = abs(x - goals.columns[k]), abs(y - goals.rows[k])
@@ -170,16 +171,35 @@ def _step_cost(flat, node, other, direction):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _open_sides(flat, node, width, height):  # type: ignore[no-untyped-def]
+def _open_sides(flat, node, x, y, width, height):  # type: ignore[no-untyped-def]
     """Return whether the cells east, west, north and south of a cell are open."""
-    y = node // width
-    x = node - y * width
     return (
         x < width - 1 and flat[node + 1] != 0,
         x > 0 and flat[node - 1] != 0,
         y < height - 1 and flat[node + width] != 0,
         y > 0 and flat[node - width] != 0,
     )
+
+
+@compiled
+def _look(other, x, y, length, here, flat, work, aim):  # type: ignore[no-untyped-def]
+    """Reach a cell from a neighbour, if that is cheaper; return 1 if it was not seen before, else 0."""
+    so_far, cost, generation = here
+    near = work.cells[other]
+    if near.stamp == generation + 1:
+        return 0
+    value = so_far + length * (cost + np.int64(flat[other])) // 2
+    new = near.stamp != generation
+    if new:
+        near.stamp = generation
+        near.rest = _least_cost(other, x, y, aim)
+    elif value >= near.g:
+        return 0
+    else:
+        _unlink(near, (near.g + near.rest) & _IN_RING, work)
+    near.g = value
+    _link(other, near, (value + near.rest) & _IN_RING, work)
+    return 1 if new else 0
 
 
 @compiled
@@ -195,11 +215,11 @@ def search(cost, work, start, goals, generation, landmarks):  # type: ignore[no-
     cells, head = work.cells, work.head
     height, width = cost.shape
     flat = cost.ravel()
-    from_goal = landmarks[goals.cells[0] if len(goals.cells) else 0].copy()
+    aim = goals, landmarks, landmarks[goals.cells[0] if len(goals.cells) else 0].copy()
     head[:] = -1
     first = cells[start]
     first.g, first.stamp = 0, generation
-    first.rest = _least_cost(start, goals, width, landmarks, from_goal)
+    first.rest = _least_cost(start, start % width, start // width, aim)
     level = np.int64(first.rest)
     _link(start, first, level & _IN_RING, work)
     left, met, goal_cost = 1, np.int64(-1), np.int64(0)
@@ -216,30 +236,26 @@ def search(cost, work, start, goals, generation, landmarks):  # type: ignore[no-
         onward = _left_from(node, goals)
         if onward >= 0 and (met < 0 or cell.g + onward < goal_cost):
             met, goal_cost = node, cell.g + onward
-        east, west, north, south = _open_sides(flat, node, width, height)
-        for direction in range(8):
-            step_x, step_y = _step(direction)
-            if not (
-                (step_x == 0 or (east if step_x > 0 else west)) and (step_y == 0 or (north if step_y > 0 else south))
-            ):
-                continue
-            other = node + step_y * width + step_x
-            if flat[other] == 0:
-                continue
-            near = cells[other]
-            if near.stamp == generation + 1:
-                continue
-            value = cell.g + _step_cost(flat, node, other, direction)
-            if near.stamp == generation:
-                if value >= near.g:
-                    continue
-                _unlink(near, (near.g + near.rest) & _IN_RING, work)
-            else:
-                near.stamp = generation
-                near.rest = _least_cost(other, goals, width, landmarks, from_goal)
-                left += 1
-            near.g = value
-            _link(other, near, (value + near.rest) & _IN_RING, work)
+        y = node // width
+        x = node - y * width
+        east, west, north, south = _open_sides(flat, node, x, y, width, height)
+        here = cell.g, np.int64(flat[node]), generation
+        if east:
+            left += _look(node + 1, x + 1, y, STRAIGHT, here, flat, work, aim)
+            if north and flat[node + width + 1] != 0:
+                left += _look(node + width + 1, x + 1, y + 1, DIAGONAL, here, flat, work, aim)
+            if south and flat[node - width + 1] != 0:
+                left += _look(node - width + 1, x + 1, y - 1, DIAGONAL, here, flat, work, aim)
+        if west:
+            left += _look(node - 1, x - 1, y, STRAIGHT, here, flat, work, aim)
+            if north and flat[node + width - 1] != 0:
+                left += _look(node + width - 1, x - 1, y + 1, DIAGONAL, here, flat, work, aim)
+            if south and flat[node - width - 1] != 0:
+                left += _look(node - width - 1, x - 1, y - 1, DIAGONAL, here, flat, work, aim)
+        if north:
+            left += _look(node + width, x, y + 1, STRAIGHT, here, flat, work, aim)
+        if south:
+            left += _look(node - width, x, y - 1, STRAIGHT, here, flat, work, aim)
     return met
 
 

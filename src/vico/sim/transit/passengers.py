@@ -210,10 +210,11 @@ def _sidewalks_at(transit: HasBuses) -> dict[str, tuple[int, float]]:
     lines: list[Any] = [shapely.LineString(walks.line(int(way))) for way in ways]
     found: dict[str, tuple[int, float]] = {}
     every: list[Stop | TramStop] = [*transit.transit.stops, *transit.transit.tram_stops]
+    tree = shapely.STRtree(lines)
     for stop in every if lines else ():
         point = shapely.Point(stop.wait[:2])
-        away = shapely.distance(lines, point)
-        best = int(np.argmin(away))
-        if away[best] <= _STOP_REACH:
+        near = np.sort(tree.query(point, "dwithin", _STOP_REACH))
+        if len(near):
+            best = int(near[np.argmin(shapely.distance([lines[k] for k in near.tolist()], point))])
             found[stop.id] = int(ways[best]), float(shapely.line_locate_point(lines[best], point))
     return found

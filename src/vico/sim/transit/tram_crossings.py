@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from vico.sim.traffic.records import TRACK_CROSSING
 from vico.sim.transit.tram_outlines import first_taken
 from vico.world.lanes import LaneGraph
 from vico.world.rails import ACROSS_REACH, STEP, TRAM_BRAKING, TRAM_LENGTH, Track
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _HALF_WIDTH = 1.3  # m to each side of a lane that vehicles take
 _FARTHEST = 4.5  # m from a track beyond which no lane is in its way
@@ -127,6 +131,8 @@ def crossed_stretches(tracks: Sequence[Track], lanes: LaneGraph) -> tuple[NDArra
     tuple
         Crossings in the order of lanes, dtype `TRACK_CROSSING`, and the stretches of each track in the order they come.
     """
+    from scipy.spatial import cKDTree
+
     if not len(tracks) or not len(lanes):
         return np.zeros(0, TRACK_CROSSING), [[] for _ in tracks]
     counts = np.maximum(np.ceil(lanes.length / _SAMPLE).astype(np.int64), 1) + 1
@@ -134,7 +140,8 @@ def crossed_stretches(tracks: Sequence[Track], lanes: LaneGraph) -> tuple[NDArra
     step = np.arange(len(lane)) - np.repeat(np.cumsum(counts) - counts, counts)
     offset = np.minimum(step * _SAMPLE, lanes.length[lane])
     place = lanes.at(lane, offset)
-    met = [_met(track, place) for track in tracks]
+    tree = cKDTree(place[:, :2])
+    met = [_met(track, place, tree) for track in tracks]
     near = np.any([mask for mask, _, _ in met], axis=0)
     rows: list[tuple[int, float, float]] = []
     row_of = np.full(len(lane), -1)
@@ -151,9 +158,12 @@ def crossed_stretches(tracks: Sequence[Track], lanes: LaneGraph) -> tuple[NDArra
 
 
 def _met(
-    track: Track, place: NDArray[np.float64]
+    track: Track, place: NDArray[np.float64], tree: cKDTree
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-    """Mark the places on lanes, x, y, yaw, that are in a track's way; from where to where they are, metres along it."""
+    """Mark the places on lanes, x, y, yaw, that are in a track's way; from where to where they are, metres along it.
+
+    `tree` holds the places.
+    """
     from scipy.spatial import cKDTree
 
     found = np.zeros(len(place), np.bool_)
@@ -162,15 +172,17 @@ def _met(
         return found, first, last
     way = np.gradient(track.xy, axis=0)
     yaw = np.arctan2(way[:, 1], way[:, 0])
-    away, nearest = cKDTree(track.xy).query(place[:, :2], distance_upper_bound=_FARTHEST)
-    for k in np.flatnonzero(np.isfinite(away)).tolist():
-        here = nearest[k]
-        turn = abs((yaw[here] - place[k, 2] + np.pi) % (2 * np.pi) - np.pi)
-        if turn <= _ALONG or away[k] > track.half_width[here] + _HALF_WIDTH:
-            continue
-        around = slice(max(here - int(_FARTHEST / STEP), 0), here + int(_FARTHEST / STEP) + 1)
-        apart = np.hypot(*(track.xy[around] - place[k, :2]).T)
-        close = np.flatnonzero(apart <= track.half_width[around] + _HALF_WIDTH) + around.start
+    # Few of a city's lanes are near the track: they are found by some of its points.
+    around = tree.query_ball_point(track.xy[:: int(_FARTHEST / STEP)], 2.0 * _FARTHEST)
+    near = np.unique(np.concatenate([np.asarray(part, np.int64) for part in around]))
+    away, nearest = cKDTree(track.xy).query(place[near, :2], distance_upper_bound=_FARTHEST)
+    near, nearest, away = (part[np.isfinite(away)] for part in (near, nearest, away))
+    turn = np.abs((yaw[nearest] - place[near, 2] + np.pi) % (2 * np.pi) - np.pi)
+    crosses = (turn > _ALONG) & (away <= track.half_width[nearest] + _HALF_WIDTH)
+    for k, here in zip(near[crosses].tolist(), nearest[crosses].tolist(), strict=True):
+        beside = slice(max(here - int(_FARTHEST / STEP), 0), here + int(_FARTHEST / STEP) + 1)
+        apart = np.hypot(*(track.xy[beside] - place[k, :2]).T)
+        close = np.flatnonzero(apart <= track.half_width[beside] + _HALF_WIDTH) + beside.start
         found[k], first[k], last[k] = True, close[0] * STEP, close[-1] * STEP
     return found, first, last
 

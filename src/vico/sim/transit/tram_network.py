@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from vico.sim.transit.tram_crossings import CrossedStretch, crossed_stretches
@@ -64,9 +65,22 @@ class TramNetwork:
         if self.tracks:
             points = np.concatenate([track.xy for track in self.tracks])
             reach = np.concatenate([track.half_width for track in self.tracks]) + _WALKER
-            for k in np.flatnonzero(walks.kind != CROSSING).tolist():
-                line = np.ascontiguousarray(walks.line(k), np.float64)
+            ways = np.flatnonzero(walks.kind != CROSSING).tolist()
+            lines = [np.ascontiguousarray(walks.line(k), np.float64) for k in ways]
+            for k, line, near in zip(ways, lines, _points_around(lines, points, float(reach.max())), strict=True):
                 most = _CORNER_ON_TRACK if walks.kind[k] == CORNER else _ON_TRACK
-                found[k] = spots_near(line, points, reach) >= most
+                found[k] = len(near) > 0 and spots_near(line, points[near], reach[near]) >= most
         found.setflags(write=False)
         return found
+
+
+def _points_around(
+    lines: Sequence[NDArray[np.float64]], points: NDArray[np.float64], within: float
+) -> list[NDArray[np.int64]]:
+    """Return which points lie in the rectangle around each line, rising, and some metres beyond."""
+    low = np.array([line[:, :2].min(axis=0) for line in lines]).reshape(-1, 2) - within
+    high = np.array([line[:, :2].max(axis=0) for line in lines]).reshape(-1, 2) + within
+    which, near = shapely.STRtree(shapely.points(points[:, :2])).query(shapely.box(*low.T, *high.T))
+    order = np.lexsort((near, which))
+    starts = np.searchsorted(which[order], np.arange(len(lines) + 1))
+    return [near[order[a:b]] for a, b in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True)]
