@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 
 from vico.errors import InputError
+from vico.world.far_windows import BAYS, SHOWN, STOREYS, WINDOWS
 from vico.world.heights import HeightField
-from vico.world.mesh import Material, Surface
+from vico.world.mean_colours import LINEAR, srgb
+from vico.world.mesh import Material, Surface, joined
 from vico.world.model import ENTITY_GROUND, FIRST_BUILDING, FIRST_OBJECT, Building
 from vico.world.objects import Objects
 from vico.world.silhouettes import FAR, silhouette_of
@@ -20,8 +23,17 @@ from vico.world.world import World
 @pytest.fixture(scope="module")
 def far(helsinki: World) -> Surface:
     """The silhouette of 300 m x 300 m of Helsinki."""
-    (surface,) = silhouette_of(helsinki)
-    return surface
+    return _in_one(silhouette_of(helsinki))
+
+
+def _in_one(surfaces: list[Surface]) -> Surface:
+    """Return surfaces as one, whatever they are of; colours are those from afar."""
+    seen = []
+    for surface in surfaces:
+        shown = SHOWN if surface.material is WINDOWS else 1.0
+        seen.append(replace(surface, colour=srgb(LINEAR[surface.colour] * shown), material=Material(FAR)))
+    (one,) = joined(seen)
+    return one
 
 
 def _made(world: World, like: Building, walls: Surface, roofs: Surface) -> World:
@@ -35,8 +47,8 @@ def _made(world: World, like: Building, walls: Surface, roofs: Surface) -> World
     )
 
 
-def test_a_few_triangles_each_without_a_picture(helsinki: World, far: Surface) -> None:
-    assert far.material == Material(FAR)
+def test_a_few_triangles_each(helsinki: World, far: Surface) -> None:
+    assert [surface.material.name for surface in silhouette_of(helsinki)] == [FAR, WINDOWS.name]
     of = Counter(far.entity[far.triangles[:, 0]].tolist())
     houses = [of[b.entity] for b in helsinki.buildings]
     assert min(houses) > 0
@@ -121,7 +133,7 @@ def test_colours_lie_between_those_of_the_tile(helsinki: World, far: Surface) ->
 
 
 def test_it_is_the_same_every_time(helsinki: World, far: Surface) -> None:
-    (again,) = silhouette_of(helsinki)
+    again = _in_one(silhouette_of(helsinki))
     for name in ("positions", "normals", "colour", "entity", "triangles"):
         assert np.array_equal(getattr(again, name), getattr(far, name))
 
@@ -130,3 +142,46 @@ def test_a_world_without_size_has_no_silhouette(helsinki: World) -> None:
     nowhere = World(helsinki.manifest.model_copy(update={"half": 0.0}))
     with pytest.raises(InputError, match="half side"):
         silhouette_of(nowhere)
+
+
+def test_walls_whose_windows_shine_have_windows_from_afar(helsinki: World) -> None:
+    picture = np.full((64, 64, 4), 255, np.uint8)
+    picture[:32, :, 3] = 64
+    picture[32:, :, 3] = 0
+    foot = [(-10.0, -5.0), (10.0, -5.0), (10.0, 5.0), (-10.0, 5.0)]
+    points = [(*foot[k % 4], z) for k in range(4) for z in (0.0, 9.0)]
+    uv = np.array([(3.0 * k, z) for k in range(4) for z in (0, 1)])
+    blind = Surface.from_triangles(
+        points, [(0, 2, 3), (0, 3, 1)], uv=uv, entity=1000, material=Material("blind", picture[..., :3])
+    )
+    glazed = Surface.from_triangles(
+        points, [(2, 4, 5), (2, 5, 3), (4, 6, 7), (4, 7, 5), (6, 0, 1), (6, 1, 7)], uv=uv, colour=(150, 150, 150),
+        entity=1000, material=Material("glazed", picture, emission=1.0),
+    )  # fmt: skip
+    walls = joined([blind, glazed])
+    like = helsinki.buildings[0].model_copy(
+        update={
+            "entity": 1000, "footprint": [foot], "base": 0.0, "height": 9.0, "roof_shape": "flat", "tags": {},
+        }
+    )  # fmt: skip
+    lid = Surface.from_triangles([(*xy, 9.0) for xy in foot], [(0, 1, 2), (0, 2, 3)], entity=1000)
+    world = _made(helsinki, like, walls[0], lid)
+    world = World(
+        world.manifest, height=HeightField.flat(50.0), buildings=[like], objects=Objects.none(), models={},
+        layers={"ground": world.surfaces("ground"), "buildings": walls, "roofs": [lid]},
+    )  # fmt: skip
+    plain, windows = silhouette_of(world)
+    assert windows.material is WINDOWS
+    # Not on the southern wall, which is blind.
+    assert windows.normals[:, 1].min() > -0.5
+    assert len(windows.triangles) == 6
+    assert plain.normals[:, 1].min() < -0.5
+    # Seen from afar the wall has the colour it had.
+    seen = srgb(LINEAR[windows.colour] * SHOWN)
+    assert np.abs(seen.astype(int) - 150).max() <= 1
+    corners = windows.uv[windows.triangles].astype(np.float64) * (BAYS, STOREYS)
+    ground, head = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
+    assert np.allclose(head % 1.0, 0.0, atol=1e-5)
+    assert ((head - ground >= 3.0) & (head - ground < 3.5)).all()
+    wide = corners[..., 0].max(axis=1) - corners[..., 0].min(axis=1)
+    assert sorted(wide.round(4).tolist()) == [3.0] * 4 + [6.0] * 2

@@ -12,6 +12,7 @@ from vico.render.lamps.found import LAMP_KINDS, lamps_placed, shop_lamps, with_l
 from vico.render.lighting import Lighting
 from vico.render.records import GROUND_WINDOWS, UPPER_WINDOWS
 from vico.render.scene import Scene
+from vico.world.far_windows import WINDOWS
 from vico.world.mesh import Surface
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from vico.world.world import World
 
 # Beginnings of the names of materials with windows in them.
-_UPPER, _GROUND = ("wall_", "dormer"), ("ground_", "doors")
+_UPPER, _GROUND = ("wall_", "dormer", WINDOWS.name), ("ground_", "doors")
 # Storeys in the pictures of those that show bays, the same width everywhere.
 _STOREYS = {"wall_": 4, "ground_": 1}
 # Their panes have pictures of their own of what stands in them.

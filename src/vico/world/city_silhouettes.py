@@ -13,6 +13,7 @@ from vico.errors import OutputError
 from vico.io.cache import cache_folder
 from vico.io.files import new_file
 from vico.world.city import City, CityTile
+from vico.world.far_windows import WINDOWS
 from vico.world.mesh import Material, Surface
 from vico.world.moving import Shift
 from vico.world.silhouettes import FAR, silhouette_of
@@ -20,9 +21,9 @@ from vico.world.silhouettes import FAR, silhouette_of
 _log = logging.getLogger(__name__)
 
 # Of the files: another number has all made anew.
-_VERSION = 2
+_VERSION = 3
 _ARRAYS = ("positions", "normals", "uv", "colour", "entity", "triangles")
-_MATERIAL = Material(FAR)
+_MATERIALS = {material.name: material for material in (Material(FAR), WINDOWS)}
 
 
 class CitySilhouettes:
@@ -73,14 +74,15 @@ def _read(path: Path) -> list[Surface] | None:
     """Return the surfaces of a file; None where there is none, or none that can be read."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            parts = [{name: file[f"{k}.{name}"] for name in _ARRAYS} for k in range(int(file["count"]))]
+            parts = [{name: file[f"{k}.{name}"] for name in _ARRAYS} for k in range(len(file["materials"]))]
+            materials = [_MATERIALS[name] for name in file["materials"].tolist()]
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         return None
-    return [Surface(**arrays, material=_MATERIAL) for arrays in parts]
+    return [Surface(**arrays, material=material) for arrays, material in zip(parts, materials, strict=True)]
 
 
 def _write(path: Path, surfaces: list[Surface]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {f"{k}.{name}": getattr(surface, name) for k, surface in enumerate(surfaces) for name in _ARRAYS}
     with new_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, count=len(surfaces), **arrays)
+        np.savez(file, materials=[surface.material.name for surface in surfaces], **arrays)

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from vico.world.far_parts import FarPart, far_outline, parts_by_height
 from vico.world.far_roofs import roof_over
+from vico.world.far_windows import SHOWN, WINDOWS, has_windows, places_of
 from vico.world.mean_colours import LINEAR, Looks, looks_from_afar, spread_points, srgb, sums_by
 from vico.world.mesh import Material, Surface
 from vico.world.model import Building
 from vico.world.world import World
 
 _SECTORS = 8  # of directions that a building's walls have colours of their own for
+_GLAZED = 0.01  # share of its light that a wall with windows gives of its own by night, at least
+_LOWEST = 0.2  # metres; lower walls, and the roof over them, are left out
 
 
 def far_houses(world: World, material: Material) -> Iterator[Surface]:
@@ -26,13 +29,13 @@ def far_houses(world: World, material: Material) -> Iterator[Surface]:
     world
         The world.
     material
-        What they are of; it has no texture.
+        What they are of where they have no windows; it has no texture.
 
     Returns
     -------
     iterator of Surface
-        One of all houses, flat-shaded, in the world's frame; vertices have the entities of their buildings. None where
-        there are no houses.
+        One of all roofs and blind walls, one of all walls with windows (`vico.world.far_windows`), flat-shaded, in the
+        world's frame; vertices have the entities of their buildings. None where there are no houses.
     """
     buildings = world.buildings
     if not buildings:
@@ -47,34 +50,46 @@ def far_houses(world: World, material: Material) -> Iterator[Surface]:
         return np.where(known[order[at]] == entity, order[at], -1)
 
     own = LINEAR[np.array([_rgb(b.colour) for b in buildings])]
-    facades = _wall_colours(walls, number(walls.entity), own, buildings)
+    facades, shines = _wall_colours(walls, number(walls.entity), own, buildings)
     tops = _roof_colours(roofs, number(roofs.entity), 0.6 * own)
     up = roofs.where(roofs.normals[:, 2] > 0.2 * np.linalg.norm(roofs.normals, axis=1))
     triangle, place, _ = spread_points(up.corners, up.normals[:, 2], 1.0)
     of = number(up.entity)[triangle]
     by_building = np.argsort(of, kind="stable")
     place, starts = place[by_building], np.searchsorted(of[by_building], np.arange(len(known) + 1))
-    pieces = _Pieces()
+    pieces, windows = _Pieces(), _Pieces()
     for k, building in enumerate(buildings):
         outline = far_outline(building)
         if not outline.is_empty:
             parts = parts_by_height(world, building, outline, place[starts[k] : starts[k + 1]])
             for part in parts:
-                _add_part(pieces, building, part, facades[k], tops[k])
+                eaves, *roof = roof_over(building, part)
+                if eaves - part.foot >= _LOWEST:
+                    _add_walls((pieces, windows), building, part, eaves, (facades[k], shines[k]))
+                    _add_roof(pieces, building, roof, facades[k], tops[k])
     yield from pieces.surfaces(material)
+    yield from windows.surfaces(WINDOWS)
 
 
 class _Pieces:
-    """Collects triangles: corners, colours in linear light, entities."""
+    """Collects triangles: corners, colours in linear light, places in a picture, entities."""
 
     def __init__(self) -> None:
         self._corners: list[NDArray[np.float64]] = []
         self._colours: list[NDArray[np.float64]] = []
+        self._places: list[NDArray[np.float64]] = []
         self._entities: list[NDArray[np.int32]] = []
 
-    def add(self, corners: NDArray[np.float64], colour: NDArray[np.float64], entity: int) -> None:
-        """Add triangles ``(n, 3, 3)`` of an entity; colours are those of the corners, ``(n, 3, 3)`` or broadcast."""
+    def add(
+        self,
+        corners: NDArray[np.float64],
+        colour: NDArray[np.float64],
+        entity: int,
+        places: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Add triangles ``(n, 3, 3)`` of an entity, of colours ``(n, 3, 3)`` or broadcast, at places ``(n, 3, 2)``."""
         count = len(corners)
+        self._places.append(np.zeros((count, 3, 2)) if places is None else places)
         self._corners.append(corners)
         self._colours.append(np.broadcast_to(colour, (count, 3, 3)))
         self._entities.append(np.full(count, entity, np.int32))
@@ -93,7 +108,7 @@ class _Pieces:
             Surface(
                 corners.reshape(-1, 3).astype(np.float32),
                 np.repeat(normals, 3, axis=0).astype(np.float32),
-                np.zeros((count, 2), np.float32),
+                np.concatenate(self._places)[seen].reshape(-1, 2).astype(np.float32),
                 srgb(np.concatenate(self._colours)[seen].reshape(-1, 3)),
                 np.repeat(np.concatenate(self._entities)[seen], 3),
                 np.arange(count, dtype=np.int32).reshape(-1, 3),
@@ -112,11 +127,11 @@ def _rgb(colour: str) -> tuple[int, int, int]:
 
 def _wall_colours(
     walls: Looks, of: NDArray[np.int64], own: NDArray[np.float64], buildings: Sequence[Building]
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return colours of walls at their foot and at their head, by building and direction, ``(n, _SECTORS, 2, 3)``.
 
-    A fire wall is not like a front, and shops below are darker than the storeys above: of each a straight line is
-    fitted to the colours over the height.
+    And how much of their light they give of their own by night, ``(n, _SECTORS)``. A fire wall is not like a front, and
+    shops below are darker than the storeys above: of each a straight line is fitted to the colours over the height.
     """
     area = np.linalg.norm(walls.normals, axis=1)
     upright = (np.abs(walls.normals[:, 2]) < 0.5 * area) & (of >= 0)
@@ -126,20 +141,21 @@ def _wall_colours(
     at = rise.mean(axis=1)
     # Over a triangle: the square of its middle's height and how far its corners lie from that.
     square = at**2 + ((rise - at[:, None]) ** 2).sum(axis=1) / 12.0
-    values = np.column_stack([walls.colour, at[:, None] * walls.colour, at, square])
-    sums = sums_by(_SECTORS * of + _sector(walls.normals), area, values, _SECTORS * len(own)).reshape(-1, _SECTORS, 9)
+    values = np.column_stack([walls.colour, at[:, None] * walls.colour, at, square, walls.shine])
+    sums = sums_by(_SECTORS * of + _sector(walls.normals), area, values, _SECTORS * len(own)).reshape(-1, _SECTORS, 10)
     total = sums.sum(axis=1, keepdims=True)
-    weight = np.maximum(total[..., 8:], 1e-9)
-    mean = np.where(total[..., 8:] > 0.0, total[..., :3] / weight, 0.7 * own[:, None])
+    weight = np.maximum(total[..., 9:], 1e-9)
+    mean = np.where(total[..., 9:] > 0.0, total[..., :3] / weight, 0.7 * own[:, None])
     # What few square metres of reveals face is no wall.
-    enough = sums[..., 8:] > np.maximum(0.04 * total[..., 8:], 1e-9)
-    weight = np.where(enough, sums[..., 8:], 1.0)
+    enough = sums[..., 9:] > np.maximum(0.04 * total[..., 9:], 1e-9)
+    weight = np.where(enough, sums[..., 9:], 1.0)
     middle, centre = np.where(enough, sums[..., :3] / weight, mean), sums[..., 6:7] / weight
     spread = sums[..., 7:8] / weight - centre**2
     slope = (sums[..., 3:6] / weight - centre * middle) / np.maximum(spread, 0.02)
     slope = np.where(enough, slope, 0.0)
     foot, head = (middle + slope * (end - centre) for end in (0.0, 1.0))
-    return np.clip(np.stack([foot, head], axis=2), 0.6 * middle[:, :, None], 1.3 * middle[:, :, None])
+    colours = np.clip(np.stack([foot, head], axis=2), 0.6 * middle[:, :, None], 1.3 * middle[:, :, None])
+    return colours, np.where(enough, sums[..., 8:9] / weight, 0.0)[..., 0]
 
 
 def _sector(normals: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -160,23 +176,41 @@ def _roof_colours(roofs: Looks, of: NDArray[np.int64], own: NDArray[np.float64])
     return np.where(enough, sums[..., :3] / np.maximum(sums[..., 3:], 1e-9), mean)
 
 
-def _add_part(
-    pieces: _Pieces, building: Building, part: FarPart, facades: NDArray[np.float64], tops: NDArray[np.float64]
+def _add_walls(
+    pieces: tuple[_Pieces, _Pieces],
+    building: Building,
+    part: FarPart,
+    eaves: float,
+    looks: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
-    """Add walls and roof of a part of a building."""
-    eaves, roof, gables = roof_over(building, part)
-    if eaves - part.foot < 0.2:
-        return
-    for ring in (part.outline.exterior, *part.outline.interiors):
+    """Add the walls of a part of a building: blind ones to the first pieces, those with windows to the second."""
+    facades, shines = looks
+    for number, ring in enumerate((part.outline.exterior, *part.outline.interiors)):
         p = shapely.get_coordinates(ring)
         p, q = p[:-1], p[1:]
         along = q - p
-        colour = facades[_sector(np.column_stack([along[:, 1], -along[:, 0]]))]
+        sector = _sector(np.column_stack([along[:, 1], -along[:, 0]]))
         low, high = np.full(len(p), part.foot), np.full(len(p), eaves)
-        a, b, c, d = np.c_[p, low], np.c_[q, low], np.c_[q, high], np.c_[p, high]
-        foot, head = colour[:, 0], colour[:, 1]
-        for corners, colours in (((a, b, c), (foot, foot, head)), ((a, c, d), (foot, head, head))):
-            pieces.add(np.stack(corners, axis=1), np.stack(colours, axis=1), building.entity)
+        quads = np.stack([np.c_[p, low], np.c_[q, low], np.c_[q, high], np.c_[p, high]], axis=1)
+        colours = facades[sector][:, [0, 0, 1, 1]]
+        length, base = np.hypot(*along.T), max(part.foot, building.base)
+        glazed = has_windows(length, eaves - base) & (shines[sector] > _GLAZED)
+        places = places_of(length, part.foot, min(base, eaves - 0.1), eaves, building.entity + number)
+        for chosen, into, shown in ((~glazed, pieces[0], 1.0), (glazed, pieces[1], SHOWN)):
+            for corners in ([0, 1, 2], [0, 2, 3]):
+                found = quads[chosen][:, corners], colours[chosen][:, corners] / shown
+                into.add(*found, building.entity, places[chosen][:, corners] if into is pieces[1] else None)
+
+
+def _add_roof(
+    pieces: _Pieces,
+    building: Building,
+    roof_and_gables: Sequence[NDArray[np.float64]],
+    facades: NDArray[np.float64],
+    tops: NDArray[np.float64],
+) -> None:
+    """Add the roof of a part of a building, with its gables."""
+    roof, gables = roof_and_gables
     turn = np.cross(roof[:, 1] - roof[:, 0], roof[:, 2] - roof[:, 0])
     slopes = turn[:, 2] < 0.99 * np.linalg.norm(turn, axis=1)
     pieces.add(roof, tops[slopes.astype(np.int64)][:, None], building.entity)

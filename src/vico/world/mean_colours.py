@@ -28,6 +28,8 @@ class Looks(NamedTuple):
         Shape ``(n,)``.
     cover
         Which share of a triangle is no hole, shape ``(n,)``.
+    shine
+        Which share of its light it gives of its own by night, as lit windows do, shape ``(n,)``.
     """
 
     corners: NDArray[np.float64]
@@ -35,6 +37,7 @@ class Looks(NamedTuple):
     colour: NDArray[np.float64]
     entity: NDArray[np.int32]
     cover: NDArray[np.float64]
+    shine: NDArray[np.float64]
 
     def where(self, chosen: NDArray[Any]) -> Looks:
         """Return some of the triangles: a mask, shape ``(n,)``, or indices."""
@@ -84,7 +87,7 @@ def looks_from_afar(surfaces: Iterable[Surface]) -> Looks:
     found = [_looks_of(surface) for surface in surfaces if len(surface.triangles)]
     if not found:
         none = np.zeros((0, 3))
-        return Looks(np.zeros((0, 3, 3)), none, none, np.zeros(0, np.int32), np.zeros(0))
+        return Looks(np.zeros((0, 3, 3)), none, none, np.zeros(0, np.int32), np.zeros(0), np.zeros(0))
     return Looks(*(np.concatenate(column) for column in zip(*found, strict=True)))
 
 
@@ -92,18 +95,18 @@ def _looks_of(surface: Surface) -> Looks:
     corners = surface.positions[surface.triangles].astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2.0
     colour = LINEAR[surface.colour][surface.triangles].mean(axis=1)
-    cover = np.ones(len(corners))
+    cover, shine = np.ones(len(corners)), np.zeros(len(corners))
     material = surface.material
     if material.texture is not None:
-        shown, cover = _texture_means(material.texture, material.cutout, surface.uv[surface.triangles])
-        colour = colour * shown
-    return Looks(corners, normals, colour, surface.entity[surface.triangles[:, 0]], cover)
+        shown, cover, shine = _texture_means(material.texture, material.cutout, surface.uv[surface.triangles])
+        colour, shine = colour * shown, material.emission * shine
+    return Looks(corners, normals, colour, surface.entity[surface.triangles[:, 0]], cover, shine)
 
 
 def _texture_means(
     texture: NDArray[np.uint8], cutout: bool, uv: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean colours of what triangles show of a texture, and which shares of them are no holes.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean colours of what triangles show of a texture, which shares of them are no holes, and what shines.
 
     Taken over the upright rectangles around the triangles in the texture, from sums over everything left of and below
     a texel: rectangles may be as large as they like, for a texture repeats.
@@ -111,9 +114,10 @@ def _texture_means(
     steps = [max(side // _TEXELS, 1) for side in texture.shape[:2]]
     texels = texture[steps[0] // 2 :: steps[0], steps[1] // 2 :: steps[1]]
     there = texels[..., 3:] >= 128 if cutout else np.ones((*texels.shape[:2], 1), bool)
-    layers = np.concatenate([LINEAR[texels[..., :3]] * there, there], axis=2)
+    shines = texels[..., 3:] / 255.0 if texels.shape[2] == 4 and not cutout else np.zeros_like(there, np.float64)
+    layers = np.concatenate([LINEAR[texels[..., :3]] * there, there, shines], axis=2)
     rows, columns = layers.shape[:2]
-    sums = np.zeros((rows + 1, columns + 1, 4))
+    sums = np.zeros((rows + 1, columns + 1, 5))
     sums[1:, 1:] = layers.cumsum(axis=0).cumsum(axis=1)
 
     def below(u: NDArray[np.int64], v: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -127,8 +131,8 @@ def _texture_means(
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-3).astype(np.int64), first + 1)
     total = below(last[:, 0], last[:, 1]) - below(first[:, 0], last[:, 1])
     total += below(first[:, 0], first[:, 1]) - below(last[:, 0], first[:, 1])
-    cover = total[:, 3] / np.prod(last - first, axis=1)
-    return total[:, :3] / np.maximum(total[:, 3:], 1e-9), cover
+    texels_of = np.prod(last - first, axis=1)
+    return total[:, :3] / np.maximum(total[:, 3:4], 1e-9), total[:, 3] / texels_of, total[:, 4] / texels_of
 
 
 def sums_by(group: NDArray[Any], weight: NDArray[np.float64], values: NDArray[np.float64], count: int) -> Any:

@@ -1,4 +1,4 @@
-"""What a tile of a city looks like from afar: its ground, houses and trees, of a few triangles each, without pictures.
+"""What a tile of a city looks like from afar: its ground, houses and trees, of a few triangles each.
 
 A city has more triangles and pictures of facades than fit into memory, and from a few hundred metres nobody sees them.
 So a house becomes the walls of its simplified outline and a plain roof, the ground a coarse grid, a tree two pyramids.
@@ -20,7 +20,7 @@ from vico.world.mesh import Material, Surface, joined, quad_triangles, surface_o
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER
 from vico.world.world import World
 
-#: Name of the one material that silhouettes are of.
+#: Name of the material that silhouettes are of, but for walls with windows.
 FAR = "far"
 
 _MATERIAL = Material(FAR)
@@ -47,7 +47,8 @@ def silhouette_of(world: World) -> list[Surface]:
     Returns
     -------
     list of Surface
-        In the tile's own frame, all of the material `FAR`, which has no texture. Vertices have the entities that the
+        In the tile's own frame, of the material `FAR`, which has no texture, and where walls have windows of
+        `vico.world.far_windows.WINDOWS`, one small picture for all. Vertices have the entities that the
         tile's own meshes have: of buildings, of trees, of kinds of ground.
 
     Raises
