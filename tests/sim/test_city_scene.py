@@ -18,8 +18,10 @@ from vico.sim import city_scene
 from vico.sim.city_scene import CityRenderer, Neighbourhood
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
+from vico.world.city_silhouettes import CitySilhouettes
 from vico.world.city_world import CityWorld
 from vico.world.folder import read_world
+from vico.world.model import ENTITY_BACKDROP
 from vico.worldgen.city_build import build_city, city_request
 from vico.worldgen.sources import Sources
 
@@ -172,3 +174,29 @@ def test_people_have_bodies_where_they_are_near_and_nobody_else_has(
         assert here <= drawn
         assert away
         assert not away & drawn
+
+
+def test_beyond_the_edge_the_city_is_seen_mirrored(city: CityWorld) -> None:
+    size = city.city.manifest.size
+    places = [(tile.column, tile.row) for tile in city.city.manifest.tiles]
+    last = max(places)
+    surfaces = CitySilhouettes(city.city).beyond({last}, 2)
+    around = [surface for surface in surfaces if (surface.entity == ENTITY_BACKDROP).all()]
+    # Of 25 places three are tiles of the city; each is of the ground and, where there are any, of walls with windows.
+    assert 22 < len(around) <= 44
+    edge = (last[0] + 0.5) * size
+    beyond = np.concatenate([s.positions[s.triangles].reshape(-1, 3, 3) for s in around])
+    low, high = (np.array(places).min(axis=0) - 0.5) * size, (np.array(places).max(axis=0) + 0.5) * size
+    assert not ((beyond[..., :2] > low + 0.5) & (beyond[..., :2] < high - 0.5)).all(axis=-1).any()
+    normals = np.concatenate([s.normals[s.triangles[:, 0]] for s in around])
+    turn = np.cross(beyond[:, 1] - beyond[:, 0], beyond[:, 2] - beyond[:, 0])
+    assert ((turn * normals).sum(axis=1) > 0.0).all()
+    # The ground meets the city's at its edge, and houses stand on both sides of it as in a mirror.
+    others = CitySilhouettes(city.city).beyond({(last[0] - 1, last[1])}, 1)
+    inside = np.concatenate([s.positions for s in others if (s.entity != ENTITY_BACKDROP).any()])
+    mirrored = np.concatenate([s.positions for s in around])
+    beside = mirrored[(np.abs(mirrored[:, 0] - edge - 20.0) < 20.0) & (np.abs(mirrored[:, 1]) < size / 2)]
+    near = {tuple(p) for p in np.round(beside, 1).tolist()}
+    far = inside[np.abs(inside[:, 0] - edge + 20.0) < 20.0] * np.float32([-1, 1, 1]) + np.float32([2 * edge, 0, 0])
+    assert len(near & {tuple(p) for p in np.round(far, 1).tolist()}) > 0.9 * len(near) > 50
+    assert city.entities[ENTITY_BACKDROP]["kind"] == "backdrop"
