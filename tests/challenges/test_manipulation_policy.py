@@ -171,3 +171,15 @@ def test_training_goes_on_where_it_was_killed_to_the_same_weights(tmp_path: Path
     other = train(tmp_path / "parts", "--reward", "paper", "--iterations", "4")
     assert other.returncode == 2
     assert "holds another training" in other.stderr
+
+
+def test_the_kept_policy_lifts() -> None:
+    folder = Path(__file__).parents[2] / "benchmarks" / "policies" / "decomposed" / "lift"
+    about = read_json(folder / "policy.json")
+    assert about["sha256"] == sha256_of(folder / "policy.npz")
+    batch = make_manipulation_vec("lift", num_envs=12)
+    policy = read_policy(folder / "policy.npz", inputs=42, outputs=8)
+    assert score(batch, policy.act).success_at_end >= 0.9
+    with (folder / "curve.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["iteration"]) for row in rows] == list(range(1, about["iterations"] + 1))
