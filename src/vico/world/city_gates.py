@@ -109,16 +109,15 @@ class Scratch:
     """Working memory that searches use one after the other: to fetch it anew takes as long as a short one."""
 
     def __init__(self) -> None:
-        self._memory = SearchMemory(np.zeros(0, CELL), np.empty(RING, np.int32))
+        self.memory = SearchMemory(np.zeros(0, CELL), np.empty(RING, np.int32))
         # Even; of the last search. It counts on when the memory grows, so that stamps of any search differ.
         self.generation = 0
 
-    def begin(self, cells: int) -> SearchMemory:
-        """Return memory for a search of so many cells; what the last one found is lost."""
-        if len(self._memory.cells) < cells:
-            self._memory = SearchMemory(np.zeros(cells, CELL), self._memory.head)
+    def begin(self, cells: int) -> None:
+        """Begin a search of so many cells; what the last one found is lost."""
+        if len(self.memory.cells) < cells:
+            self.memory = SearchMemory(np.zeros(cells, CELL), self.memory.head)
         self.generation += 2
-        return self._memory
 
 
 class Window:
@@ -141,7 +140,6 @@ class Window:
     ) -> None:
         self._cost, self._row, self._column, self._width = cost, row, column, width
         self._scratch = scratch or Scratch()
-        self._memory = self._scratch.begin(0)
         self._landmarks = np.zeros((cost.size, 0), np.int32)
 
     def own(self, cells: Ints) -> Ints:
@@ -153,8 +151,8 @@ class Window:
         """Return what walks from a cell of the map to others cost; -1 where there is none."""
         self._search(start, EVERYWHERE)
         own = self.own(goals)
-        final = self._memory.cells["stamp"][own] == self._scratch.generation + 1
-        return np.where(final, self._memory.cells["g"][own], -1).astype(np.int64)
+        final = self._scratch.memory.cells["stamp"][own] == self._scratch.generation + 1
+        return np.where(final, self._scratch.memory.cells["g"][own], -1).astype(np.int64)
 
     def reached(self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float) -> Reached:
         """Return what walks from a cell of the map to others cost, and how long they are, pulled straight.
@@ -211,14 +209,14 @@ class Window:
         return (cells // side + self._row) * self._width + cells % side + self._column, costs
 
     def _search(self, start: int, goals: Goals) -> int:
-        self._memory = self._scratch.begin(self._cost.size)
+        self._scratch.begin(self._cost.size)
         first = int(self.own(np.array([start]))[0])
-        return int(search(self._cost, self._memory, first, goals, self._scratch.generation, self._landmarks))
+        return int(search(self._cost, self._scratch.memory, first, goals, self._scratch.generation, self._landmarks))
 
     def _found(self, first: int, last: int) -> tuple[Ints, Ints]:
-        known = self._memory.cells["g"], self._memory.cells["stamp"], self._scratch.generation + 1
+        known = self._scratch.memory.cells["g"], self._scratch.memory.cells["stamp"], self._scratch.generation + 1
         cells = backtrack(self._cost, known, first, last)
-        return cells, self._memory.cells["g"][cells].astype(np.int64)
+        return cells, self._scratch.memory.cells["g"][cells].astype(np.int64)
 
     def _length(self, first: int, last: int, clearance: NDArray[np.float32], cell: float) -> tuple[float, int]:
         cells, g = self._found(first, last)

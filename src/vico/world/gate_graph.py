@@ -164,9 +164,24 @@ def _least(cell, goal, width):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _go_on(node, graph, known, queue, aim, width):  # type: ignore[no-untyped-def]
+    """Reach the neighbours of a gate that is done; `known` are costs so far, by which gate, and what is done."""
+    cells, first, ends, costs = graph
+    best, by, done = known
+    for k in range(first[node], first[node + 1]):
+        other = ends[k]
+        if costs[k] < 0 or done[other]:
+            continue
+        value = best[node] + costs[k]
+        if value < best[other]:
+            best[other], by[other] = value, node
+            heapq.heappush(queue, (value + _least(cells[other], aim, width), other))
+
+
+@compiled
 def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # type: ignore[no-untyped-def]
     """Run A* over the gates; of ways that cost the same, the gates with the lower numbers are taken first."""
-    cells, first, ends, costs = graph
+    cells = graph[0]
     count = len(cells)
     best, came = np.full(count, _FAR), np.full(count, -1)
     onward, done = np.full(count, -1), np.zeros(count, np.bool_)
@@ -188,14 +203,7 @@ def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # 
         done[node] = True
         if onward[node] >= 0 and best[node] + onward[node] < total:
             total, last = best[node] + onward[node], node
-        for k in range(first[node], first[node + 1]):
-            other = ends[k]
-            if costs[k] < 0 or done[other]:
-                continue
-            value = best[node] + costs[k]
-            if value < best[other]:
-                best[other], came[other] = value, node
-                heapq.heappush(queue, (value + _least(cells[other], goal, width), other))
+        _go_on(node, graph, (best, came, done), queue, goal, width)
     way = [np.int64(0)]
     way.pop()
     while last >= 0:
@@ -207,7 +215,7 @@ def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # 
 @compiled
 def _onward(graph, arrive, arrive_costs, leave, start, width):  # type: ignore[no-untyped-def]
     """Run A* from the goal to all gates of a tile; of ways that cost the same, those over lower numbers are taken."""
-    cells, first, ends, costs = graph
+    cells = graph[0]
     count = len(cells)
     best, then = np.full(count, _FAR), np.full(count, -1)
     done, wanted = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
@@ -225,12 +233,5 @@ def _onward(graph, arrive, arrive_costs, leave, start, width):  # type: ignore[n
             continue
         done[node] = True
         left -= wanted[node]
-        for k in range(first[node], first[node + 1]):
-            other = ends[k]
-            if costs[k] < 0 or done[other]:
-                continue
-            value = best[node] + costs[k]
-            if value < best[other]:
-                best[other], then[other] = value, node
-                heapq.heappush(queue, (value + _least(cells[other], start, width), other))
+        _go_on(node, graph, (best, then, done), queue, start, width)
     return np.where(done, best, -1), then
