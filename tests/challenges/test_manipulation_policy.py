@@ -23,6 +23,7 @@ from vico.io.files import read_json, sha256_of
 from vico.seeds import rng
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "train_manipulation.py"
+KEPT = Path(__file__).parents[2] / "benchmarks" / "policies" / "decomposed"
 
 
 def network(sizes: tuple[int, ...] = (42, 16, 8), seed: int = 0) -> ArrayPolicy:
@@ -173,13 +174,20 @@ def test_training_goes_on_where_it_was_killed_to_the_same_weights(tmp_path: Path
     assert "holds another training" in other.stderr
 
 
-def test_the_kept_policy_lifts() -> None:
-    folder = Path(__file__).parents[2] / "benchmarks" / "policies" / "decomposed" / "lift"
+@pytest.mark.parametrize("task", ["lift", "place"])
+def test_a_kept_policy_solves_its_task(task: str) -> None:
+    folder = KEPT / task
     about = read_json(folder / "policy.json")
     assert about["sha256"] == sha256_of(folder / "policy.npz")
-    batch = make_manipulation_vec("lift", num_envs=12)
+    batch = make_manipulation_vec(task, num_envs=12)
     policy = read_policy(folder / "policy.npz", inputs=42, outputs=8)
     assert score(batch, policy.act).success_at_end >= 0.9
     with (folder / "curve.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["iteration"]) for row in rows] == list(range(1, about["iterations"] + 1))
+
+
+def test_the_kept_policies_pick_and_place_together() -> None:
+    lift, place = (read_policy(KEPT / task / "policy.npz", inputs=42, outputs=8) for task in ("lift", "place"))
+    batch = make_manipulation_vec("pick_place", num_envs=12)
+    assert score(batch, DecomposedPolicy(lift, place).act).success_at_end >= 0.9

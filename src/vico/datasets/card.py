@@ -119,6 +119,10 @@ def _of_actions(record: Mapping[str, Any]) -> str:
     return " ".join(lines)
 
 
+# What a world of no map says of where it comes from: a level field is drawn by the program.
+_DRAWN = {"name": "none: drawn by the program", "licence": "that of the program", "attribution": "none"}
+
+
 def _origin(record: Mapping[str, Any]) -> str:
     lines = [
         "## Where it comes from, and its licences",
@@ -129,7 +133,7 @@ def _origin(record: Mapping[str, Any]) -> str:
         "|---|---|---|---|---|---|",
     ]
     for world in record["worlds"]:
-        for source in world["sources"] or [{}]:
+        for source in world["sources"] or [_DRAWN]:
             cells = [world["name"], str(world["episodes"]), f"`{world['digest'][:12]}`"]
             cells += [str(source.get(name, "unknown")) for name in ("name", "licence", "attribution")]
             lines.append("| " + " | ".join(cells) + " |")

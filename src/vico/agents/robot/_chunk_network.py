@@ -86,7 +86,7 @@ class ChunkNetwork(nn.Module):  # type: ignore[misc]
         seen = seen.flatten(2).transpose(1, 2) + self.cell_place
         told = self.words(words) + self.word_place
         tokens = torch.cat([self.joints(states)[:, None], seen, told], dim=1)
-        nothing = torch.zeros(len(words), 1 + seen.shape[1], dtype=torch.bool)
+        nothing = torch.zeros(len(words), 1 + seen.shape[1], dtype=torch.bool, device=words.device)
         masked = torch.cat([nothing, words == 0], dim=1)
         memory = self.encoder(tokens, src_key_padding_mask=masked)
         asked = self.queries.expand(len(words), -1, -1)

@@ -132,7 +132,7 @@ class ChunkPolicy:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all of it as arrays, as `read` wants the file."""
         about = {"schema_name": _SCHEMA, "version": _VERSION, **asdict(self.shape)}
-        weights = {f"{_WEIGHT}{name}": value.numpy() for name, value in self.network.state_dict().items()}
+        weights = {f"{_WEIGHT}{name}": value.cpu().numpy() for name, value in self.network.state_dict().items()}
         return {_SHAPE: np.frombuffer(json.dumps(about).encode(), np.uint8), **self.scales, **weights}
 
     def chunk(self, picture: NDArray[np.uint8], state: Array, instruction: str) -> Array:
