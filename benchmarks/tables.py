@@ -8,7 +8,11 @@ Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), 
 (21). A table that was cut short goes on with the same command. With `--reduced` there are four worlds, one seed and
 shorter episodes of the first part, so that all is over in ten minutes on two cores; these worlds are built into
 OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method` names them, with
-the model of the environment; without, the page says that they were not run.
+the model of the environment; without, the page says that they were not run. So are methods of the robot table whose arm
+was trained, with their `--policy METHOD=FILE`:
+
+    python benchmarks/tables.py --table robot --worlds WORLDS --block "oracle grasp" --method heuristic \
+        --method rl-decomposed --policy rl-decomposed=benchmarks/policies/decomposed --out OUT
 
 Reported seeds are drawn from the commit at which a method was frozen, so nobody can have tuned on them:
 `--first-seed N` with N the first six hexadecimal digits of that commit's hash, as an integer (`echo $((16#e6541f))`).
@@ -19,7 +23,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from worlds import locate, row_of
@@ -28,7 +32,7 @@ from vico.challenges.episodes import Outcome, label_of
 from vico.challenges.evaluation import evaluate, jobs_for
 from vico.challenges.records import Challenge, Setting
 from vico.challenges.registry import load_challenge
-from vico.challenges.robot.policy_files import LEARNED
+from vico.challenges.robot.policy_files import LEARNED, policy_settings
 from vico.challenges.tables.files import write_results
 from vico.challenges.tables.published import published_rows
 from vico.challenges.windows import window_list
@@ -149,6 +153,8 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
         seeds=arguments.seeds or (1 if arguments.reduced else table.seeds),
         first_seed=arguments.first_seed,
     )
+    policies = policy_settings(methods, arguments.policy)
+    jobs = [replace(job, setting={**job.setting, **policies.get(job.method, {})}) for job in jobs]
     folder = arguments.out / block.name.replace(", ", "_").replace(" ", "_")
     outcomes = evaluate(
         block.challenge, jobs, folder, workers=arguments.workers, record=arguments.record, finished=tell
@@ -173,6 +179,7 @@ def main() -> int:
     parser.add_argument("--worlds", type=Path, help="folder of the worlds of the table's list")
     parser.add_argument("--reduced", action="store_true")
     parser.add_argument("--method", action="append", help="instead of all methods without a language model")
+    parser.add_argument("--policy", action="append", default=[], help="METHOD=FILE, of a method whose arm was trained")
     parser.add_argument("--category", action="append", help="instead of all")
     parser.add_argument("--block", action="append", help="parts of the table instead of all: their names")
     parser.add_argument("--seeds", type=int, default=0)
