@@ -127,3 +127,15 @@ def test_rotation_matrices_are_rotations(angle: float) -> None:
     turned = matrix(np.array([0.6, 0.0, 0.8]) * angle)
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
     assert turned.trace() == pytest.approx(1 + 2 * np.cos(angle), abs=1e-9)
+
+
+def test_a_body_of_a_batch_is_the_same_body_and_takes_no_memory_of_its_own() -> None:
+    for k, body in enumerate(bodies()):
+        found = crowd().body(k, body)
+        for name in ("vertices", "normals", "weight_joints", "weights", "colour"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(body, name))
+            assert np.shares_memory(getattr(found, name), getattr(crowd(), name))
+        np.testing.assert_array_equal(found.triangles, body.triangles)
+    again = batch_bodies([crowd().body(k, body) for k, body in enumerate(bodies())], [11, 12, 13])
+    np.testing.assert_array_equal(again.triangles, crowd().triangles)
+    assert again.nbytes == crowd().nbytes >= sum(body.vertices.nbytes * 2 for body in bodies())

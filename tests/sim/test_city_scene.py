@@ -101,9 +101,10 @@ def _are_equal(a: list[Any], b: list[Any]) -> bool:
 @pytest.mark.slow
 @pytest.mark.usefixtures("_two_tiles_in_full")
 def test_what_is_seen_and_what_happens_depend_neither_on_the_budget_nor_on_who_looks(
-    city: CityWorld, people: Community
+    city: CityWorld, people: Community, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen, state = _run(city, people)
+    monkeypatch.setattr("vico.sim.simulation._PAGES_EVERY", 1)
     assert any(np.abs(one["flow"]).max() > 0.0 for one in seen[-1].values())
     again, same = _run(city, people, memory=1e-6)
     assert _are_equal(seen, again)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -58,3 +59,23 @@ def mapped_array(path: Path) -> NDArray[Any]:
         raise MissingFileError(f"{path}: no such file; build it anew") from None
     except (ValueError, OSError, EOFError) as error:
         raise SchemaError(f"{path}: not a readable array ({error}); build it anew") from None
+
+
+def drop_pages(array: NDArray[Any]) -> None:
+    """Give back the memory that a mapped array's file is read into: it is read again where it is looked at.
+
+    What was written into the array is lost. Of other arrays, and where the system can't do it, nothing changes.
+    """
+    while isinstance(array, np.ndarray):
+        if isinstance(array, np.memmap):
+            pages = getattr(array, "_mmap", None)
+            if isinstance(pages, mmap.mmap):
+                drop_map(pages)
+            return
+        array = array.base  # type: ignore[assignment]
+
+
+def drop_map(pages: mmap.mmap) -> None:
+    """Give back the memory that a mapped file is read into, where the system can do it."""
+    if hasattr(pages, "madvise") and hasattr(mmap, "MADV_DONTNEED"):
+        pages.madvise(mmap.MADV_DONTNEED)

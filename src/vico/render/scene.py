@@ -181,7 +181,8 @@ class Scene:
     @property
     def nbytes(self) -> int:
         """Bytes of the scene's own arrays: without textures, which scenes may share."""
-        return sum(_bytes_of(part) for name, part in self.arrays._asdict().items() if name != "textures")
+        drawn = sum(_bytes_of(part) for name, part in self.arrays._asdict().items() if name != "textures")
+        return drawn + _bytes_of(self._placed) + _bytes_of(self._light or ())
 
     def share_textures(self, other: Scene) -> None:
         """Take the textures of a scene that was made later with the same palette, so that both have the same arrays."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,6 +53,24 @@ class BodyBatch:
 
     def __len__(self) -> int:
         return len(self.starts) - 1
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its arrays."""
+        arrays = [getattr(self, field.name) for field in fields(self) if field.name != "limbs"]
+        return sum(array.nbytes for array in arrays)
+
+    def body(self, number: int, whole: SkinnedBody) -> SkinnedBody:
+        """Return one of the bodies as it was given, but with its vertices in the batch's arrays, without a copy."""
+        part = slice(self.starts[number], self.starts[number + 1])
+        return replace(
+            whole,
+            vertices=self.vertices[part],
+            normals=self.normals[part],
+            weight_joints=self.weight_joints[part],
+            weights=self.weights[part],
+            colour=self.colour[part],
+        )
 
 
 def batch_bodies(bodies: Sequence[SkinnedBody], entities: Sequence[int]) -> BodyBatch:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -180,7 +181,7 @@ class CityRenderer:
 
     def _make_room(self) -> None:
         """Let go of the scenes that were looked at longest ago until there is room for another."""
-        sizes = {where: scene.scene.nbytes for where, scene in self._scenes.items()}
+        sizes = {where: scene.nbytes for where, scene in self._scenes.items()}
         largest = max(sizes.values(), default=0)
         for where in sizes:
             if sum(sizes[one] for one in self._scenes) + largest <= self._sim.config.memory * _GIGABYTE:
@@ -196,7 +197,7 @@ class CityRenderer:
         low, high = (
             tuple((k + side * where.rings + 0.5) * size for k in (where.column, where.row)) for side in (-1, 1)
         )
-        far = self._silhouettes.beyond(tiles, where.reach(size))
+        far = partial(self._silhouettes.beyond, tiles, where.reach(size))
         return ScenePart(self._city.part(tiles), (low[0], low[1]), (high[0], high[1]), far, self._palette)
 
 

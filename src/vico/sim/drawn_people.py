@@ -106,6 +106,12 @@ class DrawnPeople:
         if everybody:
             self.choose(np.arange(len(looks)))
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the bodies."""
+        rest = sum(body.triangles.nbytes for bodies in (self._bodies, self._far) for body in bodies.values())
+        return self.batch.nbytes + rest
+
     def choose(self, rows: NDArray[np.int64]) -> None:
         """Have bodies for some, by their numbers, ascending, and for nobody else."""
         if np.array_equal(rows, self.rows):
@@ -194,6 +200,10 @@ class DrawnPeople:
         bodies = [self._bodies[i] for i in rows] + [self._far[i] for i in rows if self._has_far]
         entities = self.entities[self.rows].tolist()
         self.batch: BodyBatch = batch_bodies(bodies, entities * (2 if self._has_far else 1))
+        # Their vertices are kept once.
+        self._bodies = {i: self.batch.body(k, self._bodies[i]) for k, i in enumerate(rows)}
+        if self._has_far:
+            self._far = {i: self.batch.body(k, self._far[i]) for k, i in enumerate(rows, len(rows))}
 
 
 def _worn_bodies(sim: Cast) -> dict[str, Path]:

@@ -64,6 +64,7 @@ def initial_state(
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(base, config)
+    base.world.drop_pages()  # streets look at the ground of all the city, and so do those who find their places below
     state.show_signals()
     robots = systems.robots_of(base, config, state.obstacles(), errands=config.errands)
     if robots is not None:

@@ -160,7 +160,7 @@ class SceneRenderer:
         if part is None:
             scene = scene_of(sim.world, prototypes=shapes, cabins=cabins)
         else:
-            scene = scene_of(part.world, prototypes=shapes, cabins=cabins, far=part.far, palette=part.palette)
+            scene = scene_of(part.world, prototypes=shapes, cabins=cabins, far=part.far(), palette=part.palette)
         scene.keep_detail(self._doors.prototypes)
         return scene
 
@@ -324,6 +324,11 @@ class SceneRenderer:
     def scene(self) -> Scene:
         """What is rendered."""
         return self._scene
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the scene and of the bodies in it; textures, which scenes may share, aside."""
+        return self._scene.nbytes + self._people.nbytes
 
     def holders(self, state: SimulationState) -> Holders:
         """Return everybody as they are posed, with what their hands hold."""

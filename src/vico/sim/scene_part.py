@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +26,8 @@ class ScenePart:
     low, high
         Corners of the ground they cover, ENU metres: what moves is drawn within them.
     far
-        What the other tiles look like from afar.
+        Returns what the other tiles look like from afar: asked for each scene that is made, which keeps its own form of
+        it.
     palette
         Textures that parts of the city share.
     """
@@ -34,7 +35,7 @@ class ScenePart:
     world: CityPart
     low: tuple[float, float]
     high: tuple[float, float]
-    far: Sequence[Surface]
+    far: Callable[[], Sequence[Surface]]
     palette: Palette
 
     def holds(self, points: NDArray[np.floating], margin: float = 0.0) -> NDArray[np.bool_]:

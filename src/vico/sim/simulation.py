@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from vico.assets.people import Appearance
     from vico.community.model import Community
 
+# Seconds after which memory that files are read into is given back.
+_PAGES_EVERY = 60
+
 
 @dataclass(frozen=True)
 class StepResult:
@@ -130,6 +133,9 @@ class Simulation:
         self._renderer, self._attached = renderer, False
         #: Counts overlaps since `check_overlaps`; None where they are not looked for.
         self.overlap_check: OverlapCheck | None = None
+        # Beginning reads all of a city; from then on people look at what is around them.
+        world.forget()
+        world.drop_pages()
 
     # The loop.
 
@@ -203,6 +209,8 @@ class Simulation:
                 advance_lines(state)
                 state.show_signals()
                 self.punctuality.watch(state)
+                if state.second % _PAGES_EVERY == 0:
+                    self.world.drop_pages()
             watch.lap("bookkeeping")
 
     def _guarded(self, ticks: int) -> AbstractContextManager[None]:

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from pydantic_core import from_json
 
 from vico.errors import MissingFileError, SchemaError
+from vico.io.arrays import drop_map
 from vico.world.model import Room
 from vico.world.moving import Shift
 from vico.world.records import invalid
@@ -68,6 +69,12 @@ class CityRooms(Sequence[Room]):
         """Return the numbers of the rooms in some of the files, given by their places in the list."""
         ranges = [np.arange(*self._first[k : k + 2], dtype=np.int64) for k in files]
         return np.concatenate([np.zeros(0, np.int64), *ranges])
+
+    def drop_pages(self) -> None:
+        """Give back the memory that the files are read into; they are read again where somebody asks."""
+        for content in self._maps:
+            if isinstance(content, mmap.mmap):
+                drop_map(content)
 
     @cached_property
     def numbers(self) -> dict[str, int]:

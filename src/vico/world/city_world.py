@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.geo.frame import LocalFrame
-from vico.io.arrays import mapped_array
+from vico.io.arrays import drop_pages, mapped_array
 from vico.io.files import sha256_of
 from vico.world.city import CITY, City, CityTile
 from vico.world.city_entities import CityEntities
@@ -147,8 +147,31 @@ class CityWorld(World):
     @cached_property
     def router(self) -> CityRouter:
         """Finds ways on the walkable map: from gate to gate of the tiles."""
-        whole = self.city.path / WHOLE
-        return CityRouter(self.walkable, mapped_array(whole / COST), Gates.read(whole / GATES), self._side)
+        return CityRouter(self.walkable, self._cost, Gates.read(self.file(GATES)), self._side)
+
+    @cached_property
+    def _cost(self) -> NDArray[np.int32]:
+        """What cells of the walkable map cost a walker, read where it is looked at."""
+        return mapped_array(self.file(COST))
+
+    def forget(self) -> None:
+        """Forget the things of all tiles, much of whose size is names: they are read anew where somebody asks."""
+        self.__dict__.pop("objects", None)
+
+    def drop_pages(self) -> None:
+        """Give back the memory that files are read into: ground, walkable map, costs of walks, rooms."""
+        opened = self.__dict__
+        arrays: list[NDArray[Any]] = []
+        if "height" in opened:
+            arrays += [self.height.heights, *(vars(self.height.steps).values() if self.height.steps else ())]
+        if "walkable" in opened:
+            arrays += [self.walkable.cls, self.walkable.clearance, self.walkable.connected]
+        if "_cost" in opened:
+            arrays.append(self._cost)
+        for array in arrays:
+            drop_pages(array)
+        if "rooms" in opened:
+            self.rooms.drop_pages()
 
     @property
     def _side(self) -> int:

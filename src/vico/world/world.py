@@ -148,6 +148,12 @@ class World:
         """Finds ways on the walkable map."""
         return Router(self.walkable)
 
+    def forget(self) -> None:
+        """Forget what is easily read anew; a world of one tile keeps all it has read."""
+
+    def drop_pages(self) -> None:
+        """Give back memory whose content is read again where it is looked at; a world of one tile has none."""
+
     def walk_lengths(self) -> WalkLengths:
         """Return what measures many walks; who made it keeps it, for it takes some memory."""
         return CoarseWalkLengths(self.router)
