@@ -8,13 +8,14 @@ tile.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from threading import Lock
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.io.arrays import drop_pages
 from vico.io.recent import Recent
 from vico.world.city_gates import Gates, Ints, Scratch, Window
 from vico.world.gate_graph import GateGraph
@@ -28,6 +29,8 @@ _NEAR, _AROUND = 800, 300
 _TRIES = 40
 # Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks that begin at a gate, 8 a cell.
 _ENDS, _LEGS = 8192, 8192
+# Windows after which the memory that the map is read into is given back: some 6 MB each at 400 m a tile.
+_WINDOWS = 40
 _FAR = np.int64(1) << 60
 _NO_WALK = np.zeros(0, np.int32), np.zeros(0, np.int32)
 
@@ -58,6 +61,7 @@ class CityRouter(Router):
         self._shut = np.zeros(cost.shape, np.bool_)
         self._nothing = np.zeros((0, 0), np.bool_)
         self._scratch = Scratch()
+        self._opened = 0
         self._lock = Lock()
 
     def learn_landmarks(self) -> None:
@@ -117,7 +121,15 @@ class CityRouter(Router):
     def _ask(
         self, blocked: NDArray[np.bool_] | None, room: float, closed: Sequence[tuple[float, float, float]]
     ) -> _Ask:
-        return _Ask(self._cost, self._clearance, blocked, room, self._side, self._tiles_of(closed), self._scratch)
+        tiles = self._tiles_of(closed)
+        return _Ask(self._cost, self._clearance, blocked, room, self._side, tiles, self._scratch, self._open)
+
+    def _open(self) -> None:
+        """Count a window that is opened: all of a city's map would come to be in memory."""
+        self._opened += 1
+        if self._opened % _WINDOWS == 0:
+            drop_pages(self._cost)
+            drop_pages(self._clearance)
 
     def _tiles_of(self, closed: Sequence[tuple[float, float, float]]) -> set[tuple[int, int]]:
         """Return the rows and columns of the tiles in which squares lie."""
@@ -243,9 +255,10 @@ class _Ask:
         side: int,
         closed: set[tuple[int, int]],
         scratch: Scratch,
+        opened: Callable[[], None],
     ) -> None:
         self._cost, self._clearance, self._blocked, self.room, self._side = cost, clearance, blocked, room, side
-        self._scratch = scratch
+        self._scratch, self._opened = scratch, opened
         # Whether what is found in a tile is found again: nothing is closed there.
         self._usual = dict.fromkeys(closed, False)
         self._windows: dict[tuple[int, int, int, int], Window] = {}
@@ -281,5 +294,6 @@ class _Ask:
         rows, columns = part
         key = rows.start, rows.stop, columns.start, columns.stop
         if key not in self._windows:
+            self._opened()
             self._windows[key] = Window(self.costs(part), rows.start, columns.start, self._cost.shape[1], self._scratch)
         return self._windows[key]
