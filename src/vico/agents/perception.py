@@ -125,15 +125,19 @@ class DepthGrid:
         self.corner = np.asarray(middle, np.float64)[:2] - side / 2
         # How often pictures showed something; made with the first, for whoever is told of rooms looks at none.
         self._hits: NDArray[np.int32] | None = None
-        self._bumps = np.zeros((self.n, self.n), np.bool_)
-        # What a body of some radius keeps from, by radius, until something new is known.
-        self._blocked: dict[float, NDArray[np.bool_]] = {}
+        # A bit a cell, for thousands keep such a grid each.
+        self._bits = np.packbits(np.zeros(self.n * self.n, np.bool_))
+        # What a body of some radius keeps from, by radius, until something new is known; bits, too.
+        self._blocked: dict[float, NDArray[np.uint8]] = {}
 
     @property
     def nbytes(self) -> int:
         """Bytes of what is kept."""
         hits = 0 if self._hits is None else self._hits.nbytes
-        return hits + self._bumps.nbytes + sum(blocked.nbytes for blocked in self._blocked.values())
+        return hits + self._bits.nbytes + sum(blocked.nbytes for blocked in self._blocked.values())
+
+    def _cells(self, bits: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        return np.unpackbits(bits, count=self.n * self.n).view(np.bool_).reshape(self.n, self.n)
 
     def state(self) -> dict[str, Any]:
         """Return the cells that hold something, as arrays; few do, so they are listed."""
@@ -143,7 +147,7 @@ class DepthGrid:
             "corner": self.corner.copy(),
             "hit": hit.astype(np.int32),
             "hits": hits[hit],
-            "bumps": np.packbits(self._bumps.ravel()),
+            "bumps": self._bits.copy(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -153,8 +157,7 @@ class DepthGrid:
         if len(state["hit"]):
             self._hits = np.zeros((self.n, self.n), np.int32)
             self._hits.ravel()[state["hit"]] = state["hits"]
-        bumps = np.unpackbits(state["bumps"], count=self.n * self.n)
-        self._bumps = bumps.astype(np.bool_).reshape(self.n, self.n)
+        self._bits = np.array(state["bumps"], np.uint8)
 
     def see(self, observation: Mapping[str, Any], *, floor: float, ignore: ArrayLike = ()) -> None:
         """Add what a depth image shows between ankle and head height.
@@ -190,10 +193,11 @@ class DepthGrid:
         """
         axis = (np.arange(self.n) + 0.5) * self.cell
         x, y = np.meshgrid(self.corner[0] + axis, self.corner[1] + axis)
-        self._bumps |= ~_within(room, x, y)
+        bumps = self._cells(self._bits) | ~_within(room, x, y)
         for box in furniture:
             part = self._around(box)
-            self._bumps[part] |= _within(box, x[part], y[part])
+            bumps[part] |= _within(box, x[part], y[part])
+        self._bits = np.packbits(bumps)
         self._blocked.clear()
 
     def _around(self, box: NDArray[np.float64]) -> tuple[slice, slice]:
@@ -207,7 +211,9 @@ class DepthGrid:
         """Remember that something stopped a step at a point."""
         ix, iy = ((np.asarray(xy, np.float64)[:2] - self.corner) / self.cell).astype(np.int64)
         if 0 <= ix < self.n and 0 <= iy < self.n:
-            self._bumps[iy, ix] = True
+            bumps = self._cells(self._bits)
+            bumps[iy, ix] = True
+            self._bits = np.packbits(bumps)
             self._blocked.clear()
 
     def route(self, start: ArrayLike, goal: ArrayLike, *, near: float, radius: float = 0.3) -> NDArray[np.float64]:
@@ -221,15 +227,16 @@ class DepthGrid:
         a = np.asarray(start, np.float64)[:2]
         b = np.asarray(goal, np.float64)[:2]
         if radius not in self._blocked:
-            self._blocked[radius] = self._grown(radius)
-        blocked = self._blocked[radius]
+            self._blocked[radius] = np.packbits(self._grown(radius))
+        blocked = self._cells(self._blocked[radius])
         first = tuple(((a - self.corner) / self.cell).astype(int))
         aim = (b - self.corner) / self.cell
         reach = near / self.cell
         return self.corner + (_a_star(blocked, first, aim, reach) + 0.5) * self.cell
 
     def _grown(self, radius: float) -> NDArray[np.bool_]:
-        solid = self._bumps if self._hits is None else (self._hits >= 3) | self._bumps
+        bumps = self._cells(self._bits)
+        solid = bumps if self._hits is None else (self._hits >= 3) | bumps
         grown = solid.copy()
         reach = math.ceil(radius / self.cell)
         for dy in range(-reach, reach + 1):

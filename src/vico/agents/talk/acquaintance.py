@@ -68,7 +68,7 @@ class Acquaintance:
         return next((habit for habit in reversed(self.habits) if habit.start <= second < habit.end), None)
 
 
-def acquaintance_of(resident: Any, kind: str, note: str) -> Acquaintance:
+def acquaintance_of(resident: Any, kind: str, note: str, *, day: tuple[Habit, ...] | None = None) -> Acquaintance:
     """Return what somebody knows of a resident to whom they are tied.
 
     Parameters
@@ -77,15 +77,15 @@ def acquaintance_of(resident: Any, kind: str, note: str) -> Acquaintance:
         As `vico.community.model.Resident`; what it lacks is not known.
     kind
         As `vico.community.model.RelationKind`.
+    day
+        What `day_of` returns of the resident's schedule, where it was asked before.
     """
     habits: tuple[Habit, ...] = ()
-    if kind in _WHOLE_DAY:
-        habits = _day_of(getattr(resident, "schedule", ()))
-    elif kind in _WORK:
+    if kind in _WHOLE_DAY or kind in _WORK:
+        habits = day_of(getattr(resident, "schedule", ())) if day is None else day
+    if kind not in _WHOLE_DAY:
         work = getattr(resident, "workplace", None)
-        habits = tuple(
-            one for one in _day_of(getattr(resident, "schedule", ())) if one.place == work and not one.travels
-        )
+        habits = tuple(one for one in habits if one.place == work and not one.travels)
     home = str(getattr(resident, "home", "") or "") if kind in _WHERE_THEY_LIVE else ""
     return Acquaintance(resident.id, resident.name, kind, note, resident.age, home, habits)
 
@@ -101,15 +101,19 @@ def acquaintances_of(residents: Mapping[str, Any], relations: Iterable[Any]) -> 
         As `vico.community.model.Relation`; ties to people who are not among the residents are left out.
     """
     known: dict[str, list[Acquaintance]] = {name: [] for name in residents}
+    # All who know a day know the same one.
+    days = {name: day_of(getattr(resident, "schedule", ())) for name, resident in residents.items()}
     for relation in relations:
         first, second = relation.between
         for me, other in ((first, second), (second, first)):
             if me in residents and other in residents:
-                known[me].append(acquaintance_of(residents[other], str(relation.kind), relation.note))
+                kind, note = str(relation.kind), relation.note
+                known[me].append(acquaintance_of(residents[other], kind, note, day=days[other]))
     return known
 
 
-def _day_of(schedule: Sequence[Any]) -> tuple[Habit, ...]:
+def day_of(schedule: Sequence[Any]) -> tuple[Habit, ...]:
+    """Return where a schedule has somebody, and when; ways lead to where they are next."""
     found: list[Habit] = []
     for k, item in enumerate(schedule):
         travels = item.place is None
@@ -119,4 +123,4 @@ def _day_of(schedule: Sequence[Any]) -> tuple[Habit, ...]:
     return tuple(found)
 
 
-__all__ = ["Acquaintance", "Habit", "acquaintance_of", "acquaintances_of"]
+__all__ = ["Acquaintance", "Habit", "acquaintance_of", "acquaintances_of", "day_of"]
