@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vico.world.mesh import Material, Surface
 from vico.world.model import Entrance
@@ -132,14 +133,16 @@ def house_doors(panels: Sequence[Surface], entrances: Sequence[Entrance]) -> NDA
     if not len(kinds):
         return doors
     middle = corners.mean(axis=1)
+    beside = cKDTree(middle[:, :2]).query_ball_point(at[:, :2], math.hypot(_OFF, _ALONG), return_sorted=True)
     for k in range(len(doors)):
+        near = np.array(beside[k], np.int64)
         out = np.array([-doors["inward_x"][k], -doors["inward_y"][k]])
-        off = middle[:, :2] - at[k, :2]
+        off = middle[near, :2] - at[k, :2]
         along = np.abs(off @ np.array([-out[1], out[0]]))
-        low = np.abs(corners[:, 0, 2] - at[k, 2])
+        low = np.abs(corners[near, 0, 2] - at[k, 2])
         fits = np.flatnonzero((np.abs(off @ out) < _OFF) & (along < _ALONG) & (low < _UP))
         if len(fits):
-            nearest = int(fits[along[fits].argmin()])
+            nearest = int(near[fits[along[fits].argmin()]])
             _describe(doors[k : k + 1], int(kinds[nearest]), corners[nearest], uv[nearest])
             doors["colour"][k] = colours[nearest]
     return doors

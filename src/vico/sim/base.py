@@ -98,6 +98,10 @@ class SimulationBase:
         """Tills of shops and cafés by room, and where people stand in line before them."""
         return tills_of(self.world.places, self.indoor, self.world.objects)
 
+    def know_things(self) -> None:
+        """Make what people ask for of the world's things: a city's are forgotten once a run has begun."""
+        _ = self.seats, self.tills
+
     @cached_property
     def solids(self) -> list[shapely.Polygon]:
         """Footprints nobody walks through: buildings, and the feet of solid things outdoors."""

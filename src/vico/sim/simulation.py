@@ -134,6 +134,8 @@ class Simulation:
         #: Counts overlaps since `check_overlaps`; None where they are not looked for.
         self.overlap_check: OverlapCheck | None = None
         # Beginning reads all of a city; from then on people look at what is around them.
+        if self.residents:
+            self.base.know_things()
         world.forget()
         world.drop_pages()
 

@@ -30,7 +30,7 @@ _TRIES = 40
 # Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks that begin at a gate, 8 a cell.
 _ENDS, _LEGS = 8192, 8192
 # Windows after which the memory that the map is read into is given back: some 6 MB each at 400 m a tile.
-_WINDOWS = 40
+_WINDOWS = 16
 _FAR = np.int64(1) << 60
 _NO_WALK = np.zeros(0, np.int32), np.zeros(0, np.int32)
 
