@@ -13,6 +13,7 @@ import argparse
 import json
 import sys
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from vico.errors import SchemaError, VicoError
 from vico.io.files import read_json, write_bytes, write_json
@@ -23,10 +24,18 @@ _KEPT = ("*/episodes/*.json", "*/tasks/*.json")
 def pack(out: Path, file: Path) -> int:
     """Write all records and tasks under `out` to a file; return how many."""
     paths = sorted(path for pattern in _KEPT for path in out.glob(pattern))
-    rows = [{"path": path.relative_to(out).as_posix(), "content": read_json(path)} for path in paths]
+    rows = [{"path": path.relative_to(out).as_posix(), "content": kept(read_json(path))} for path in paths]
     lines = [json.dumps(row, sort_keys=True, ensure_ascii=False, separators=(",", ":")) for row in rows]
     write_bytes(file, "".join(line + "\n" for line in lines).encode())
     return len(lines)
+
+
+def kept(content: dict[str, Any]) -> dict[str, Any]:
+    """Return a record without where a policy lay: its hash, which stays, says which it was."""
+    setting = content.get("episode", {}).get("setting", {})
+    if "policy" in setting:
+        setting["policy"] = PurePosixPath(setting["policy"]).name
+    return content
 
 
 def unpack(file: Path, out: Path) -> int:

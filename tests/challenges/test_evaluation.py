@@ -72,6 +72,18 @@ def test_a_table_goes_on_from_one_file_of_its_episodes(worlds: list[Path], tmp_p
     assert not (tmp_path / "episodes").exists()
 
 
+def test_kept_episodes_say_which_policy_played_but_not_where_it_lay(tmp_path: Path) -> None:
+    script = Path(__file__).parents[2] / "benchmarks" / "kept_episodes.py"
+    episode = tmp_path / "out" / "part" / "episodes" / "one.json"
+    episode.parent.mkdir(parents=True)
+    setting = {"policy": "/home/somebody/runs/both", "policy_sha256": "ab12"}
+    episode.write_text(json.dumps({"episode": {"setting": setting}}))
+    words = [sys.executable, script, "pack", tmp_path / "out", tmp_path / "kept.jsonl"]
+    subprocess.run([str(word) for word in words], check=True)
+    row = json.loads((tmp_path / "kept.jsonl").read_text())
+    assert row["content"]["episode"]["setting"] == {"policy": "both", "policy_sha256": "ab12"}
+
+
 def test_a_changed_world_and_a_damaged_episode_are_played_again(worlds: list[Path], tmp_path: Path) -> None:
     asked = jobs(worlds)
     whole = evaluate(TOY, asked, tmp_path / "out")
