@@ -98,6 +98,9 @@ def test_long_walks_are_hardly_longer_than_the_cheapest(seed: int, town: Walkabl
     again = router.path(a, b)
     assert again is not None
     assert np.array_equal(found, again)
+    of_many = router.path(a, b, often=True)
+    assert of_many is not None
+    assert _length(of_many) <= _length(exact) * 1.06 + 20.0
 
 
 def test_short_walks_are_the_cheapest(town: WalkableMap, router: CityRouter) -> None:
@@ -177,12 +180,13 @@ def test_walks_begin_and_end_in_gates_too(town: WalkableMap, router: CityRouter)
     near = min(gates.tolist(), key=lambda cell: cell % n + cell // n)
     ends = [town.centre_of([cell % n, cell // n]) for cell in (near, far)]
     ask = router._ask(None, 0.0, ())
-    found = router._far(ask, near, far)
-    assert found is not None
-    assert (found[0][0], found[0][-1]) == (near, far)
-    assert len(found[0]) == len(found[1])
-    assert (np.diff(found[1]) > 0).all()
-    assert router.path(*ends) is not None
+    for often in (False, True):
+        found = router._far(ask, near, far, often=often)
+        assert found is not None
+        assert (found[0][0], found[0][-1]) == (near, far)
+        assert len(found[0]) == len(found[1])
+        assert (np.diff(found[1]) > 0).all()
+        assert router.path(*ends, often=often) is not None
 
 
 def test_walks_that_need_room_begin_and_end_where_there_is_room(town: WalkableMap, router: CityRouter) -> None:
@@ -212,11 +216,12 @@ def test_exits_are_chosen_by_all_that_is_left_to_go(town: WalkableMap, router: C
         ask = router._ask(None, 0.0, ())
         if ask.tile(a) == ask.tile(b):
             continue
-        walk = router._far(ask, a, b)
+        walk, of_many = (router._far(ask, a, b, often=often) for often in (False, True))
         assert walk is not None
+        assert of_many is not None
         (leave, leaving), (arrive, arriving) = router._to_gates(ask, a), router._to_gates(ask, b)
         starts, ends = leaving >= 0, arriving >= 0
         total = leaving[starts][:, None] + apart[np.ix_(leave[starts], arrive[ends])] + arriving[ends]
-        assert walk[1][-1] == total.min()
+        assert walk[1][-1] == of_many[1][-1] == total.min()
         compared += 1
     assert compared >= 6

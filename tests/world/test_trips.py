@@ -24,7 +24,7 @@ from vico.world.routing import Router
 from vico.world.timetable import LineTimes
 from vico.world.transit_model import BikeStation, Line, Stop, Transit
 from vico.world.trips import MODES, Trip, Trips
-from vico.world.trips.network import AHEAD, ALIGHT, BOARD, DISMOUNT, MOUNT
+from vico.world.trips.model import AHEAD, ALIGHT, BOARD, DISMOUNT, MOUNT
 from vico.world.trips.ways import find_way
 from vico.world.walkable import BLOCKED, OPEN, SIDEWALK, WalkableMap
 
@@ -300,6 +300,17 @@ def test_when_the_bus_is_gone_a_bicycle_is_faster() -> None:
     assert trip is not None
     assert trip.modes == ("walk", "bike", "walk")
     assert trip.price == pytest.approx(ride_price(282 / 3 + DISMOUNT, returned=True))
+
+
+def test_who_has_to_be_there_sets_out_at_the_last_second_where_no_bus_runs() -> None:
+    trips = Trips(FAR)
+    trip = trips.plan(WEST, EAST, EIGHT, modes=("walk", "bike"), arrive_by=EIGHT + 900)
+    late = trips.plan(WEST, EAST, EIGHT, modes=("walk", "bike"))
+    assert trip is not None
+    assert late is not None
+    assert trip.modes == ("walk", "bike", "walk")
+    assert trip.seconds == pytest.approx(late.seconds)
+    assert EIGHT + 899 < trip.arrive <= EIGHT + 900
 
 
 def test_only_the_modes_asked_for_are_used() -> None:

@@ -21,7 +21,7 @@ from vico.world.model import Point2
 from vico.world.timetable import LineTimes, TramTimes
 from vico.world.transit_model import Stop, TramStop, Transit
 from vico.world.trips import AHEAD
-from vico.world.trips.network import ALIGHT, BOARD, DISMOUNT, MOUNT
+from vico.world.trips.model import ALIGHT, BOARD, DISMOUNT, MOUNT
 from vico.world.trips.ways import TURN
 from vico.world.walk_lengths import Walk
 

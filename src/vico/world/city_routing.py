@@ -27,7 +27,7 @@ from vico.world.walkable import WalkableMap
 _NEAR, _AROUND = 800, 300
 # How often a walk is looked for anew where something closed is in the way of the last.
 _TRIES = 40
-# Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks that begin at a gate, 8 a cell.
+# Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks to or from a gate, 8 a cell.
 _ENDS, _LEGS = 8192, 8192
 # Windows after which the memory that the map is read into is given back: some 6 MB each at 400 m a tile.
 _WINDOWS = 16
@@ -78,6 +78,7 @@ class CityRouter(Router):
         blocked: NDArray[np.bool_] | None = None,
         closed: Sequence[tuple[float, float, float]] = (),
         room: float = 0.0,
+        often: bool = False,
     ) -> NDArray[np.float64] | None:
         """Find a walk; as `Router.path`."""
         a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
@@ -86,7 +87,7 @@ class CityRouter(Router):
             first, last = (self._end_near(ask, point) for point in (a, b))
             if first < 0 or last < 0:
                 return None
-            walk = self._near(ask, first, last) or self._far(ask, first, last)
+            walk = self._near(ask, first, last) or self._far(ask, first, last, often=often)
             if walk is None:
                 return None
             shut = self._shut if blocked is None else blocked | self._shut
@@ -140,27 +141,28 @@ class CityRouter(Router):
                 found |= {(row, k) for k in range(columns.start // self._side, (columns.stop - 1) // self._side + 1)}
         return found
 
-    def _far(self, ask: _Ask, first: int, last: int) -> tuple[Ints, Ints] | None:
+    def _far(self, ask: _Ask, first: int, last: int, *, often: bool) -> tuple[Ints, Ints] | None:
         """Look for a walk from gate to gate; where what is closed makes one dearer than it was, anew."""
         leaving, arriving = self.graph.of_tile(ask.tile(first)), self._to_gates(ask, last)
-        window = ask.window(ask.square(first))
         changed: dict[tuple[int, int], int] = {}
         for attempt in range(_TRIES):
             onward = self.graph.onward(first, leaving, arriving, changed)
             # From others the way leads to one of these.
             exits = leaving[(onward.cost[leaving] >= 0) & ~np.isin(onward.then[leaving], leaving)]
             begun = None
-            if attempt == 0:
+            if attempt == 0 and not often:
+                window = ask.window(ask.square(first))
                 begun = window.walk_out(first, self.graph.cells[exits], onward.cost[exits])
                 gate = -1 if begun is None else int(np.searchsorted(self.graph.cells, begun[0][-1]))
             else:
-                # Where the first is not the cheapest others often aren't: what all of them cost is found once.
+                # Where the first is not the cheapest others often aren't: what all of them cost is found once, as it
+                # is for a cell where many walks begin.
                 gate = self._cheapest_exit(ask, first, exits, onward.cost[exits])
             if gate < 0:
                 return None
             walk = self._from_gate(ask, onward.gates(gate), last, changed)
             if walk is not None:
-                begun = begun or window.walk(first, int(self.graph.cells[gate]))
+                begun = begun or self._leg(ask, first, int(self.graph.cells[gate]))
                 assert begun is not None
                 # Of a walk that begins at a gate nothing is left here.
                 (cells, costs), (more, dearer) = begun, walk
@@ -210,7 +212,7 @@ class CityRouter(Router):
         return gates, known
 
     def _leg(self, ask: _Ask, a: int, b: int) -> tuple[Ints, Ints] | None:
-        """Return the walk from a gate to another cell of its tile, and keep it for others."""
+        """Return the walk from a cell to another of its tile, one of them a gate, and keep it for others."""
         if not ask.is_usual(a):
             return ask.window(ask.square(a)).walk(a, b)
         known = self._legs.get((ask.room, a, b))

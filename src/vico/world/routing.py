@@ -125,6 +125,7 @@ class Router:
         blocked: NDArray[np.bool_] | None = None,
         closed: Sequence[tuple[float, float, float]] = (),
         room: float = 0.0,
+        often: bool = False,
     ) -> NDArray[np.float64] | None:
         """Find a walk that prefers sidewalks and crossings and keeps 0.3 m from walls, and off kerbs' edges if it can.
 
@@ -140,6 +141,9 @@ class Router:
         room
             Metres to walls and to the map's edge at corners and ends of the walk, for what needs them to turn; straight
             on it leads through narrower places, too.
+        often
+            Whether many walks begin and end at these very points: the router of a city keeps what it finds around them.
+            Of walks that cost the same it may be another one.
 
         Returns
         -------

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.commute.stops import nearest
-from vico.rules import BIKE_SPEED, WALK_SPEED, ride_price
+from vico.rules import BIKE_SPEED, BUS_FARE, WALK_SPEED, ride_price
 from vico.world.model import Point2
 from vico.world.public import PublicMap
 from vico.world.transit_model import BikeStation
-from vico.world.trips.model import Leg, Trip
-from vico.world.trips.network import DISMOUNT, MOUNT, TripNetwork
+from vico.world.trips.model import DISMOUNT, MOUNT, Leg, Trip
+from vico.world.trips.network import TripNetwork
 from vico.world.trips.ways import Way, find_way
 
 # Ways that are kept; more are found anew.
@@ -79,7 +79,7 @@ class LegMaker:
         if not rides:
             return None
         ride = min(rides, key=lambda ride: (ride.arrive, ride.line))
-        points = self._network.bus_stops_between(ride)
+        points = self._network.bus_stops_between(ride.line, ride.first, ride.last)
         metres = sum(math.dist(a, b) for a, b in pairwise(points))
         times = lines[ride.line]
         return Leg(
@@ -90,7 +90,7 @@ class LegMaker:
             ride.depart,
             ride.arrive,
             metres,
-            price=ride.price,
+            price=BUS_FARE,
             line=times.line.id,
             origin=origin,
             destination=destination,

@@ -48,6 +48,7 @@ def run_record(
 def agents_record(sim: Simulation) -> list[dict[str, Any]]:
     """Return what ``agents.json`` says of each agent."""
     people, robots = sim.state.people, sim.state.robots
+    places = {place.id: place.name for place in sim.world.places}
     found: list[dict[str, Any]] = []
     for i, name in enumerate(people.names):
         person = sim.residents[i] if i < len(sim.residents) else None
@@ -57,7 +58,7 @@ def agents_record(sim: Simulation) -> list[dict[str, Any]]:
                 "kind": "assistant" if person is None else "resident",
                 "entity": int(people.entity[i]),
                 "resident": None if person is None else person.id,
-                "person": None if person is None else _person(person, sim.looks[i], sim),
+                "person": None if person is None else _person(person, sim.looks[i], places),
             }
         )
     if robots is not None:
@@ -99,7 +100,10 @@ def _models_of(sim: Simulation) -> dict[int, str]:
 def describer(sim: Simulation) -> Callable[[int], dict[str, Any]]:
     """Return what tells an entity's name, whose body it is, which pedestrian and which model, as the cast says it."""
     models = _Models(sim)
-    agents = {agent["entity"]: agent["name"] for agent in agents_record(sim)}
+    people, robots = sim.state.people, sim.state.robots
+    agents = dict(zip(people.entity.tolist(), people.names, strict=True))
+    if robots is not None:
+        agents |= dict(zip(robots.bodies().entity.tolist(), robots.names, strict=True))
     walkers = sim.state.traffic.walkers.entity.tolist() if sim.state.traffic is not None else []
     pedestrians = {entity: k for k, entity in enumerate(walkers)}
 
@@ -151,8 +155,7 @@ def _is_names(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
-def _person(resident: Any, look: Appearance, sim: Simulation) -> dict[str, Any]:
-    places = {place.id: place.name for place in sim.world.places}
+def _person(resident: Any, look: Appearance, places: Mapping[str, str]) -> dict[str, Any]:
     return {
         "name": resident.name,
         "age": resident.age,

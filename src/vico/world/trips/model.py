@@ -12,6 +12,11 @@ from vico.world.model import Point2
 #: Ways to get about.
 MODES = ("walk", "bus", "tram", "bike")
 
+#: Seconds that each takes: getting into a bus, out of it, on and off a bicycle. An agent acts once a second.
+BOARD = ALIGHT = MOUNT = DISMOUNT = 1.0
+#: Who boards on the way has to be there so many seconds before the bus is due to leave: it may be early by as much.
+AHEAD = 10.0
+
 #: Something out of use: the id of a line, a stop or a bicycle station, or a circle of ground: x, y, radius, metres.
 Closure = str | tuple[float, float, float]
 

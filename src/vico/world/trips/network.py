@@ -3,48 +3,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vico.rules import BIKE_SPEED, BUS_FARE, ride_price
+from vico.rules import BIKE_SPEED
 from vico.world.model import Point2
 from vico.world.timetable import LineTimes, TramTimes
 from vico.world.transit_model import Stop, TramStop, Transit
-
-#: Seconds that each takes: getting into a bus, out of it, on and off a bicycle. An agent acts once a second.
-BOARD = ALIGHT = MOUNT = DISMOUNT = 1.0
-#: Who boards on the way has to be there so many seconds before the bus is due to leave: it may be early by as much.
-AHEAD = 10.0
+from vico.world.trips.labels import Timetable, ride_along
 
 
 class Ride(NamedTuple):
-    """A ride one may take.
+    """A ride by bus or tram.
 
     Attributes
     ----------
     to
         Node where it ends.
     depart, arrive
-        When the bus leaves or one gets on the bicycle, and when one is off again; seconds.
-    price
-        What it costs.
+        When the bus leaves, and when one is off again; seconds.
     line
-        Number of the bus line, -1 for a bicycle.
+        Number of the line.
     first, last
-        Of a bus ride the indices among the line's stops where it begins and ends (counted on past the last stop).
+        The indices among the line's stops where it begins and ends (counted on past the last stop).
     """
 
     to: int
     depart: float
     arrive: float
-    price: float
     line: int
-    first: int = 0
-    last: int = 0
+    first: int
+    last: int
 
 
 @dataclass(frozen=True)
@@ -120,31 +115,41 @@ class TripNetwork:
     def __len__(self) -> int:
         return len(self.ids)
 
+    @cached_property
+    def timetable(self) -> Timetable:
+        """When what runs, as arrays."""
+        travel = [times.line.travel[: len(times.line.stops) + times.round] for times in self.lines]
+        nodes = [[self._number.get(stop, -1) for stop in times.line.stops] for times in self.lines]
+        departures = [
+            times.departures if isinstance(times, LineTimes) else times.line.departures for times in self.lines
+        ]
+        return Timetable(
+            calls=np.array([call for calls in self._calls for call in calls], np.int64).reshape(-1, 2),
+            first_call=_begins(self._calls),
+            first_stop=_begins(nodes),
+            nodes=np.array([node for of_line in nodes for node in of_line], np.int64),
+            first_time=_begins(travel),
+            travel=np.array([second for of_line in travel for second in of_line], np.float64),
+            first_departure=_begins(departures),
+            departures=np.array([second for of_line in departures for second in of_line], np.float64),
+            buses=np.array([times.buses if isinstance(times, LineTimes) else 0 for times in self.lines], np.int64),
+            gives=np.array([k in self.stations and self.stations[k].gives for k in range(len(self))], np.bool_),
+            takes=self.returnable,
+            boardable=self.boardable,
+        )
+
     def bus_rides(self, node: int, ready: float) -> Iterator[Ride]:
         """Yield the rides with the next bus or tram of every line that stops at a node, for who is there at `ready`."""
-        for number, k in self._calls[node]:
-            times = self.lines[number]
-            stops = times.line.stops
-            n = len(stops)
-            waits = times.round and k == 0
-            turn = times.next_round(k, ready + BOARD + (0.0 if waits else AHEAD))
-            leaves, onward = times.leaves(turn, k), times.leaves(turn, n) if times.round else 0.0
-            for last in range(k + 1, k + n if times.round else n):
-                to = self._number.get(stops[last % n])
-                # At the end of its round the bus stands at the first stop until its next departure.
-                arrives = times.arrives(turn, last) if last <= n else onward + times.line.travel[last - n]
-                if to is not None and to != node:
-                    yield Ride(to, leaves, arrives + ALIGHT, BUS_FARE, number, k, last)
+        rides = np.empty((len(self.timetable.nodes), 3))
+        for call in range(*self.timetable.first_call[node : node + 2].tolist()):
+            first, leaves, count = ride_along(self.timetable, call, ready, rides)
+            for to, arrive, last in rides[:count].tolist():
+                yield Ride(int(to), leaves, arrive, int(self.timetable.calls[call, 0]), first, int(last))
 
-    def bike_ride(self, to: int, ready: float, seconds: float) -> Ride:
-        """Return the ride to a station that takes `seconds` on the way, for who stands by a bicycle at `ready`."""
-        arrive = ready + MOUNT + seconds + DISMOUNT
-        return Ride(to, ready, arrive, round(ride_price(seconds + DISMOUNT, returned=True), 2), -1)
-
-    def bus_stops_between(self, ride: Ride) -> list[Point2]:
+    def bus_stops_between(self, line: int, first: int, last: int) -> list[Point2]:
         """Return the points of the stops that a bus ride calls at, its own two included; closed ones are left out."""
-        stops = self.lines[ride.line].line.stops
-        called = (stops[k % len(stops)] for k in range(ride.first, ride.last + 1))
+        stops = self.lines[line].line.stops
+        called = (stops[k % len(stops)] for k in range(first, last + 1))
         return [self.points[self._number[stop]] for stop in called if stop in self._number]
 
     def _fastest_bus(self) -> float:
@@ -160,3 +165,8 @@ class TripNetwork:
             for (a, start), (b, end) in pairwise(known):
                 fastest = max(fastest, math.dist(a, b) / (end - start) if end > start else math.inf)
         return fastest
+
+
+def _begins(parts: Sequence[Sequence[object]]) -> NDArray[np.int64]:
+    """Return where each part begins among all, and how many there are."""
+    return np.cumsum([0, *map(len, parts)], dtype=np.int64)

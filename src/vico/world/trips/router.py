@@ -15,10 +15,11 @@ from vico.rules import WALK_SPEED
 from vico.world.model import Point2
 from vico.world.routing import Router
 from vico.world.transit_model import Transit
+from vico.world.trips.labels import BY_BICYCLE, ON_FOOT
 from vico.world.trips.model import MODES, Closure, Leg, Trip
 from vico.world.trips.network import TripNetwork
-from vico.world.trips.search import Label, Question, best_trips
-from vico.world.trips.ways import Way, Ways
+from vico.world.trips.search import Question, Step, best_trips
+from vico.world.trips.ways import KnownWays, Ways
 
 
 class TripEnd(Protocol):
@@ -52,10 +53,11 @@ class Trips:
         self.router = place.router
         self.transit = place.transit
         self.walk_speed = walk_speed
-        self._kept: dict[str, dict[str, Way]] = {}
         self._networks: dict[tuple[bool, bool, bool], TripNetwork] = {}
         t = self.transit
-        self._known = {r.id for part in (t.stops, t.lines, t.bike_stations, t.tram_stops, t.tram_lines) for r in part}
+        self._ends = [record.id for part in (t.stops, t.tram_stops, t.bike_stations) for record in part]
+        self._lines = {line.id for part in (t.lines, t.tram_lines) for line in part}
+        self._ways = KnownWays(self._ends, walk_speed)
 
     def plan(
         self,
@@ -106,7 +108,7 @@ class Trips:
         best = found[0]
         if not question.network.lines:
             # Without buses all trips take as long whenever one leaves.
-            low = max(0, math.floor(arrive_by - best.arrive) - 1)
+            low = max(0, math.floor(arrive_by - best[-1].arrive) - 1)
             high = min(high, low + 2)
             best = best_trips(question, depart + low)[0]
         while low < high:
@@ -153,21 +155,18 @@ class Trips:
         if unknown := set(modes) - set(MODES):
             raise InputError(f"trips: mode {sorted(unknown)[0]!r} is not known; there are {', '.join(MODES)}")
         ids = {closure for closure in closed if isinstance(closure, str)}
-        if unknown := ids - self._known:
+        if unknown := ids - self._lines - set(self._ends):
             raise InputError(
                 f"trips: nothing is called {sorted(unknown)[0]!r}; close a line, a stop or a station by its id"
             )
         network = self._network(ids, buses="bus" in modes, bikes="bike" in modes, trams="tram" in modes)
         circles = [closure for closure in closed if not isinstance(closure, str)]
         ends = [_point(start), _point(goal)]
-        ways = Ways(
-            self.router,
-            [*network.points, *ends],
-            [*network.ids, None, None],
-            self._kept,
-            walk_speed=self.walk_speed,
-            blocked=self.router.walkable.cells_within(circles) if circles else None,
-        )
+        blocked = self.router.walkable.cells_within(circles) if circles else None
+        # Ways around what is closed are those of this question alone.
+        known = self._ways if blocked is None else KnownWays(self._ends, self.walk_speed)
+        place = np.array([known.number[name] for name in network.ids], np.int64)
+        ways = Ways(self.router, [*network.points, *ends], place, known, blocked=blocked)
         return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good=all_good)
 
     def _network(self, closed: set[str], *, buses: bool, bikes: bool, trams: bool) -> TripNetwork:
@@ -177,26 +176,21 @@ class Trips:
             self._networks[buses, bikes, trams] = TripNetwork(self.transit, buses=buses, bikes=bikes, trams=trams)
         return self._networks[buses, bikes, trams]
 
-    def _trip(self, question: Question, last: Label, depart: float) -> Trip:
-        legs = [
-            self._leg(question, label) for label in last.chain() if label.parent and label.parent.node != label.node
-        ]
-        return Trip(depart, tuple(legs))
+    def _trip(self, question: Question, steps: list[Step], depart: float) -> Trip:
+        return Trip(depart, tuple(self._leg(question, step) for step in steps if step.origin != step.to))
 
-    def _leg(self, question: Question, label: Label) -> Leg:
-        network, ways, ride = question.network, question.ways, label.step
-        assert label.parent is not None
-        a, b = label.parent.node, label.node
-        start, end = ways.points[a], ways.points[b]
-        if ride.line == -2:
-            way = ways.way(a, b)
-            return Leg("walk", start, end, way.path, label.parent.arrive, label.arrive, way.metres)
-        if ride.line == -1:
-            way = ways.way(a, b)
+    def _leg(self, question: Question, step: Step) -> Leg:
+        network, ways = question.network, question.ways
+        start, end = ways.points[step.origin], ways.points[step.to]
+        if step.line == ON_FOOT:
+            way = ways.way(step.origin, step.to)
+            return Leg("walk", start, end, way.path, step.depart, step.arrive, way.metres)
+        if step.line == BY_BICYCLE:
+            way = ways.way(step.origin, step.to)
             path, metres, line, mode = way.path, way.metres, None, "bike"
         else:
-            path = np.array(network.bus_stops_between(ride), np.float64)
-            times = network.lines[ride.line]
+            path = np.array(network.bus_stops_between(step.line, step.first, step.last), np.float64)
+            times = network.lines[step.line]
             metres, line = float(np.hypot(*np.diff(path, axis=0).T).sum()), times.line.id
             mode = "bus" if times.round else "tram"
         return Leg(
@@ -204,13 +198,13 @@ class Trips:
             start,
             end,
             path,
-            ride.depart,
-            ride.arrive,
+            step.depart,
+            step.arrive,
             metres,
-            price=ride.price,
+            price=step.price,
             line=line,
-            origin=network.ids[a],
-            destination=network.ids[b],
+            origin=network.ids[step.origin],
+            destination=network.ids[step.to],
         )
 
 

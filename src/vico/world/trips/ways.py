@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from vico.rules import BIKE_SPEED
 from vico.world.model import Point2
 from vico.world.routing import Router
+from vico.world.trips.labels import Ground, bee_lines
 
 #: Seconds that a corner costs: an agent that turns does not go on in the same second.
 TURN = 1.0
@@ -41,26 +43,67 @@ class Way(NamedTuple):
 NO_WAY = Way(np.zeros((0, 2)), math.inf)
 
 
-def find_way(router: Router, start: Point2, goal: Point2, blocked: NDArray[np.bool_] | None = None) -> Way:
-    """Return the way between two points; `NO_WAY` if there is none."""
-    path = router.path(start, goal, blocked=blocked)
+def find_way(
+    router: Router, start: Point2, goal: Point2, blocked: NDArray[np.bool_] | None = None, *, often: bool = False
+) -> Way:
+    """Return the way between two points; `NO_WAY` if there is none. Parameters are those of `Router.path`."""
+    path = router.path(start, goal, blocked=blocked, often=often)
     if path is None:
         return NO_WAY
     return Way(path, round(float(np.hypot(*np.diff(path, axis=0).T).sum()), 3))
 
 
-class From(NamedTuple):
-    """Ways from one point to each.
+class KnownWays:
+    """The ways between the stops and stations of a place that were found so far; threads may share it.
+
+    Parameters
+    ----------
+    names
+        Of the stops and stations.
+    walk_speed
+        Metres a second on foot.
 
     Attributes
     ----------
-    metres, walk, ride
-        Metres, seconds on foot and by bicycle, float64; lower bounds until a way is known.
+    number
+        Of each name, in their order.
     """
 
-    metres: NDArray[np.float64]
-    walk: NDArray[np.float64]
-    ride: NDArray[np.float64]
+    def __init__(self, names: Sequence[str], walk_speed: float) -> None:
+        self.number = {name: k for k, name in enumerate(names)}
+        self.walk_speed = walk_speed
+        self._ways: dict[tuple[int, int], Way] = {}
+        self._row = np.full(len(names), -1, np.int64)
+        self._known = np.full((1, len(names), 3), np.nan)
+        self._lock = Lock()
+
+    def get(self, a: int, b: int) -> Way | None:
+        """Return the way from one to another, by number; None if it is not known."""
+        return self._ways.get((a, b))
+
+    def keep(self, a: int, b: int, way: Way) -> Way:
+        """Keep a way from one to another, and return it; or the one that is known already."""
+        with self._lock:
+            if (a, b) not in self._ways:
+                row = self._row[a]
+                if row < 0:
+                    row = self._row.max() + 1
+                    if row == len(self._known):
+                        self._known = np.concatenate([self._known, np.full_like(self._known, np.nan)])
+                    self._row[a] = row
+                self._known[row, b] = measures(way, self.walk_speed)
+                self._ways[a, b] = way
+            return self._ways[a, b]
+
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return the row of each of the known ways from there, -1 without any, and the measures by row and number."""
+        with self._lock:
+            return self._row, self._known
+
+
+def measures(way: Way, walk_speed: float) -> tuple[float, float, float]:
+    """Return a way's metres, and its seconds on foot and by bicycle."""
+    return way.metres, way.seconds(walk_speed), way.seconds(BIKE_SPEED)
 
 
 class Ways:
@@ -71,94 +114,61 @@ class Ways:
     router
         Finds them.
     points
-        ENU metres; the last one is the goal.
-    names
-        A name for each point under which its ways are kept for later; None for points nobody will come back to.
-    kept
-        Ways by the name of where they begin, then where they end, shared between searches.
-    walk_speed
-        Metres a second on foot.
+        ENU metres: of stops and stations, then of the start and the goal.
+    place
+        Numbers of the stops and stations among the known ways, int64.
+    known
+        Ways that are known; those found are kept there.
     blocked
-        Cells that are closed, as for `Router.path`; ways around them are not kept.
-
-    Attributes
-    ----------
-    bee_line
-        Metres that a way from each point to the goal has at least.
+        Cells that are closed, as for `Router.path`.
     """
 
     def __init__(
         self,
         router: Router,
         points: Sequence[Point2],
-        names: Sequence[str | None],
-        kept: dict[str, dict[str, Way]],
+        place: NDArray[np.int64],
+        known: KnownWays,
         *,
-        walk_speed: float,
         blocked: NDArray[np.bool_] | None = None,
     ) -> None:
         self.points = list(points)
-        self.walk_speed = walk_speed
-        self._router, self._names, self._kept, self._blocked = router, list(names), kept, blocked
-        self._xy = np.array(self.points, np.float64).reshape(-1, 2)
-        sure = router.walkable.is_connected(self._xy) if blocked is None else np.zeros(len(self._xy), bool)
-        self._off = np.where(sure, 0.0, _SNAP)
-        self._to_goal = self._bounds(len(self.points) - 1)
-        self.bee_line: list[float] = self._to_goal.tolist()
-        self._number = {name: k for k, name in enumerate(self._names) if name is not None}
-        self._from: dict[int, From] = {}
-        self._found: dict[tuple[int, int], Way] = {}
+        self.walk_speed = known.walk_speed
+        self._router, self._place, self._known, self._blocked = router, place, known, blocked
+        xy = np.array(self.points, np.float64).reshape(-1, 2)
+        sure = router.walkable.is_connected(xy) if blocked is None else np.zeros(len(xy), bool)
+        off = np.where(sure, 0.0, _SNAP)
+        self._own: dict[tuple[int, int], Way] = {}
+        of_start, of_goal = np.full((2, len(xy), 3), np.nan)
+        self._ground = Ground(xy, off, place, *known.arrays(), of_start, of_goal, bee_lines(xy, off, len(xy) - 1))
 
-    def leaving(self, a: int) -> From:
-        """Return the ways from a point, made when they are first asked for: there are many points in a large city."""
-        if a not in self._from:
-            metres = self._bounds(a)
-            self._from[a] = From(metres, metres / self.walk_speed, metres / BIKE_SPEED)
-            name = self._names[a]
-            if self._blocked is None and name is not None:
-                # A copy: another thread may find a way meanwhile.
-                for other, way in self._kept.get(name, {}).copy().items():
-                    b = self._number.get(other)
-                    if b is not None:
-                        self._note(a, b, way)
-        return self._from[a]
-
-    def reached(
-        self, a: int, points: NDArray[np.int64], seconds: float, top_speed: float, *, by_bicycle: bool = False
-    ) -> list[int]:
-        """Return to which of some points one may go and still be at the goal in a time, at a speed from there on.
-
-        No point is missing for want of a known way; a hundredth of a second is left for rounding.
-        """
-        row = self.leaving(a)
-        there = (row.ride if by_bicycle else row.walk)[points] + self._to_goal[points] / top_speed
-        found: list[int] = points[there <= seconds + 0.01].tolist()
-        return found
-
-    def _bounds(self, a: int) -> NDArray[np.float64]:
-        """Return metres that ways between a point and each have at least."""
-        away = np.hypot(*(self._xy - self._xy[a]).T)
-        # A little below, so that rounding makes no bound too high.
-        return np.maximum(away - self._off - self._off[a] - 0.02, 0.0)
+    @property
+    def ground(self) -> Ground:
+        """What is known of them now."""
+        row, known = self._known.arrays()
+        return self._ground._replace(row=row, known=known)
 
     def known(self, a: int, b: int) -> bool:
         """Whether the way is known, and not a bound."""
-        self.leaving(a)
-        return (a, b) in self._found
+        return self._get(a, b) is not None
 
     def way(self, a: int, b: int) -> Way:
         """Return the way from one point to another, finding it if need be."""
-        if (a, b) not in self._found:
-            way = find_way(self._router, self.points[a], self.points[b], self._blocked)
-            first, second = self._names[a], self._names[b]
-            if self._blocked is None and first is not None and second is not None:
-                way = self._kept.setdefault(first, {}).setdefault(second, way)
-            self._note(a, b, way)
-        return self._found[a, b]
+        if (way := self._get(a, b)) is not None:
+            return way
+        start, goal = len(self.points) - 2, len(self.points) - 1
+        between = a < start and b < start
+        way = find_way(self._router, self.points[a], self.points[b], self._blocked, often=between)
+        if between:
+            return self._known.keep(int(self._place[a]), int(self._place[b]), way)
+        self._own[a, b] = way
+        if a == start:
+            self._ground.of_start[b] = measures(way, self.walk_speed)
+        if b == goal:
+            self._ground.of_goal[a] = measures(way, self.walk_speed)
+        return way
 
-    def _note(self, a: int, b: int, way: Way) -> None:
-        self._found[a, b] = way
-        row = self.leaving(a)
-        row.metres[b] = way.metres
-        row.walk[b] = way.seconds(self.walk_speed)
-        row.ride[b] = way.seconds(BIKE_SPEED)
+    def _get(self, a: int, b: int) -> Way | None:
+        if max(a, b) < len(self.points) - 2:
+            return self._known.get(int(self._place[a]), int(self._place[b]))
+        return self._own.get((a, b))
