@@ -195,12 +195,18 @@ def _picture(material: Material) -> tuple[bytes, str] | None:
     """Return a material's texture as a file, and that file's type."""
     if material.texture is None:
         return None
-    packed = io.BytesIO()
     if material.photo and material.texture.shape[2] == 3:
+        packed = io.BytesIO()
         Image.fromarray(material.texture).save(packed, "JPEG", quality=_PHOTO_QUALITY, optimize=True)
         return packed.getvalue(), "image/jpeg"
-    Image.fromarray(material.texture).save(packed, "PNG", compress_level=_PNG_LEVEL)
-    return packed.getvalue(), "image/png"
+    return material.png or packed_png(material.texture), "image/png"
+
+
+def packed_png(texture: NDArray[np.uint8]) -> bytes:
+    """Return a texture as the PNG file that a glTF file holds."""
+    packed = io.BytesIO()
+    Image.fromarray(texture).save(packed, "PNG", compress_level=_PNG_LEVEL)
+    return packed.getvalue()
 
 
 def _material_entry(

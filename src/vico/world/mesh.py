@@ -36,6 +36,8 @@ class Material:
         Drawn from behind too.
     photo
         A photo: kept as JPEG in files, which loses detail nobody sees and a tenth of the bytes remain.
+    png
+        The texture as a PNG file, where it has been packed already.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Material:
     emission: float = 0.0
     double_sided: bool = False
     photo: bool = False
+    png: bytes | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from vico.seeds import rng
 from vico.world.mesh import Material
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER
 from vico.worldgen.facts.street_habits import Paving
+from vico.worldgen.kept_textures import Painters
 from vico.worldgen.texture_canvas import Canvas, periodic_noise
 
 Rgb = tuple[int, int, int]
@@ -403,8 +404,11 @@ _PAINTERS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "ground_blocks": _stone_blocks,
 }
 
+_PAINTED = Painters(__file__, __name__)
+
 
 @cache
 def ground_material(name: str) -> Material:
-    """Paint the ground material of that name."""
-    return Material(name, _PAINTERS[name](rng(0, "ground", name)))
+    """Return the ground material of that name."""
+    texture, png = _PAINTED.picture(name, lambda: _PAINTERS[name](rng(0, "ground", name)))
+    return Material(name, texture, png=png)

@@ -19,6 +19,8 @@ from vico.worldgen.facades.textures.block_walls import UPPER_FLOORS
 from vico.worldgen.facades.textures.doors import paint_doors
 from vico.worldgen.facades.textures.ground_floors import GROUNDS
 from vico.worldgen.facades.textures.trims import HOLED, TRIMS
+from vico.worldgen.facades.textures.windows import windows_digest
+from vico.worldgen.kept_textures import Painters
 from vico.worldgen.texture_canvas import Canvas, blocks, bricks, plaster
 
 # ------------------------------------------------------------------------------------------------ blank walls, roofs
@@ -149,10 +151,15 @@ PAINTERS: dict[str, Callable[[np.random.Generator], NDArray[np.uint8]]] = {
 }
 
 
+_PAINTED = Painters(__file__, __name__)
+
+
 def material(name: str, seed: int = 0) -> Material:
     """Return the material of that name: same name and seed, same picture; what has lit texels shines at night."""
-    painter = PAINTERS.get(name) or PAINTERS[styles().families[name].picture]
-    texture = painter(rng(seed, "texture", name))
+    picture = name if name in PAINTERS else styles().families[name].picture
+    texture, png = _PAINTED.picture(
+        f"{name} {picture} {seed}", lambda: PAINTERS[picture](rng(seed, "texture", name)), data=windows_digest()
+    )
     holed = name in HOLED
     emission = 1.0 if texture.shape[2] == 4 and not holed else 0.0
-    return Material(name, texture, cutout=holed, emission=emission, double_sided=name.startswith("rail_"))
+    return Material(name, texture, cutout=holed, emission=emission, double_sided=name.startswith("rail_"), png=png)

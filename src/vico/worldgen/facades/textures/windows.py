@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,12 @@ def window_style(name: str, **changes: Any) -> WindowStyle:
 def _styles() -> dict[str, WindowStyle]:
     files = [read_record(path, WindowsFile) for path in data_files(ROOM, "windows")]
     return {window.name: window for file in files for window in file.window}
+
+
+@cached_data
+def windows_digest() -> str:
+    """Return a digest of the files of windows, the user's among them."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in data_files(ROOM, "windows"))).hexdigest()
 
 
 # Light of a pane with no lamp on behind it, of 255: too little to be seen; it tells glass from wall.
