@@ -1,3 +1,5 @@
+import gc
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,6 +57,25 @@ def test_equal_vertices_are_written_once_and_no_corner_changes(
         np.testing.assert_array_equal(was, is_)
     if count >= 256:
         assert len(back.positions) <= kinds
+
+
+def test_files_of_the_same_pictures_share_them_while_they_are_in_use(tmp_path: Path) -> None:
+    picture = rng(2, "picture").integers(0, 256, (16, 32, 4)).astype(np.uint8)
+    for name, seed in (("a", 1), ("b", 2)):
+        surface = replace(whole(patchwork(60, 50, seed)), material=Material(f"wall {name}", picture))
+        write_glb(tmp_path / f"{name}.glb", {"all": [surface]})
+    pictures = [read_glb(tmp_path / f"{name}.glb")["all"][0].material.texture for name in "ab"]
+    assert pictures[0] is not None
+    assert np.array_equal(pictures[0], picture)
+    (first,) = read_glb(tmp_path / "a.glb")["all"]
+    (second,) = read_glb(tmp_path / "b.glb")["all"]
+    assert first.material.texture is second.material.texture is not None
+    with pytest.raises(ValueError, match="read-only"):
+        first.material.texture[0, 0] = 0
+    gone = weakref.ref(first.material.texture)
+    del first, second, pictures
+    gc.collect()
+    assert gone() is None
 
 
 def test_small_surfaces_have_short_indices(tmp_path: Path) -> None:

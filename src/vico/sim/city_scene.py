@@ -174,6 +174,7 @@ class CityRenderer:
             scene = SceneRenderer(self._sim, detail=self._detail, part=part)
             scene.remember(self._glances.pop(where, {}))
             part.world.forget()
+            self._city.drop_pages()
             for other in self._scenes.values():
                 other.scene.share_textures(scene.scene)
         self._scenes[where] = scene

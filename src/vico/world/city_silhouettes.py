@@ -51,6 +51,7 @@ class CitySilhouettes:
     def __init__(self, city: City) -> None:
         self._city = city
         self._known: dict[tuple[int, int], list[Surface]] = {}
+        self._pictures: list[NDArray[np.uint8]] = []
 
     def beyond(self, tiles: Collection[tuple[int, int]], reach: int) -> list[Surface]:
         """Return the silhouettes of all tiles but some, so many columns or rows beyond these at most.
@@ -70,6 +71,7 @@ class CitySilhouettes:
         for place in self._around:
             if is_seen(*place):
                 found += self._beyond_edge(place)
+        self._pictures.clear()
         return found
 
     @cached_property
@@ -128,7 +130,10 @@ class CitySilhouettes:
         path = cache_folder() / "silhouettes" / f"{tile.digest[:32]}.{_VERSION}.npz"
         known = _read(path)
         if known is None:
-            known = silhouette_of(self._city.world((tile.column, tile.row)))
+            world = self._city.world((tile.column, tile.row))
+            known = silhouette_of(world)
+            # The next tile has most of these, too: as long as they are here they need not be decoded again.
+            self._pictures = world.textures()
             try:
                 _write(path, known)
             except OutputError as error:

@@ -10,8 +10,10 @@ import json
 import struct
 from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,6 +260,21 @@ def read_glb(path: Path, *, only: str | None = None) -> dict[str, list[Surface]]
         raise SchemaError(f"{path}: not a readable GLB ({error}); build the world anew") from None
 
 
+# Pictures that somebody has, by the digest of their file: files of many tiles hold the same facades.
+_DECODED: WeakValueDictionary[bytes, NDArray[np.uint8]] = WeakValueDictionary()
+
+
+def _decoded(packed: memoryview) -> NDArray[np.uint8]:
+    """Return the picture of a PNG or JPEG file, not writable; the same one as long as somebody has it."""
+    key = blake2b(packed, digest_size=16).digest()
+    picture = _DECODED.get(key)
+    if picture is None:
+        picture = np.asarray(Image.open(io.BytesIO(packed)))
+        picture.flags.writeable = False
+        _DECODED[key] = picture
+    return picture
+
+
 def _surfaces_of(document: dict[str, Any], binary: memoryview, only: str | None = None) -> dict[str, list[Surface]]:
     types: dict[int, np.dtype[Any]] = {
         _FLOAT: np.dtype(np.float32),
@@ -285,7 +302,7 @@ def _surfaces_of(document: dict[str, Any], binary: memoryview, only: str | None 
         pixels, photo = None, False
         if texture is not None:
             image = document["images"][document["textures"][texture["index"]]["source"]]
-            pixels = np.asarray(Image.open(io.BytesIO(bytes_of(image["bufferView"]))))
+            pixels = _decoded(bytes_of(image["bufferView"]))
             photo = image.get("mimeType") == "image/jpeg"
         return Material(
             entry["name"],

@@ -8,6 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vico.errors import MissingFileError
 from vico.geo.frame import LocalFrame
 from vico.io.files import sha256_of
@@ -178,6 +181,11 @@ class World:
             nodes = read_glb(self._mesh(layer))
             self._layers[layer] = [surface for surfaces in nodes.values() for surface in surfaces]
         return self._layers[layer]
+
+    def textures(self) -> list[NDArray[np.uint8]]:
+        """Return the textures of the layers that were read so far."""
+        pictures = (surface.material.texture for layer in self._layers.values() for surface in layer)
+        return [picture for picture in pictures if picture is not None]
 
     def geometry(self, layer: str, material: str) -> list[Surface]:
         """Return the meshes of a layer that are of one material, without its texture; none of a world without any."""
