@@ -51,7 +51,8 @@ OPEN = {"viewer", "cli"}  # and the front door, api.py
 SHARED = {
     "facts": set(),
     "texture_canvas": set(),
-    "facades": {"facts", "texture_canvas"},
+    "kept_textures": set(),
+    "facades": {"facts", "texture_canvas", "kept_textures"},
 }
 
 
