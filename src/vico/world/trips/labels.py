@@ -42,10 +42,7 @@ LABEL = np.dtype(
         ("first", np.int32),  # indices among the line's stops, counted on past the last
         ("last", np.int32),
         ("steps", np.int32),  # from the start
-        (
-            "walked",
-            np.bool_,
-        ),  # one came on foot, to board or at the goal; else one has just got off, or not yet set out
+        ("walked", np.bool_),  # one came on foot, to board or at the goal; else one has just got off, or not set out
     ],
     align=True,
 )
