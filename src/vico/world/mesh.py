@@ -37,7 +37,7 @@ class Material:
     photo
         A photo: kept as JPEG in files, which loses detail nobody sees and a tenth of the bytes remain.
     png
-        The texture as a PNG file, where it has been packed already.
+        This very texture as a PNG file, where it has been packed already; None goes with another texture.
     """
 
     name: str

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from vico.io.cache import cache_folder
 from vico.io.compiled import source_digest
@@ -86,7 +86,7 @@ def _read(path: Path) -> tuple[Picture, bytes] | None:
         packed = path.read_bytes()
         with Image.open(io.BytesIO(packed), formats=["PNG"]) as image:
             return np.asarray(image), packed
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError):
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         return None
 
 
@@ -94,8 +94,8 @@ def _make_room(folder: Path) -> None:
     """Make a folder if it is not there, and let go of those of the same module that were made long before it."""
     if folder.is_dir():
         return
-    folder.mkdir(parents=True, exist_ok=True)
     module = folder.name.rpartition("-")[0]
-    own = sorted(folder.parent.glob(f"{module}-*"), key=lambda path: path.stat().st_mtime)
-    for old in own[:-_KEPT]:
+    others = sorted(folder.parent.glob(f"{module}-*"), key=lambda path: path.stat().st_mtime)
+    for old in others[: 1 - _KEPT]:
         shutil.rmtree(old, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)

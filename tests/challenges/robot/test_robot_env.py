@@ -98,8 +98,9 @@ def test_what_is_asked_is_told_in_numbers_and_the_thing_where_it_is_seen(helsink
     assert found[1:3] == pytest.approx([1.2, 0.0], abs=0.15)
     (narrow, wide), sides = np.sort(found[4:6]), np.sort(size[:2])
     assert narrow == pytest.approx(sides[0], abs=0.05)
-    # A spout or a handle may be hidden.
-    assert 0.3 * sides[1] < wide < sides[1] + 0.05
+    # A spout may be hidden.
+    least = 0.3 * sides[1] if work.stage.task.thing.kind == "watering can" else sides[1] - 0.05
+    assert least < wide < sides[1] + 0.05
 
 
 def test_an_action_that_is_no_number_ends_the_episode(helsinki_path: Path) -> None:
