@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from vico.errors import SchemaError
 from vico.io.arrays import mapped_array
-from vico.world.city_files import COST, REACHED, ROOM, SURFACES
-from vico.world.city_gates import Gates, border_gates, tile_gates
+from vico.world.city_files import COST, GATES, REACHED, ROOM, STEPS, SURFACES
+from vico.world.city_gates import Gates, Window, border_gates, tile_gates
 from vico.world.city_ground import whole_walkable
 from vico.world.city_routing import CityRouter
 from vico.world.city_walk_lengths import CityWalkLengths
+from vico.world.grid_search import followed
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
 from vico.worldgen.seams.grid import TileGrid, tile_name
-from vico.worldgen.seams.walking import MOST_ROOM, square_of, write_walking
+from vico.worldgen.seams.walking import MOST_ROOM, square_of, write_gates, write_walking
 
 SIDE = 300  # cells of a tile
 GRID = TileGrid(SIDE * 0.5, (-1, -1), (1, 1))
@@ -58,7 +60,8 @@ def _opened(folder: Path, town: WalkableMap) -> CityRouter:
     write_walking(folder, GRID, tiles)
     cost = mapped_array(folder / COST)
     room = mapped_array(folder / ROOM)
-    gates = Gates.joined([tile_gates(cost, room, square_of(tile, GRID, SIDE), cell=0.5) for tile in GRID])
+    write_gates(folder, [tile_gates(cost, room, square_of(tile, GRID, SIDE), cell=0.5) for tile in GRID])
+    gates = Gates.read(folder / GATES, mapped_array(folder / STEPS))
     return CityRouter(whole_walkable(folder, town.half), cost, gates, SIDE)
 
 
@@ -127,6 +130,38 @@ def test_what_is_closed_is_gone_round_on_long_walks_too(town: WalkableMap, route
     again = router.path(a, b)
     assert again is not None
     assert np.array_equal(again, usual)
+
+
+def test_walks_from_gate_to_gate_are_kept_cell_by_cell(router: CityRouter) -> None:
+    n, graph = router.walkable.n, router.graph
+    looked_at = 0
+    for tile in ((0, 0), (1, 1), (2, 1)):
+        cells = graph.cells[graph.of_tile(tile)].tolist()
+        square = tuple(slice(k * SIDE, (k + 1) * SIDE) for k in tile)
+        window = Window(np.ascontiguousarray(router._cost[square]), square[0].start, square[1].start, n)
+        for a, b in permutations(cells, 2):
+            kept, searched = graph.walk(a, b), window.walk(a, b)
+            assert (kept is None) == (searched is None)
+            if kept is None or searched is None:
+                continue
+            walk, costs = followed(router._cost, a, *kept)
+            assert (walk[0], walk[-1]) == (a, b)
+            # Of several that cost the same, either may be the one that is found the other way round.
+            assert costs[-1] == searched[1][-1]
+            if a < b:
+                assert np.array_equal(walk, searched[0])
+                assert np.array_equal(costs, searched[1])
+            looked_at += 1
+    assert looked_at > 100
+    assert graph.walk(0, int(graph.cells[0])) is None
+    assert graph.walk(int(graph.cells[0]), n * n - 1) is None
+
+
+def test_steps_of_other_walks_are_refused(router: CityRouter, tmp_path: Path) -> None:
+    cost, room = router._cost, router.walkable.clearance
+    write_gates(tmp_path, [tile_gates(cost, room, square_of((0, 0), GRID, SIDE), cell=0.5)])
+    with pytest.raises(SchemaError, match="steps beside it"):
+        Gates.read(tmp_path / GATES, mapped_array(tmp_path / STEPS)[1:])
 
 
 def test_there_is_no_way_into_a_yard_without_a_gate(tmp_path: Path) -> None:

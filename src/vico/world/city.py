@@ -21,7 +21,7 @@ from vico.world.model import Origin, Record, StageReport
 from vico.world.stored import read_stored
 from vico.world.world import World
 
-VERSION = 2
+VERSION = 3
 #: Name of a city's manifest.
 CITY = "city.json"
 _AGAIN = "the vico city build that made the city makes it again"
@@ -62,7 +62,7 @@ class CityManifest(Record):
     """
 
     schema_name: Literal["vico.city"] = "vico.city"
-    version: Literal[2] = 2
+    version: Literal[3] = 3
     producer: str
     origin: Origin
     size: Annotated[float, Field(gt=0)]

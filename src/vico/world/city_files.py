@@ -6,5 +6,7 @@ WHOLE = "whole"
 SMOOTH, EDGE, LOW, HIGH, LEVELS = "smooth.npy", "edge.npy", "low.npy", "high.npy", "levels.npz"
 #: Streets: roads, lanes, transit.
 ROADS, NET, XODR, TRANSIT = "roads.json", "roads.net.xml", "roads.xodr", "transit.json"
-#: Where people walk: surfaces, room to walls, what can be reached, what it costs to walk there, gates between tiles.
-SURFACES, ROOM, REACHED, COST, GATES = "surfaces.npy", "room.npy", "reached.npy", "cost.npy", "gates.npz"
+#: Where people walk: surfaces, room to walls, what can be reached, what it costs to walk there, gates between tiles,
+#: the steps of the walks from gate to gate.
+SURFACES, ROOM, REACHED, COST = "surfaces.npy", "room.npy", "reached.npy", "cost.npy"
+GATES, STEPS = "gates.npz", "steps.npy"

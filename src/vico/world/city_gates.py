@@ -1,7 +1,7 @@
 """Where one walks from a city's tiles into others, and what walks between these places cost.
 
 Where two tiles meet there are gates: the middle of each stretch of the border that can be walked over. Each tile knows
-the walks between its own.
+the walks between its own, cell by cell.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from vico.world.grid_search import (
     goals_at,
     pull,
     search,
+    steps_of,
 )
 from vico.world.routing import WEIGHTS
 from vico.world.walkable import ROADWAY
@@ -38,6 +39,7 @@ Ints = NDArray[np.int64]
 # A gate for so many cells side by side.
 _GATE = 64
 _NOTHING = np.zeros((0, 0), np.bool_)
+_NO_STEP = np.zeros(0, np.uint8)
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,11 @@ class Gates:
         What they cost, int64, shape ``(m,)``.
     metres, corners
         How long they are, and how many corners they have between their ends, float64 and int64, shape ``(m,)``.
+    count
+        How many steps from cell to cell they have, int64, shape ``(m,)``.
+    steps
+        These steps, walk after walk, as `vico.world.grid_search.steps_of` writes them, uint8, shape
+        ``(count.sum(),)``.
     """
 
     cells: Ints
@@ -62,10 +69,16 @@ class Gates:
     cost: Ints
     metres: NDArray[np.float64]
     corners: Ints
+    count: Ints
+    steps: NDArray[np.uint8]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return them as named arrays, for a file."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+        """Return them as named arrays, for a file; `steps`, which are many, are written apart."""
+        return {name: getattr(self, name) for name in self._named()}
+
+    @classmethod
+    def _named(cls) -> list[str]:
+        return [name for name in cls.__dataclass_fields__ if name != "steps"]
 
     @classmethod
     def joined(cls, parts: Sequence[Gates]) -> Gates:
@@ -73,20 +86,22 @@ class Gates:
         return cls(*(np.concatenate([getattr(one, name) for one in parts]) for name in cls.__dataclass_fields__))
 
     @classmethod
-    def read(cls, path: Path) -> Gates:
-        """Read what was written of `arrays`.
+    def read(cls, path: Path, steps: NDArray[np.uint8]) -> Gates:
+        """Read what was written of `arrays`, for these steps.
 
         Raises
         ------
         SchemaError
-            If the file does not hold them.
+            If the file does not hold them, or the steps are those of other walks.
         """
         arrays = read_npz(path.read_bytes())
-        missing = sorted(set(cls.__dataclass_fields__) - set(arrays))
+        missing = sorted(set(cls._named()) - set(arrays))
         if missing:
             raise SchemaError(f"{path}: has no {', '.join(missing)}; build the city anew")
-        whole = {k: np.ascontiguousarray(arrays[k], np.int64) for k in cls.__dataclass_fields__ if k != "metres"}
-        return cls(**whole, metres=np.ascontiguousarray(arrays["metres"], np.float64))
+        whole = {k: np.ascontiguousarray(arrays[k], np.int64) for k in cls._named() if k != "metres"}
+        if steps.dtype != np.uint8 or steps.shape != (whole["count"].sum(),):
+            raise SchemaError(f"{path}: the steps beside it are those of other walks; build the city anew")
+        return cls(**whole, metres=np.ascontiguousarray(arrays["metres"], np.float64), steps=steps)
 
 
 class Reached(NamedTuple):
@@ -98,11 +113,14 @@ class Reached(NamedTuple):
         int64; -1 where there is none.
     metres, corners
         float64 and int64.
+    steps
+        From cell to cell, uint8 each; none where they were not asked for.
     """
 
     cost: Ints
     metres: NDArray[np.float64]
     corners: Ints
+    steps: Sequence[NDArray[np.uint8]] = ()
 
 
 class Scratch:
@@ -154,7 +172,9 @@ class Window:
         final = self._scratch.memory.cells["stamp"][own] == self._scratch.generation + 1
         return np.where(final, self._scratch.memory.cells["g"][own], -1).astype(np.int64)
 
-    def reached(self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float) -> Reached:
+    def reached(
+        self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float, *, steps: bool = False
+    ) -> Reached:
         """Return what walks from a cell of the map to others cost, and how long they are, pulled straight.
 
         Parameters
@@ -165,14 +185,20 @@ class Window:
             Room to walls of the window's cells, metres.
         cell
             Side of a cell, metres.
+        steps
+            Whether to tell their steps, too.
         """
         cost = self.costs(start, goals)
         metres, corners = np.zeros(len(goals)), np.zeros(len(goals), np.int64)
+        told = [_NO_STEP] * len(goals) if steps else []
         first = int(self.own(np.array([start]))[0])
         for k, last in enumerate(self.own(goals).tolist()):
             if cost[k] > 0:
-                metres[k], corners[k] = self._length(first, last, clearance, cell)
-        return Reached(cost, metres, corners)
+                cells, costs = self._found(first, last)
+                metres[k], corners[k] = self._length(cells, costs, clearance, cell)
+                if steps:
+                    told[k] = steps_of(cells, self._cost.shape[1])
+        return Reached(cost, metres, corners, told)
 
     def length(self, start: int, goal: int, clearance: NDArray[np.float32], cell: float) -> tuple[float, int] | None:
         """Return how long the cheapest walk between two cells of the map is, and its corners; None if there is none."""
@@ -181,7 +207,7 @@ class Window:
         first, last = self.own(np.array([start, goal])).tolist()
         if self._search(start, goal_at(last, self._cost.shape[1])) < 0:
             return None
-        return self._length(first, last, clearance, cell)
+        return self._length(*self._found(first, last), clearance, cell)
 
     def walk(self, start: int, goal: int) -> tuple[Ints, Ints] | None:
         """Return the cells of the cheapest walk between two cells of the map, and its cost up to each."""
@@ -218,11 +244,10 @@ class Window:
         cells = backtrack(self._cost, known, first, last)
         return cells, self._scratch.memory.cells["g"][cells].astype(np.int64)
 
-    def _length(self, first: int, last: int, clearance: NDArray[np.float32], cell: float) -> tuple[float, int]:
-        cells, g = self._found(first, last)
+    def _length(self, cells: Ints, costs: Ints, clearance: NDArray[np.float32], cell: float) -> tuple[float, int]:
         side = self._cost.shape[1]
         points = np.column_stack([cells % side, cells // side]) + 0.5
-        kept = points[pull(self._cost, clearance, _NOTHING, False, points, g)]
+        kept = points[pull(self._cost, clearance, _NOTHING, False, points, costs)]
         return float(np.hypot(*np.diff(kept, axis=0).T).sum()) * cell, max(0, len(kept) - 2)
 
 
@@ -275,6 +300,7 @@ def tile_gates(
     ]
     own: list[int] = []
     walks: list[tuple[int, int, int, float, int]] = []
+    steps: list[NDArray[np.uint8]] = []
     for (rows, columns), (up, aside) in sides:
         there = tuple(_shifted(part, by) for part, by in ((rows, up), (columns, aside)))
         if not all(_within(part, size) for part, size in zip(there, (height, width), strict=True)):
@@ -287,20 +313,24 @@ def tile_gates(
             if up + aside > 0:
                 other = (row + up) * width + column + aside
                 walks.append((own[-1], other, STRAIGHT * (int(mine[k]) + int(theirs[k])) // 2, cell, 0))
+                steps.append(steps_of(np.array([own[-1], other], np.int64), width))
     cells = np.unique(np.array(own, np.int64))
     window = Window(np.ascontiguousarray(cost[square]), bottom, left, width)
     room = np.ascontiguousarray(clearance[square], np.float32)
     for k, first in enumerate(cells.tolist()):
         rest = cells[k + 1 :]
-        found = window.reached(first, rest, room, cell)
-        for other, far, metres, corners in zip(rest.tolist(), *(part.tolist() for part in found), strict=True):
-            if far >= 0:
-                walks.append((first, other, far, round(metres, 2), corners))
+        found = window.reached(first, rest, room, cell, steps=True)
+        for j in np.flatnonzero(found.cost >= 0).tolist():
+            walks.append(
+                (first, int(rest[j]), int(found.cost[j]), round(float(found.metres[j]), 2), int(found.corners[j]))
+            )
+            steps.append(found.steps[j])
     ends = np.array([walk[:3] for walk in walks], np.int64).reshape(-1, 3)
     metres = np.array([walk[3] for walk in walks], np.float64)
     corners = np.array([walk[4] for walk in walks], np.int64)
     start, end, far = ends.T
-    return Gates(cells, start, end, far, metres, corners)
+    count = np.array([len(one) for one in steps], np.int64)
+    return Gates(cells, start, end, far, metres, corners, count, np.concatenate([_NO_STEP, *steps]))
 
 
 def _shifted(part: slice | int, by: int) -> slice | int:

@@ -19,7 +19,7 @@ from vico.io.arrays import drop_pages
 from vico.io.recent import Recent
 from vico.world.city_gates import Gates, Ints, Scratch, Window
 from vico.world.gate_graph import GateGraph
-from vico.world.grid_search import STRAIGHT, nearest_free
+from vico.world.grid_search import STRAIGHT, followed, nearest_free
 from vico.world.routing import SNAP, Router
 from vico.world.walkable import WalkableMap
 
@@ -215,6 +215,11 @@ class CityRouter(Router):
         """Return the walk from a cell to another of its tile, one of them a gate, and keep it for others."""
         if not ask.is_usual(a):
             return ask.window(ask.square(a)).walk(a, b)
+        kept = None if ask.room else self.graph.walk(a, b)
+        if kept is not None:
+            self._open()
+            cells, costs = followed(self._cost, a, *kept)
+            return cells, costs
         known = self._legs.get((ask.room, a, b))
         if known is None:
             found = ask.window(ask.square(a)).walk(a, b)

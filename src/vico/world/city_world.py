@@ -18,7 +18,7 @@ from vico.io.arrays import drop_pages, mapped_array
 from vico.io.files import sha256_of
 from vico.world.city import CITY, City, CityTile
 from vico.world.city_entities import CityEntities
-from vico.world.city_files import COST, GATES, WHOLE
+from vico.world.city_files import COST, GATES, STEPS, WHOLE
 from vico.world.city_gates import Gates
 from vico.world.city_ground import whole_ground, whole_walkable
 from vico.world.city_rooms import CityRooms, RoomsById
@@ -147,7 +147,8 @@ class CityWorld(World):
     @cached_property
     def router(self) -> CityRouter:
         """Finds ways on the walkable map: from gate to gate of the tiles."""
-        return CityRouter(self.walkable, self._cost, Gates.read(self.file(GATES)), self._side)
+        gates = Gates.read(self.file(GATES), mapped_array(self.file(STEPS)))
+        return CityRouter(self.walkable, self._cost, gates, self._side)
 
     @cached_property
     def _cost(self) -> NDArray[np.int32]:
@@ -168,6 +169,8 @@ class CityWorld(World):
             arrays += [self.walkable.cls, self.walkable.clearance, self.walkable.connected]
         if "_cost" in opened:
             arrays.append(self._cost)
+        if "router" in opened:
+            arrays.append(self.router.graph.steps)
         for array in arrays:
             drop_pages(array)
         if "rooms" in opened:

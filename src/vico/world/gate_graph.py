@@ -55,6 +55,8 @@ class GateGraph:
     ----------
     cells
         The gates, number of the cell of each, rising.
+    steps
+        Of all walks, as in `Gates`.
     """
 
     def __init__(self, gates: Gates, width: int, side: int) -> None:
@@ -68,6 +70,10 @@ class GateGraph:
         self._metres = np.tile(gates.metres, 2)[order]
         self._corners = np.tile(gates.corners, 2)[order]
         self._first = np.searchsorted(starts[order], np.arange(len(self.cells) + 1))
+        # Of an edge: the walk as it is kept, and where the steps of each begin; walks are kept in one direction.
+        self._walk = order.astype(np.int32)
+        self._begin = np.concatenate([[0], np.cumsum(gates.count)])
+        self.steps = gates.steps
 
     @cached_property
     def _by_tile(self) -> dict[tuple[int, int], Ints]:
@@ -91,6 +97,25 @@ class GateGraph:
         """Return what the walk from gate to gate costs; -1 if there is none."""
         k = self.edge(a, b)
         return -1 if k < 0 else int(self._costs[k])
+
+    def walk(self, a: int, b: int) -> tuple[NDArray[np.uint8], bool] | None:
+        """Return the steps of the walk from the cell of a gate to that of another; None if none is kept.
+
+        Returns
+        -------
+        steps
+            As in `Gates`.
+        backwards
+            Whether they lead from the second to the first.
+        """
+        gates = np.searchsorted(self.cells, (a, b)).tolist()
+        if max(gates) >= len(self.cells) or self.cells[gates].tolist() != [a, b]:
+            return None
+        k = self.edge(*gates)
+        if k < 0:
+            return None
+        backwards, number = divmod(int(self._walk[k]), len(self._begin) - 1)
+        return self.steps[self._begin[number] : self._begin[number + 1]], bool(backwards)
 
     def length(self, a: int, b: int) -> tuple[float, int]:
         """Return how long the walk from gate to gate is, metres, and its corners."""

@@ -298,6 +298,51 @@ def backtrack(cost, costs, start, goal):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def steps_of(cells, width):  # type: ignore[no-untyped-def]
+    """Return the directions of the steps from each of a walk's cells to the next, uint8."""
+    steps = np.empty(len(cells) - 1, np.uint8)
+    for k in range(len(steps)):
+        aside, up = cells[k + 1] % width - cells[k] % width, cells[k + 1] // width - cells[k] // width
+        if aside == 0 or up == 0:
+            steps[k] = (1 - aside) // 2 if up == 0 else (5 - up) // 2
+        else:
+            steps[k] = 4 + (1 - aside) // 2 + (1 - up)
+    return steps
+
+
+@compiled
+def followed(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
+    """Return the cells of a walk, int64, and what it costs up to each.
+
+    Parameters
+    ----------
+    cost
+        Of the grid's cells.
+    start
+        The cell that it begins in; where `backwards` that in which the walk of these steps ends.
+    steps
+        Of `steps_of`.
+    """
+    width = cost.shape[1]
+    cells, costs = np.empty(len(steps) + 1, np.int64), np.zeros(len(steps) + 1, np.int64)
+    cells[0] = start
+    x, y = start % width, start // width
+    here = np.int64(cost[y, x])
+    for k in range(len(steps)):
+        direction = np.int64(steps[len(steps) - 1 - k if backwards else k])
+        step_x, step_y = _step(direction)
+        if backwards:
+            step_x, step_y = -step_x, -step_y
+        x, y = x + step_x, y + step_y
+        there = np.int64(cost[y, x])
+        length = STRAIGHT if direction < _FIRST_DIAGONAL else DIAGONAL
+        costs[k + 1] = costs[k] + length * (here + there) // 2
+        cells[k + 1] = y * width + x
+        here = there
+    return cells, costs
+
+
+@compiled
 def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
     """Cost of a straight walk between points in cell units, or -1 where there is no room for it."""
     height, width = cost.shape

@@ -14,7 +14,7 @@ from scipy import ndimage
 from vico.io.arrays import new_array
 from vico.io.files import write_bytes
 from vico.io.npz import npz_bytes
-from vico.world.city_files import COST, GATES, REACHED, ROOM, SURFACES
+from vico.world.city_files import COST, GATES, REACHED, ROOM, STEPS, SURFACES
 from vico.world.city_gates import Gates
 from vico.world.disjoint import DisjointSets
 from vico.world.routing import walking_costs
@@ -56,7 +56,10 @@ def write_walking(folder: Path, grid: TileGrid, tiles: Mapping[Tile, Path]) -> N
 
 def write_gates(folder: Path, gates: Sequence[Gates]) -> None:
     """Write the gates of all tiles of a city as one table."""
-    write_bytes(folder / GATES, npz_bytes(Gates.joined(gates).arrays()))
+    whole = Gates.joined(gates)
+    with new_array(folder / STEPS, whole.steps.shape, np.uint8) as steps:
+        steps[:] = whole.steps
+    write_bytes(folder / GATES, npz_bytes(whole.arrays()))
 
 
 def around(square: tuple[slice, slice], cells: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
