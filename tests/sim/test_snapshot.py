@@ -14,7 +14,7 @@ import pytest
 
 import toy_city
 from vico.agents.schedule import followers_of
-from vico.errors import MissingFileError, SchemaError
+from vico.errors import InputError, MissingFileError, SchemaError
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.physics.records import PhysicsError
@@ -56,6 +56,17 @@ def test_equal_actions_give_equal_hashes_at_every_step() -> None:
 def test_another_seed_gives_another_hash() -> None:
     other = SimConfig(seed=1, start=MORNING.start, assistants=1, observe=())
     assert fresh().state_hash() != fresh(other).state_hash()
+
+
+def test_a_step_tells_its_hash_until_the_next_one() -> None:
+    sim = fresh()
+    first = sim.step({})
+    assert first.hash == sim.state_hash()
+    second = sim.step({})
+    assert first.hash != sim.state_hash()
+    sim.advance(1.0)
+    with pytest.raises(InputError, match="gone on since step 2"):
+        assert second.hash
 
 
 def test_every_letter_of_every_text_counts_in_the_hash() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.exact import apply_matrix
 from vico.io.compiled import compiled
 from vico.pixels import shown_in
 
@@ -79,7 +80,7 @@ def points_from_depth(
     y = (v + 0.5 - intrinsics[1, 2]) / intrinsics[1, 1] * z
     rotation, shift = extrinsics[:3, :3], extrinsics[:3, 3]
     camera = np.column_stack([x, y, z])
-    return (camera - shift) @ rotation, v * width + u
+    return apply_matrix(camera - shift, rotation.T), v * width + u
 
 
 def sightings(observation: Mapping[str, Any], entities: Mapping[int, Mapping[str, str]]) -> list[Sighting]:

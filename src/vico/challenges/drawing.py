@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -84,7 +85,7 @@ class Draw:
         if towards is None:
             yaw = float(self.chance.uniform(-np.pi, np.pi))
         else:
-            yaw = float(np.arctan2(towards[1] - at[1], towards[0] - at[0]))
+            yaw = math.atan2(towards[1] - at[1], towards[0] - at[0])
         return Start(position=(float(at[0]), float(at[1])), yaw=yaw)
 
     def thing(

@@ -7,6 +7,7 @@ friends somebody has is skewed, and larger for the outgoing. ``docs/community.md
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -120,7 +121,7 @@ class _Draw:
             return 0.0
         alike = len({h.name for h in a.hobbies} & {h.name for h in b.hobbies}) + len(set(a.values) & set(b.values))
         kind = 0.4 + 0.6 * (a.character.agreeableness + b.character.agreeableness)
-        return float((1 + 0.4 * alike) * kind * np.exp(-apart / (_OF_ONE_AGE if a.child else _YEARS_BETWEEN)))
+        return float((1 + 0.4 * alike) * kind * math.exp(-apart / (_OF_ONE_AGE if a.child else _YEARS_BETWEEN)))
 
     def _tie(self, i: int, j: int) -> None:
         self.found.add((i, j) if i < j else (j, i))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -85,7 +86,7 @@ class Outings:
         sizes = Counter(kind_of(found[k]) for k in keep)
         weights = np.array(
             [
-                np.exp(-metres[k] / 220) * 0.5 ** self._visits[found[k].id] / sizes[kind_of(found[k])] ** 0.5
+                math.exp(-metres[k] / 220) * 0.5 ** self._visits[found[k].id] / sizes[kind_of(found[k])] ** 0.5
                 for k in keep
             ]
         )

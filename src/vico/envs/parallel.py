@@ -151,7 +151,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             self._simulation = self._fresh(drawn)
         self.agents = list(self.possible_agents)
         self.events = []
-        self._last = StepResult(*self.sim.observe(), [], "")
+        self._last = StepResult(*self.sim.observe(), [], lambda: "")
         return self._last
 
     def arrange(self, setup: Setup | None = None, **changes: Any) -> None:

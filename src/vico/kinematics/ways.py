@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import dot
 from vico.kinematics.arm import Chain, hand_pose, reach_pose, solve
 from vico.quaternions import matrix_of, quaternion_of
 
@@ -82,7 +83,7 @@ def way_over(chain: Chain, now: Array, above: Array) -> Array | None:
 def straight_way(chain: Chain, angles: Array, start: Array, end: Array) -> Array | None:
     """Angles along a straight way of the hand, shape ``(m, 7)``; None if it can't be gone."""
     first, last = quaternion_of(start[:, :3]), quaternion_of(end[:, :3])
-    turn = float(first @ last)
+    turn = float(dot(first, last))
     last = last if turn >= 0.0 else -last
     turned = 2.0 * math.acos(min(abs(turn), 1.0)) > 1e-3
     count = max(2, math.ceil(float(np.linalg.norm(end[:, 3] - start[:, 3])) / _STEP))
@@ -93,7 +94,7 @@ def straight_way(chain: Chain, angles: Array, start: Array, end: Array) -> Array
         goal = start + (end - start) * (k / count)
         if turned:
             between = first + (last - first) * (k / count)
-            goal[:, :3] = matrix_of(between / math.sqrt(float(between @ between)))
+            goal[:, :3] = matrix_of(between / math.sqrt(float(dot(between, between))))
         before = now.copy()
         if solve(chain, now, goal, 30) > 4e-3 or np.abs(now - before).max() > 0.35:
             return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -110,5 +111,5 @@ class Cameras:
     @cached_property
     def intrinsics(self) -> NDArray[np.float64]:
         """Camera matrix in pixels, shape ``(3, 3)``; square pixels, principal point in the middle."""
-        focal = self.height / 2 / np.tan(self.fov_y / 2)
+        focal = self.height / 2 / math.tan(self.fov_y / 2)
         return np.array([[focal, 0, self.width / 2], [0, focal, self.height / 2], [0, 0, 1]])

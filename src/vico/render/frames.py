@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable
@@ -336,7 +337,7 @@ def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2)
         np.column_stack([middles[:, 0], -middles[:, 1], np.full(len(corners), height)]),
         np.tile([0.0, 0.0, -1.0], (len(corners), 1)),
         up=(0.0, 1.0, 0.0),
-        fov_y=float(2 * np.arctan(step / metre / 2 / height)),
+        fov_y=2.0 * math.atan(step / metre / 2 / height),
         width=step,
         height=step,
         near=height - 3000.0 if height > 4000.0 else 1.0,

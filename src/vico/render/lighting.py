@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.seeds import rng
 
 Colour = tuple[float, float, float]
@@ -214,8 +216,8 @@ def sky_table(light: Lighting) -> NDArray[np.float32]:
     sine = s * np.abs(s)
     share = np.clip(sine, 0, 1)[:, None]
     zenith, horizon = np.asarray(light.zenith), np.asarray(light.horizon)
-    sky = zenith + (horizon - zenith) * np.exp(-share * 4.2)
-    below = horizon * (0.9 + 0.1 * np.exp(np.clip(sine, -1, 0) * 6))[:, None]
+    sky = zenith + (horizon - zenith) * each(math.exp, -share * 4.2)
+    below = horizon * (0.9 + 0.1 * each(math.exp, np.clip(sine, -1, 0) * 6))[:, None]
     table = np.where(sine[:, None] >= 0, sky, below)
     return np.ascontiguousarray(table * light.exposure, np.float32)
 
@@ -235,7 +237,7 @@ def tone_table() -> NDArray[np.uint8]:
 def linear_table() -> NDArray[np.float32]:
     """Return the linear light of the 256 sRGB byte values."""
     c = np.arange(256) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return np.where(c <= 0.04045, c / 12.92, each(math.pow, (c + 0.055) / 1.055, 2.4)).astype(np.float32)
 
 
 @lru_cache(maxsize=1)

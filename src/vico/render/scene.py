@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -369,7 +370,7 @@ class Scene:
             low, high = self._low, self._high + np.array([0.0, 0.0, 2.0])
             if self._shadow is None or self._shadow_key != tuple(sun):
                 side = float((high - low)[:2].max())
-                size = int(np.clip(2 ** np.ceil(np.log2(max(side / _SHADOW_METRES, 1.0))), 64, 2048))
+                size = int(np.clip(2 ** math.ceil(math.log2(max(side / _SHADOW_METRES, 1.0))), 64, 2048))
                 self._shadow = shadow_map(self.arrays, sun, low, high, size)
                 self._shadow_key = tuple(sun)
             if self._relief is None:

@@ -20,6 +20,7 @@ from vico.assets.house_doors import (
     leaf_surfaces,
     opening_of,
 )
+from vico.exact import apply_matrix
 from vico.render.records import OPENING
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import Drawn
@@ -120,7 +121,7 @@ def _floor(door: NDArray[np.void], size: int) -> shapely.Polygon:
     deep, beside = HALLS[size]
     half = float(door["half_width"]) + beside
     corners = np.array([(-half, BEHIND, 0, 1), (half, BEHIND, 0, 1), (half, deep, 0, 1), (-half, deep, 0, 1)])
-    return shapely.Polygon((corners @ _base(door).T)[:, :2])
+    return shapely.Polygon(apply_matrix(corners, _base(door))[:, :2])
 
 
 def _base(door: NDArray[np.void]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import placards, umbrellas
 from vico.assets.models.movable import movable_grip
+from vico.exact import each, product
 from vico.quaternions import matrix_of
 from vico.sim.animation import Hands, Hold, clip_index, hand_frames
 from vico.sim.bodies import Drawn
@@ -140,7 +142,7 @@ def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
     wide = size * (0.1 + 0.9 * opened)
     rim = _RIM_HEIGHT * size
     lean = lean_apart(who.world(rows, fist + rim[:, None] * up), _RIM_RADIUS * wide, rim)
-    up[:, :2] += np.tan(np.hypot(*lean.T))[:, None] * who.turned_back(rows, _unit(lean))
+    up[:, :2] += each(math.tan, np.hypot(*lean.T))[:, None] * who.turned_back(rows, _unit(lean))
     up /= np.linalg.norm(up, axis=1)[:, None]
     ahead = np.column_stack([up[:, 2], np.zeros(len(rows)), -up[:, 0]])
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
@@ -279,7 +281,7 @@ def _transforms(
     turn[:, 0, 0] = turn[:, 1, 1] = c
     turn[:, 1, 0], turn[:, 0, 1], turn[:, 2, 2] = s, -s, 1.0
     frames = np.zeros((len(rows), 4, 4))
-    frames[:, :3, :3] = turn @ axes
+    frames[:, :3, :3] = product(turn, axes)
     frames[:, :3, 3] = who.world(rows, points)
     frames[:, 3, 3] = 1.0
     return frames.astype(np.float32)

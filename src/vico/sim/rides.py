@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import apply_matrix
 from vico.sim.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.moves import follow_hands, gesture, wrapped
@@ -202,7 +203,7 @@ def _stand_at(
 def _is_on_road(spot: NDArray[np.float64], yaw: float, walkable: WalkableMap) -> bool:
     """Return whether any of a bicycle that stands at a spot is where vehicles drive."""
     c, s = math.cos(yaw), math.sin(yaw)
-    parts = spot + _PARTS @ np.array([[c, s], [-s, c]])
+    parts = spot + apply_matrix(_PARTS, np.array([[c, -s], [s, c]]))
     return any(walkable.class_of(x, y) in _ROAD for x, y in parts.tolist())
 
 

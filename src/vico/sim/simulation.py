@@ -53,14 +53,25 @@ class StepResult:
         By agent, of those who act next; see `vico.sim.observations.observe`.
     events
         What happened in the step.
-    hash
-        Of the state after it.
+    told_hash
+        Finds `hash`.
     """
 
     observations: Observations
     infos: ByAgent
     events: list[Event]
-    hash: str
+    told_hash: Callable[[], str]
+
+    @cached_property
+    def hash(self) -> str:
+        """Hash of the state after the step, hex; found when it is asked for.
+
+        Raises
+        ------
+        InputError
+            If the simulation has gone on since.
+        """
+        return self.told_hash()
 
 
 class Simulation:
@@ -156,10 +167,23 @@ class Simulation:
         self._advance(self.periods.next_due(self.state.tick) - self.state.tick)
         self.metrics.steps += 1
         observations, infos = self.observe(self.due)
-        watch = StopWatch(self.metrics.seconds)
-        digest = self.state_hash()
-        watch.lap("hash")
-        return StepResult(observations, infos, list(self.state.events.log), digest)
+        return StepResult(observations, infos, list(self.state.events.log), self._hash_after(self.metrics.steps))
+
+    def _hash_after(self, step: int) -> Callable[[], str]:
+        """Return what finds the hash of the state as it is now, after a step."""
+        tick = self.state.tick
+
+        def found() -> str:
+            if (self.metrics.steps, self.state.tick) != (step, tick):
+                raise InputError(
+                    f"hash: the simulation has gone on since step {step}; ask a result before the next step"
+                )
+            watch = StopWatch(self.metrics.seconds)
+            digest = self.state_hash()
+            watch.lap("hash")
+            return digest
+
+        return found
 
     def act(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> None:
         """Let the agents that are due begin what they ask for, without any time passing; see `step`."""

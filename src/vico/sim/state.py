@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.exact import apply_matrix, each
 from vico.quaternions import matrix_of, quaternion_of, upright
 from vico.sim.animation import LONGEST_BLEND
 from vico.sim.bodies import OBJECT, Bodies
@@ -380,7 +382,7 @@ class MovableObjects(ArrayState):
     def yaw(self) -> NDArray[np.float64]:
         """Heading of each, counter-clockwise from east, radians, shape ``(m,)``; not to be written to."""
         w, x, y, z = self.orientation.T
-        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        yaw = each(math.atan2, 2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         yaw.flags.writeable = False
         return yaw
 
@@ -428,7 +430,7 @@ class MovableObjects(ArrayState):
         near = away < np.hypot(self.size[:, 0], self.size[:, 1])
         for k in np.flatnonzero(near & (self.holder == 0) & (self.room == room)).tolist():
             turn = self.rotation(k)
-            inside = np.abs(turn[:2, :2].T @ (xy - self.position[k, :2])) <= self.size[k, :2] / 2 - ON_TOP
+            inside = np.abs(apply_matrix(xy - self.position[k, :2], turn[:2, :2].T)) <= self.size[k, :2] / 2 - ON_TOP
             if turn[2, 2] > UPRIGHT and inside.all():
                 found.append((float(self.position[k, 2] + self.size[k, 2]), k))
         return sorted(found)

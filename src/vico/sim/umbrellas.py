@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from vico.exact import each
 
 _APART = 0.04  # metres between two rims
 _STEEPEST = 0.6  # radians
@@ -40,7 +44,7 @@ def lean_apart(
     share = radius[first] / (radius[first] + radius[second])
     reach = np.hypot(radius, shaft)[first]
     may = np.clip((distance * share - _APART / 2) / reach, -1.0, 1.0)
-    angle = np.maximum(np.arccos(may) - np.arctan2(shaft, radius)[first], 0.0)
+    angle = np.maximum(each(math.acos, may) - each(math.atan2, shaft, radius)[first], 0.0)
     np.add.at(lean, first, away * (angle / np.maximum(distance, 1e-6))[:, None])
     steep = np.hypot(*lean.T)
     return lean * np.minimum(1.0, _STEEPEST / np.maximum(steep, 1e-9))[:, None]

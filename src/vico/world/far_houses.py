@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.world.far_parts import FarPart, far_outline, parts_by_height
 from vico.world.far_roofs import roof_over
 from vico.world.far_windows import SHOWN, WINDOWS, has_windows, places_of
@@ -159,7 +161,7 @@ def _wall_colours(
 
 
 def _sector(normals: NDArray[np.float64]) -> NDArray[np.int64]:
-    turn = np.arctan2(normals[..., 1], normals[..., 0]) / (2.0 * np.pi) * _SECTORS
+    turn = each(math.atan2, normals[..., 1], normals[..., 0]) / (2.0 * np.pi) * _SECTORS
     return np.round(turn).astype(np.int64) % _SECTORS
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.world.mesh import Surface
 
 _TEXELS = 128  # of a texture's side that a mean colour is made from
@@ -46,7 +48,7 @@ class Looks(NamedTuple):
 
 def _linear_table() -> NDArray[np.float64]:
     value = np.arange(256) / 255.0
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    return np.where(value <= 0.04045, value / 12.92, each(math.pow, (value + 0.055) / 1.055, 2.4))
 
 
 LINEAR = _linear_table()

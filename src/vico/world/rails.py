@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.exact import each
 from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.world.model import Point2
@@ -153,4 +154,4 @@ def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Poin
 
 
 def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)), np.float64)
+    return each(math.atan2, a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))

@@ -12,6 +12,7 @@ from vico.agents.assistant.options import Search, WalkUp
 from vico.agents.assistant.skills import OUTSIDE, Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
+from vico.exact import each
 
 # Steps after which one gives up, and for which one goes further into a room; how far, metres.
 _LONGEST, _GOING_IN, _INTO = 50, 4, 1.8
@@ -172,6 +173,6 @@ def _free_directions(view: ObservationView) -> list[float]:
     doors = np.array([door["position"][:2] for door in view.state["doors"]], np.float64).reshape(-1, 2) - view.pose[:2]
     if not len(doors):
         return around
-    ways = np.arctan2(doors[:, 1], doors[:, 0])
+    ways = each(math.atan2, doors[:, 1], doors[:, 0])
     clear = [float(np.abs((ways - angle + math.pi) % (2.0 * math.pi) - math.pi).min()) for angle in around]
     return [around[k] for k in np.argsort([-c for c in clear], kind="stable")]

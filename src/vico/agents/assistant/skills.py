@@ -20,6 +20,7 @@ from vico.agents.navigation.navigator import Navigator
 from vico.agents.navigation.search import Target
 from vico.agents.perception import Sighting, sightings
 from vico.agents.state import AgentState, generator_state, restore_generator
+from vico.exact import dot
 from vico.world.public import PublicMap
 
 Action = dict[str, Any]
@@ -194,7 +195,7 @@ class AssistantSkills:
         least, found = _DOORWAY, ""
         for door in view.state["doors"]:
             at = np.asarray(door["position"], np.float64)[:2]
-            along = float((at - here) @ (there - here)) / max(away, 1e-9)
+            along = float(dot(at - here, there - here)) / max(away, 1e-9)
             across = math.sqrt(max(math.dist(here, at) ** 2 - along**2, 0.0))
             # The way of sight leaves the room once: by the door whose middle it passes nearest to.
             if door["to"] != OUTSIDE and 0.0 < along < away - _BEHIND_DOOR and across < least:

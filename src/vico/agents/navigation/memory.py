@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vico.agents.navigation.voxels import MOVING
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
+from vico.exact import apply_matrix
 
 #: With so many pixels, and after so many seconds for what moves, confidence has come to, or fallen to, 63 % and 37 %.
 SURE_PIXELS, STALE_AFTER = 20.0, 60.0
@@ -170,7 +171,7 @@ def _are_gone(things: Sequence[SeenThing], observation: Mapping[str, Any]) -> ND
     extrinsics, intrinsics = observation["extrinsics"], observation["intrinsics"]
     depth = np.asarray(observation["depth"])
     places = np.array([thing.position for thing in things])
-    x, y, z = extrinsics[:3, :3] @ places.T + extrinsics[:3, 3:]
+    x, y, z = apply_matrix(places, extrinsics[:3, :3]).T + extrinsics[:3, 3:]
     ahead = z >= _NEVER_GONE
     z = np.where(ahead, z, 1.0)
     column, row = intrinsics[0, 0] * x / z + intrinsics[0, 2], intrinsics[1, 1] * y / z + intrinsics[1, 2]

@@ -16,6 +16,7 @@ from vico.agents.navigation.voxel_kernels import BESIDE_COST, SIDE, VOXEL
 from vico.agents.navigation.voxels import VoxelMap
 from vico.agents.state import AgentState
 from vico.agents.wayfinding import Walker
+from vico.exact import dot
 from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
 
@@ -161,7 +162,7 @@ class Navigator:
         doors = [np.asarray(door["position"], np.float64) for door in observation["state"]["doors"]]
         near = [door for door in doors if np.linalg.norm(door - pose[:3]) <= _CAME_IN]
         ahead = pose[3:5] / max(float(np.hypot(*pose[3:5])), 1e-9)
-        behind = [door for door in near if float((door - pose[:3])[:2] @ ahead) < 0.0]
+        behind = [door for door in near if float(dot((door - pose[:3])[:2], ahead)) < 0.0]
         if behind:
             nearest = min(behind, key=lambda door: float(np.linalg.norm(door - pose[:3])))
             self._map.assume_wall(nearest, ahead, int(observation["state"]["time"]))

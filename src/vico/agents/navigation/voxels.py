@@ -31,6 +31,7 @@ from vico.agents.navigation.voxel_kernels import (
     take_chunk,
 )
 from vico.agents.state import AgentState
+from vico.exact import dot
 
 #: Kinds of entities that do not stay where they are seen, and those that are in nobody's way.
 MOVING = ("resident", "assistant", "robot", "pedestrian", "car", "bus", "bicycle", "tram", "train", "cyclist")
@@ -106,7 +107,7 @@ class VoxelMap:
         camera = Camera(lens, np.ascontiguousarray(extrinsics[:3, :3]), np.ascontiguousarray(extrinsics[:3, 3]))
         depth = np.ascontiguousarray(observation["depth"], np.float32)
         segmentation = np.ascontiguousarray(observation["segmentation"], np.int32)
-        height = -float(camera.rotation[:, 2] @ camera.shift)
+        height = -float(dot(camera.rotation[:, 2], camera.shift))
         limits = np.array([STEP, REACH, now + FADES, height])
         clear_seen_through(self.voxels, depth, camera, eye, limits)
         add_points(self.voxels, depth, segmentation, camera, _special(entities, ignore), limits)

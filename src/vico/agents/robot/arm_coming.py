@@ -13,6 +13,7 @@ from vico.agents.robot.body import Stance
 from vico.agents.robot.reaching import raise_way
 from vico.agents.robot.sight import look, room_ahead
 from vico.agents.robot.stages import Stage, Work
+from vico.exact import dot
 
 # Nearer than this the base is brought up by speeds of its own, metres; and how exactly.
 _NEAR, _EXACT, _ALIGNED = 1.3, 0.03, 0.08
@@ -31,7 +32,7 @@ def come(job: ArmJob, observation: Mapping[str, Any], angles: Array) -> Action:
     distance = float(np.hypot(*away))
     side = away / max(distance, 1e-6) if job.beside is None else job.beside
     if not job.drive.busy:
-        if distance <= _NEAR and float(side @ away) > _BESIDE * distance:
+        if distance <= _NEAR and float(dot(side, away)) > _BESIDE * distance:
             return _is_near(job)
         job.drive.begin(job.target[:2] + side * (_NEAR - 0.35), near=_NEAR - 0.35)
     action = job.drive.act(observation)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.exact import apply_matrix
 from vico.kinematics.arm import Chain, hand_pose
 from vico.kinematics.limbs import Jaw, Limbs, limbs_of
 from vico.quaternions import matrix_of
@@ -78,11 +79,11 @@ class Stance(NamedTuple):
 
     def inside(self, points: Array) -> Array:
         """Return points in the frame of the base, shape ``(..., 3)``."""
-        return np.asarray((points - self.position) @ self.rotation)
+        return apply_matrix(points - self.position, self.rotation.T)
 
     def outside(self, points: Array) -> Array:
         """Return points of the base's frame in the world, shape ``(..., 3)``."""
-        return np.asarray(points @ self.rotation.T + self.position)
+        return apply_matrix(points, self.rotation) + self.position
 
 
 def metres_apart(a: ArrayLike, b: ArrayLike) -> float:

@@ -7,6 +7,7 @@ runs on torch (extra ``imitation``), which is imported when a policy is read.
 from __future__ import annotations
 
 import json
+import math
 import re
 import zipfile
 import zlib
@@ -23,6 +24,7 @@ from vico.agents.robot.chunk_shape import ChunkShape
 from vico.agents.robot.increments import BASE, INCREMENTS, JOINTS, STATE, arm_state, control_of
 from vico.agents.state import AgentState
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
+from vico.exact import apply_matrix, each
 from vico.io.npz import read_npz
 
 Array = NDArray[np.float32]
@@ -214,9 +216,9 @@ class ChunkActor:
             self._ages = np.concatenate([[0], self._ages[kept]])
         alive = self._ages < self._policy.shape.chunk
         self._chunks, self._ages = self._chunks[alive], self._ages[alive]
-        weights = np.exp(-(self._ensemble or 0.0) * (self._ages.max() - self._ages))
+        weights = each(math.exp, -(self._ensemble or 0.0) * (self._ages.max() - self._ages))
         said = self._chunks[np.arange(len(self._ages)), self._ages].astype(np.float64)
-        action = (weights / weights.sum()) @ said
+        action = apply_matrix(weights / weights.sum(), said.T)
         self._ages += 1
         action[:_ARM] -= state[:_ARM]
         return control_of(action, state)

@@ -11,6 +11,7 @@ from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.held import Held
 from vico.agents.robot.reaching import TURNS, Reach, reach_spot, room_around
 from vico.agents.robot.sight import height_at
+from vico.exact import apply_matrix
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def reach_footing(
     at[2] = height_at(points, at)
     turns = turns_held_up(held, points, at)
     if beside is not None:
-        ahead = stance.rotation[:2, :2].T @ beside
+        ahead = apply_matrix(beside, stance.rotation[:2, :2].T)
         turns.insert(0, turns_along(held, math.atan2(float(ahead[1]), float(ahead[0])) + math.pi / 2))
     at[2] += _ABOVE
     room = room_around(body, points)
@@ -88,7 +89,7 @@ def turns_held_up(held: Held, points: Array, spot: Array) -> list[list[float]]:
 def _held_up(held: Held, points: Array, spot: Array, turn: float) -> float:
     """Return the share of the cells below a turned thing in which something was seen that is as high as the spot."""
     c, s = math.cos(held.heading + turn), math.sin(held.heading + turn)
-    inside = (points[:, :2] - spot[:2]) @ np.array([[-s, c], [c, s]]).T
+    inside = apply_matrix(points[:, :2] - spot[:2], np.array([[-s, c], [c, s]]))
     counts = np.maximum(np.ceil(2.0 * held.half / _CELL).astype(int), 1)
     cells = np.floor((inside / held.half + 1.0) / 2.0 * counts).astype(int)
     below = np.all((cells >= 0) & (cells < counts), axis=1)

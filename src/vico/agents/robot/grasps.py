@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody
+from vico.exact import apply_matrix, dot
 from vico.kinematics.limbs import box_points
 from vico.kinematics.ways import downward
 
@@ -61,7 +62,7 @@ class ThingBox(NamedTuple):
         """Return points all over its faces, in the base's frame, shape ``(m, 3)``."""
         half = np.maximum(np.array([*self.half, (self.high - self.low) / 2]) - inset, 1e-3)
         found = box_points(half, spacing)
-        level = found[:, :2] @ self.axes + self.centre
+        level = apply_matrix(found[:, :2], self.axes.T) + self.centre
         return np.column_stack([level, found[:, 2] + (self.low + self.high) / 2])
 
 
@@ -98,12 +99,12 @@ def thing_box(points: Array) -> ThingBox | None:
     best: tuple[float, Array, Array, Array] | None = None
     for turn in np.radians(np.arange(0.0, 90.0, 3.0)):
         axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        along = points[:, :2] @ axes.T
+        along = apply_matrix(points[:, :2], axes)
         ends = np.quantile(along, [_STRAYS, 1.0 - _STRAYS], axis=0)
         size = ends[1] - ends[0]
         area = float(size[0] * size[1])
         if best is None or area < best[0] - 1e-6:
-            best = area, axes, (ends[0] + ends[1]) / 2 @ axes, size / 2
+            best = area, axes, apply_matrix((ends[0] + ends[1]) / 2, axes.T), size / 2
     assert best is not None
     _, axes, centre, half = best
     order = np.argsort(half, kind="stable")
@@ -153,12 +154,12 @@ def _from_the_side(box: ThingBox, body: ArmBody, seen: Array) -> list[Grasp]:
         # Pads lie flat on two faces: what is held by its edges turns, and slips.
         across, opening = box.axes[axis], float(box.half[axis]) + ROOM
         ahead = box.axes[1 - axis]
-        ahead = ahead if ahead @ away > 0.0 else -ahead
-        if opening > body.opening or float(ahead @ away) < _ASIDE:
+        ahead = ahead if dot(ahead, away) > 0.0 else -ahead
+        if opening > body.opening or float(dot(ahead, away)) < _ASIDE:
             continue
         # The pads reach into what is deep, not through it.
         first, last = _wide_part(box, seen, axis, low=grip - PADS, high=grip + PADS)
-        near = first if ahead @ box.axes[1 - axis] > 0.0 else -last
+        near = first if dot(ahead, box.axes[1 - axis]) > 0.0 else -last
         at = np.array([*(box.centre + ahead * min(near + 0.05, 0.5 * (last - first) + near)), grip])
         for slant in _SLANTS:
             z = np.array([*(ahead * math.cos(slant)), -math.sin(slant)])
@@ -172,7 +173,7 @@ def _from_the_side(box: ThingBox, body: ArmBody, seen: Array) -> list[Grasp]:
 def _opening(box: ThingBox, axis: int) -> float:
     """Return how far each finger is off the middle before it closes: more where the thing's far side is hidden."""
     away = box.centre / max(float(np.hypot(*box.centre)), 1e-6)
-    return float(box.half[axis]) + ROOM + _HIDDEN * abs(float(box.axes[axis] @ away))
+    return float(box.half[axis]) + ROOM + _HIDDEN * abs(float(dot(box.axes[axis], away)))
 
 
 def _grip_height(box: ThingBox, seen: Array) -> float:
@@ -185,7 +186,7 @@ def _grip_height(box: ThingBox, seen: Array) -> float:
     for k, height in enumerate((box.high - heights).tolist()):
         slice_ = seen[np.abs(seen[:, 2] - height) < _BIN]
         if len(slice_) >= _FEWEST:
-            widths[k] = float(np.ptp(slice_[:, :2] @ box.axes.T, axis=0).max())
+            widths[k] = float(np.ptp(apply_matrix(slice_[:, :2], box.axes), axis=0).max())
     wide = np.flatnonzero(widths >= _AS_WIDE * widths.max())
     return float(box.high - heights[wide[0]])
 
@@ -205,7 +206,7 @@ def _wide_part(box: ThingBox, seen: Array, axis: int, *, low: float, high: float
     # Where no top is seen, two sides say nothing of what is between them.
     if len(points) < _FEWEST or box.high > _TOO_HIGH:
         return whole
-    across, along = ((points[:, :2] - box.centre) @ box.axes[k] for k in (axis, 1 - axis))
+    across, along = (dot(points[:, :2] - box.centre, box.axes[k]) for k in (axis, 1 - axis))
     count = max(math.ceil((whole[1] - whole[0]) / _BIN), 1)
     bins = np.clip(((along - whole[0]) / _BIN).astype(int), 0, count - 1)
     least, most = np.full(count, np.inf), np.full(count, -np.inf)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.grasps import ThingBox, thing_box
+from vico.exact import apply_matrix, product
 from vico.kinematics.limbs import Limbs, with_held
 
 Array = NDArray[np.float64]
@@ -72,11 +73,11 @@ class Held(NamedTuple):
 
     def turned(self, turn: float) -> Array:
         """Return the rotation of the hand with the thing turned about the vertical, rad, shape ``(3, 3)``."""
-        return _about_vertical(turn) @ self.rotation
+        return product(_about_vertical(turn), self.rotation)
 
     def pose_over(self, spot: Array, turn: float) -> Array:
         """Return the pose of the hand with which the middle of the thing's underside is at a spot."""
-        off = _about_vertical(turn) @ np.array([*self.middle, -self.below])
+        off = apply_matrix(np.array([*self.middle, -self.below]), _about_vertical(turn))
         return np.column_stack([self.turned(turn), spot - off])
 
 
@@ -126,7 +127,7 @@ def seen_in_hand(body: ArmBody, angles: Array, held: Held, points: Array) -> Hel
     """
     pose = body.hand(angles)
     # As it stood when the hand closed, seen from the hand.
-    stood = (points - pose[:, 3]) @ pose[:, :3] @ held.rotation.T
+    stood = apply_matrix(apply_matrix(points - pose[:, 3], pose[:, :3].T), held.rotation)
     known = held.box()
     box = thing_box(np.vstack([stood, known.points(0.0, _BALL)]))
     if len(points) < _GLANCE or box is None or float(np.abs(box.centre - known.centre).max()) > _SHIFTED:
@@ -136,7 +137,7 @@ def seen_in_hand(body: ArmBody, angles: Array, held: Held, points: Array) -> Hel
 
 def _held(body: ArmBody, rotation: Array, box: ThingBox, opening: float) -> Held:
     """Return a thing in the jaw by the box round it, seen from between the pads, along the base as the hand closed."""
-    points = box.points(_BALL, 3.0 * _BALL) @ rotation + np.array([0.0, 0.0, body.chain.grip])
+    points = apply_matrix(box.points(_BALL, 3.0 * _BALL), rotation.T) + np.array([0.0, 0.0, body.chain.grip])
     heading = math.atan2(float(box.axes[1, 1]), float(box.axes[1, 0]))
     above = max(box.high, 0.0) + _CLEAR
     return Held(points, -box.low, above, opening, rotation, box.centre.copy(), box.half.copy(), heading)

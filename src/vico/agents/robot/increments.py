@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.robot.body import Stance
 from vico.errors import InputError
+from vico.exact import dot
 
 #: Seconds between two actions.
 PERIOD = 0.05
@@ -47,7 +48,7 @@ def arm_state(observation: Mapping[str, Any]) -> NDArray[np.float32]:
             f"state: a robot of {angles.size} joints; such policies are for the manipulator, which has {len(JOINTS)}"
         )
     speeds = np.asarray(sensors["joint_velocity"], np.float64)
-    forward = Stance.of(observation).rotation[:, 0] @ np.asarray(sensors["base_velocity"], np.float64)
+    forward = dot(Stance.of(observation).rotation[:, 0], np.asarray(sensors["base_velocity"], np.float64))
     turn = float(sensors["angular_velocity"][2])
     return np.concatenate([angles, speeds, [forward, turn]]).astype(np.float32)
 

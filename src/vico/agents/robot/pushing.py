@@ -17,6 +17,7 @@ from vico.agents.robot.grasps import thing_box
 from vico.agents.robot.reaching import room_around
 from vico.agents.robot.sight import look
 from vico.agents.state import AgentState
+from vico.exact import dot
 from vico.kinematics.inverse import free_reach
 from vico.kinematics.planning import Arm, free_way
 from vico.kinematics.ways import downward, straight_way
@@ -218,7 +219,7 @@ class Pusher:
         stance = Stance.of(observation)
         missing = self._goal - self.thing
         ahead = stance.rotation[:2, 0]
-        if float(missing @ ahead) < THERE / 2:
+        if float(dot(missing, ahead)) < THERE / 2:
             self._from = stance.position[:2].copy()
             self._next(PushStage.BACK)
             return self._hold()
@@ -229,7 +230,7 @@ class Pusher:
         if self._still > _STUCK:
             return self._give_up(observation, "it does not move")
         self._keep_up(angles, moves)
-        off = math.atan2(float(ahead[0] * missing[1] - ahead[1] * missing[0]), float(ahead @ missing))
+        off = math.atan2(float(ahead[0] * missing[1] - ahead[1] * missing[0]), float(dot(ahead, missing)))
         return self._hold(_SPEED if moves else _HARD, float(np.clip(_STEER * off, -_STEER_MOST, _STEER_MOST)))
 
     def _goes_back(self, observation: Mapping[str, Any], angles: Array) -> Action:

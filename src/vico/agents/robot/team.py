@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.robot.body import ArmBody, Stance
+from vico.exact import dot
 
 Array = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def deck_spot(deck: Deck, carrier: Stance, near: Array, *, wide: float = 0.0) ->
         Of the thing across the deck, metres: between rails it stands on neither of them.
     """
     across = carrier.rotation[:, 1]
-    side = 1.0 if float((near - carrier.position)[:2] @ across[:2]) > 0.0 else -1.0
+    side = 1.0 if float(dot((near - carrier.position)[:2], across[:2])) > 0.0 else -1.0
     floor, off = deck.centre, deck.width / 2 - _FROM_EDGE
     if deck.recess is not None:
         room = deck.recess.width / 2 - _OFF_RAILS - wide / 2

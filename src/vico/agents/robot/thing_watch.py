@@ -12,6 +12,7 @@ from vico.agents.robot.body import ArmBody, Stance
 from vico.agents.robot.grasps import ThingBox, thing_box
 from vico.agents.robot.sight import look
 from vico.agents.state import AgentState
+from vico.exact import dot, product
 
 Array = NDArray[np.float64]
 
@@ -39,15 +40,15 @@ class ThingPose(NamedTuple):
     @property
     def low(self) -> float:
         """Height of its lowest point, metres."""
-        return float(self.middle[2] - np.abs(self.rotation[2]) @ self.half)
+        return float(self.middle[2] - dot(np.abs(self.rotation[2]), self.half))
 
     def inside(self, stance: Stance) -> ThingPose:
         """Return it in the frame of a base, if it is one in the world."""
-        return ThingPose(stance.inside(self.middle), stance.rotation.T @ self.rotation, self.half)
+        return ThingPose(stance.inside(self.middle), product(stance.rotation.T, self.rotation), self.half)
 
     def outside(self, stance: Stance) -> ThingPose:
         """Return it in the world, if it is one in the frame of a base."""
-        return ThingPose(stance.outside(self.middle), stance.rotation @ self.rotation, self.half)
+        return ThingPose(stance.outside(self.middle), product(stance.rotation, self.rotation), self.half)
 
     def as_box(self) -> ThingBox:
         """Return the upright box that it is, or that stands round it."""

@@ -17,6 +17,7 @@ from vico.agents.state import AgentState
 from vico.agents.teaming.visitor import LETS_GO
 from vico.agents.teaming.walking import apart, turn_towards
 from vico.agents.teaming.words import heard_from
+from vico.exact import dot
 from vico.world.public import PublicMap
 from vico.world.walkable import OPEN, SIDEWALK
 
@@ -175,7 +176,7 @@ def waiting_spots(public_map: PublicMap, door: Array, before: Array, here: Array
             angle = 2.0 * math.pi * k / _SIDES
             offset = ring * np.array([math.cos(angle), math.sin(angle)])
             x, y = (middle + offset).tolist()
-            along, aside = float(offset @ out), abs(float(offset[0] * out[1] - offset[1] * out[0]))
+            along, aside = float(dot(offset, out)), abs(float(offset[0] * out[1] - offset[1] * out[0]))
             if not bool(walkable.is_connected((x, y))) or walkable.class_of(x, y) not in (OPEN, SIDEWALK):
                 continue
             if walkable.clearance_of(x, y) >= _ROOM and along > 0.0 and (aside >= _OFF_WAY or along > _WAY_IN):

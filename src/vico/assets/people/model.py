@@ -12,6 +12,7 @@ down, legs along -z), as in SMPL-X. A mesh may rest in another pose (arms hangin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
@@ -245,7 +246,7 @@ def t_pose(rest_joints: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.f
             frames[index] = _between(rest[J[f"{side}_{child}"]] - rest[index], way)
         # The palm is turned down: the knuckles' row, little finger to index, points ahead. The forearm shares the turn.
         knuckles = frames[J[f"{side}_wrist"]] @ (rest[J[f"{side}_index1"]] - rest[J[f"{side}_pinky1"]])
-        roll = float(np.arctan2(knuckles[2], knuckles[0]))
+        roll = math.atan2(knuckles[2], knuckles[0])
         frames[J[f"{side}_wrist"]] = _about_y(roll) @ frames[J[f"{side}_wrist"]]
         frames[J[f"{side}_elbow"]] = _about_y(0.5 * roll) @ frames[J[f"{side}_elbow"]]
         # Feet stay flat, but point ahead.

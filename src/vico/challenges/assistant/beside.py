@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import apply_matrix, dot
 from vico.world.model import Container
 
 # As the simulation looks for a spot beside: in rings, in so many directions, so far, metres.
@@ -88,7 +89,7 @@ def _overlap(one: Lying, other: Lying) -> bool:
     mine, theirs = _corners(one), _corners(other)
     for yaw in (one.yaw, one.yaw + math.pi / 2, other.yaw, other.yaw + math.pi / 2):
         axis = np.array([math.cos(yaw), math.sin(yaw)])
-        a, b = mine @ axis, theirs @ axis
+        a, b = dot(mine, axis), dot(theirs, axis)
         if min(a.max(), b.max()) - max(a.min(), b.min()) < _TOLERANCE:
             return False
     return True
@@ -97,4 +98,4 @@ def _overlap(one: Lying, other: Lying) -> bool:
 def _corners(thing: Lying) -> NDArray[np.float64]:
     half = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * (thing.size[0] / 2, thing.size[1] / 2)
     c, s = math.cos(thing.yaw), math.sin(thing.yaw)
-    return half @ np.array([[c, s], [-s, c]]) + thing.spot[:2]
+    return apply_matrix(half, np.array([[c, -s], [s, c]])) + thing.spot[:2]

@@ -155,7 +155,7 @@ class CommuteTaskEnv:
     def _stay(self) -> None:
         stay_until(self.env.sim, self._judge.logs[-1].item.end)
         observations, infos = self.env.sim.observe()
-        self._result = StepResult(observations, infos, self._result.events, self.env.sim.state_hash())
+        self._result = StepResult(observations, infos, self._result.events, self.env.sim.state_hash)
         self._judge.release(float(self.env.sim.state.second))
         self._judge.begin(observations)
 

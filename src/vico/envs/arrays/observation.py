@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vico.envs.arrays.rays import RAYS, free_ways
 from vico.envs.arrays.surroundings import DOORS, HEARD, PEOPLE, PLACES, THINGS, Something, Surroundings
 from vico.envs.spaces import picture_space
+from vico.exact import each
 from vico.rules import ActionStatus
 from vico.sim.eyes import Lens
 from vico.sim.robots import Reading
@@ -105,7 +106,9 @@ def observation_arrays(
     heading = math.atan2(pose[4], pose[3])
     state = observation["state"]
     inside = bool(state["room"])
-    free = np.zeros(RAYS) if inside else np.log1p(free_ways(public_map.walkable, pose[0], pose[1], heading)) / 3.0
+    free = (
+        np.zeros(RAYS) if inside else each(math.log1p, free_ways(public_map.walkable, pose[0], pose[1], heading)) / 3.0
+    )
     heard = sorted(observation["events"], key=lambda said: -said["time"])[:HEARD]
     speakers = [Something(said["speaker"], "", np.asarray(said["position"], np.float64)) for said in heard]
     angle = 2.0 * math.pi * state["time"] / 86_400.0

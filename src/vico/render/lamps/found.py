@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.exact import apply_matrix
 from vico.render.records import LAMP
 from vico.world.mesh import Material, Surface
 
@@ -55,7 +56,7 @@ def lamps_placed(
         place, is_globe = head
         height = float(place[2] * transform[2, 2])
         # Just below the head, or it would shine into itself alone.
-        lamp["x"], lamp["y"], lamp["z"] = transform[:3, :3] @ place + transform[:3, 3]
+        lamp["x"], lamp["y"], lamp["z"] = apply_matrix(place, transform[:3, :3]) + transform[:3, 3]
         # A globe shines all around, else the ground gets most.
         lamp["axis_z"], lamp["spread"], lamp["share"] = -1.0, (0.3 if is_globe else 1.1), (0.7 if is_globe else 0.3)
         # Bright below and even around: the lamp's light is spread over its height's square.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.exact import apply_matrix
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, take_pictures
 from vico.render.quality import PLAIN, RenderQuality
@@ -286,7 +287,7 @@ class PictureSet:
         if "semantic" in out and self._asked.classify is not None:
             out["semantic"][:] = self._asked.classify(seen(frames.segmentation))
         if "normals" in out:
-            out["normals"][:] = seen(frames.normals) @ self._asked.rotation[k].T.astype(np.float32)
+            out["normals"][:] = apply_matrix(seen(frames.normals), self._asked.rotation[k].astype(np.float32))
         if "flow" in out:
             out["flow"][:] = self._flow(k, seen(frames.places))
 
@@ -297,7 +298,7 @@ class PictureSet:
         if before is None:
             return np.zeros((*places.shape[:2], 2), np.float32)
         lens = self._asked.lenses[k]
-        was = lens.project(places @ before.T)
+        was = lens.project(apply_matrix(places, before))
         part, _ = self._place[k]
         if part.cube is not None:
             moved = part.cube.pixel - was

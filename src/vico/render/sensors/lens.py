@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.exact import apply_matrix
 
 PROJECTIONS = ("pinhole", "fisheye", "panorama")
 SMALLEST, LARGEST = 16, 4096
@@ -101,7 +103,7 @@ class Lens:
         """Focal lengths and middle, pixels, as a matrix of shape ``(3, 3)``; see the class for what they mean."""
         half = np.radians(self.fov) / 2
         if self.projection == "pinhole":
-            fx = fy = self.height / 2 / np.tan(half)
+            fx = fy = self.height / 2 / math.tan(half)
         elif self.projection == "fisheye":
             fx = fy = min(self.width, self.height) / 2 / half
         else:
@@ -199,7 +201,7 @@ def cube_map(lens: Lens) -> CubeMap:
     rays = directions(lens)
     seen = np.isfinite(rays[..., 0])
     rays = np.where(seen[..., None], rays, _AHEAD[0])
-    face = (rays @ _AHEAD.T).argmax(axis=-1)
+    face = apply_matrix(rays, _AHEAD).argmax(axis=-1)
     used, number = np.unique(face[seen], return_inverse=True)
     compact = np.zeros(face.shape, np.int64)
     compact[seen] = number

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import apply_matrix
 from vico.render.arrays import INDOORS, PAD
 from vico.render.compiled import inlined, kernel
 from vico.render.lamps.grid import Tops
@@ -107,7 +108,7 @@ def shadow_map(
     across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
     axes = np.stack([across, np.cross(sun, across), sun])
     corners = np.array([[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i, j, k in np.ndindex(2, 2, 2)])
-    reach = corners @ axes.T
+    reach = apply_matrix(corners, axes)
     first, last = reach.min(axis=0), reach.max(axis=0)
     span = np.maximum(last - first, 1e-3)
     factor = np.array([size / span[0], size / span[1], 1.0 / (span[2] * 1.01)])

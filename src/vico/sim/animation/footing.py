@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.io.compiled import compiled
 from vico.sim.animation.blending import is_gait, is_seated
 from vico.sim.animation.gait import foothold, gait_of_run, gait_of_walk
@@ -93,7 +95,7 @@ def ground_under_feet(
     behind = _HEEL * people["heel_length"][:, None, None]
     ground = np.zeros((len(people), 2, 2, 4))
     ground[..., LEVEL] = np.where(edge, found.max(axis=-1), heel + rise * behind / run)
-    ground[..., TILT] = np.where(edge, 0.0, -np.arctan2(rise, run))
+    ground[..., TILT] = np.where(edge, 0.0, -each(math.atan2, rise, run))
     steps = edge & _walks(numbers)[:, None, None]
     if roughly is not None:
         steps &= ~roughly[:, None, None]

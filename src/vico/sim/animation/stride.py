@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.io.compiled import compiled
 from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RIDE_BIKE, RUN, WALK
 
@@ -34,7 +36,7 @@ def pace_of_step(step, height):  # type: ignore[no-untyped-def]
 
 def pace_on(treads: NDArray[np.float64], pace: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the speed that strides are those of, m/s: of a tread a step where treads are so deep, else `pace`."""
-    on_treads = np.maximum(2.0 * treads / (_STRIDE * height), 0.0) ** (1.0 / _POWER)
+    on_treads = each(math.pow, np.maximum(2.0 * treads / (_STRIDE * height), 0.0), 1.0 / _POWER)
     return np.where(treads > 0.0, np.maximum(on_treads, _SLOWEST), pace)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,7 +83,7 @@ class Gathering:
         line = shapely.LineString(self.route)
         x, y = line.interpolate(along).coords[0]
         a, b = line.interpolate(max(along - 0.5, 0.0)).coords[0], line.interpolate(along + 0.5).coords[0]
-        yaw = float(np.arctan2(b[1] - a[1], b[0] - a[0]))
+        yaw = math.atan2(b[1] - a[1], b[0] - a[0])
         aside = BESIDE_APART * (column - (self.abreast - 1) / 2)
         facing = yaw if gone <= way else yaw + np.pi
         return np.array([x - np.sin(yaw) * aside, y + np.cos(yaw) * aside, facing])

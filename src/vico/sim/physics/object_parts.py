@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.exact import apply_matrix
 from vico.quaternions import matrix_of
 from vico.sim.physics.records import BALL, BOX, CYLINDER, PARTS, RigidObject, RigidPart
 
@@ -86,7 +87,7 @@ class PartRows(NamedTuple):
             part, squares = mass * float(shares[k] / shares.sum()), self.half[k] ** 2
             own = part * _moments(PARTS[k], squares)
             turn, away = matrix_of(self.quaternion[k]), self.position[k] ** 2
-            found += ((turn * turn) @ own) + part * (away.sum() - away)
+            found += apply_matrix(own, turn * turn) + part * (away.sum() - away)
         return found
 
 

@@ -13,6 +13,7 @@ from vico.assets.motions import HIP_HEIGHT, MotionClip
 from vico.assets.motions.rotations import matrices_of, vectors_of
 from vico.assets.people import Appearance, body_of
 from vico.errors import InputError
+from vico.exact import product
 from vico.seeds import rng
 from vico.sim.animation import STYLE, Hands, Hold, Transition, free_hands, pose, style_of
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian
@@ -127,10 +128,10 @@ def motion_of(run: Run, agent: str) -> MotionClip:
     pelvis = np.concatenate([found.joints[:, 0] + found.offsets for found in poses]).astype(np.float64)
     place = np.column_stack([rows[axis][mine] for axis in ("x", "y", "z")])
     standing = float(poses[0].joints[0, 0, 2])
-    position = (place + (turned @ pelvis[:, :, None])[:, :, 0]) * (HIP_HEIGHT / standing)
+    position = (place + product(turned, pelvis[:, :, None])[:, :, 0]) * (HIP_HEIGHT / standing)
     times = run.columns("steps")["time"]
     rate = (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 1 else 1.0
-    orientation = vectors_of(turned @ matrices_of(rotations[:, 0]))
+    orientation = vectors_of(product(turned, matrices_of(rotations[:, 0])))
     return MotionClip(agent, rate, np.asarray(position, np.float32), orientation, rotations[:, 1:])
 
 

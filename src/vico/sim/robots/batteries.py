@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from vico.assets.robots import BatteryModel, RobotModel
+from vico.exact import dot
 from vico.sim.robots import commands
 from vico.sim.robots.flying import LOW_BATTERY, flight_of
 from vico.sim.robots.rotors import FlightPhase
@@ -89,4 +90,4 @@ def _base_speed(run: RobotRun, robot: int, unit: str) -> float:
     base = run.engine.base(robot)
     if unit == "rad/s":
         return float(base.angular_velocity_body[2])
-    return float(base.rotation[:, 0] @ base.velocity)
+    return float(dot(base.rotation[:, 0], base.velocity))

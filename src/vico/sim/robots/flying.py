@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.exact import dot
 from vico.sim.bodies import Bodies
 from vico.sim.robots.airspace import HOVER
 from vico.sim.robots.keeping_apart import BRAKE, Around, keep_apart, near_in_the_air
@@ -277,7 +278,7 @@ def _aim(flight: Flight, row: int, position: Array, way: Array, leg: int) -> Non
     along = end - start
     length = float(np.linalg.norm(along))
     along = along / length if length > 1e-6 else np.zeros(3)
-    done = min(max(float((position - start) @ along), 0.0), length)
+    done = min(max(float(dot(position - start, along)), 0.0), length)
     left = length - done
     speed = math.sqrt(2.0 * BRAKE * max(left - 0.1, 0.0))
     level, rise = math.hypot(along[0], along[1]), float(along[2])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
-from vico.exact import apply_matrix
+from vico.exact import apply_matrix, product
 from vico.kinematics.arm import Chain, hand_pose
 from vico.quaternions import matrix_of, quaternion_of
 from vico.sim.physics.engine import PhysicsEngine
@@ -101,7 +101,7 @@ class OracleGrasp:
             inside = apply_matrix(at - objects.position[k], lies.T) - (0.0, 0.0, half[2])
             if np.all(np.abs(inside) <= half + MARGIN):
                 away = apply_matrix(objects.position[k] - at, turn.T)
-                self._place[robot] = [*away, *quaternion_of(_product(turn.T, lies))]
+                self._place[robot] = [*away, *quaternion_of(product(turn.T, lies))]
                 # Who holds what is as wide as the jaw can still open it.
                 self._touched[robot] = min(float(self._apart[robot]), own.opening - OPENS - _CLOSES)
                 self.entity[robot], objects.holder[k], objects.hand[k] = objects.entity[k], self._robots[robot], -1
@@ -110,7 +110,7 @@ class OracleGrasp:
     def _move(self, robot: int, k: int, hand: Array, objects: MovableObjects) -> None:
         place = self._place[robot]
         objects.position[k] = hand[:, 3] + apply_matrix(place[:3], hand[:, :3])
-        objects.set_rotation(k, _product(hand[:, :3], matrix_of(place[3:])))
+        objects.set_rotation(k, product(hand[:, :3], matrix_of(place[3:])))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, copied."""
@@ -140,9 +140,4 @@ def _hand(engine: PhysicsEngine, robot: int, chain: Chain, angles: Array) -> Arr
     hand_pose(chain, np.ascontiguousarray(angles), np.empty((count, 3)), np.empty((count, 3)), pose)
     base = engine.base(robot)
     at = apply_matrix(pose[:, 3], base.rotation) + base.position
-    return np.column_stack([_product(base.rotation, pose[:, :3]), at])
-
-
-def _product(a: Array, b: Array) -> Array:
-    """Return ``a @ b``, the same on every machine."""
-    return apply_matrix(b.T, a).T
+    return np.column_stack([product(base.rotation, pose[:, :3]), at])

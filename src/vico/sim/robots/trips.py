@@ -6,6 +6,8 @@ through is for the simulation to say (`vico.sim.robot_doors`), which knows who s
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -175,7 +177,7 @@ def pass_door(run: RobotRun, robot: int, space: int, spot: Array) -> None:
         yaw = rooms.entrances[origin].facing
     else:
         ahead = spot - rooms.door(space, origin)[:2]
-        yaw = float(np.arctan2(ahead[1], ahead[0]))
+        yaw = math.atan2(ahead[1], ahead[0])
     place, housed = np.array([*spot, yaw]), run.housed()
     if space == OUTDOORS:
         housed.release(robot, place)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from vico.assets.vehicle_lights import lit_lamps, night_lamps
 from vico.assets.vehicle_parts import mirrored
 from vico.assets.vehicles import CRANK_AXLE, ridden_prototypes, vehicle_prototypes
+from vico.exact import product
 from vico.sim.bodies import Drawn, joined_drawn
 from vico.sim.traffic.lights import LampDrawing
 from vico.sim.traffic.makes import VEHICLE_MODELS
@@ -88,4 +89,4 @@ def _turned_cranks(bicycles: NDArray[np.float32], turns: NDArray[np.float64]) ->
     cranks = np.tile(np.eye(4), (len(turns), 1, 1))
     cranks[:, 0, 0], cranks[:, 0, 2], cranks[:, 2, 0], cranks[:, 2, 2] = c, s, -s, c
     cranks[:, :3, 3] = CRANK_AXLE
-    return (bicycles.astype(np.float64) @ cranks).astype(np.float32)
+    return product(bicycles.astype(np.float64), cranks).astype(np.float32)

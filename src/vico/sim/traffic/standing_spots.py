@@ -96,7 +96,7 @@ class _Site:
         here = np.array(self.lines[walkway].interpolate(offset).coords[0])
         ahead = np.array(self.lines[walkway].interpolate(offset + 0.3).coords[0])
         behind = np.array(self.lines[walkway].interpolate(max(offset - 0.3, 0.0)).coords[0])
-        yaw = float(np.arctan2(*(ahead - behind)[::-1]))
+        yaw = math.atan2(*(ahead - behind)[::-1])
         return float(here[0] - np.sin(yaw) * aside), float(here[1] + np.cos(yaw) * aside), yaw
 
     def aside(self, walkway: int, offset: float, point: Point2) -> float:
@@ -205,7 +205,7 @@ def _add_stops(site: _Site, world: World) -> None:
             number, tram_stop = tram_stops[name]
             door = min(float(track.project(shapely.Point(tram_stop.wait[:2]))), offset)
             ahead, here = (np.array(track.interpolate(along).coords[0]) for along in (door + 0.5, door - 0.5))
-            pose = np.array([*here, np.arctan2(*(ahead - here)[::-1])])
+            pose = np.array([*here, math.atan2(*(ahead - here)[::-1])])
             _add_stop(site, world, tram_stop.wait[:2], pose, number, tracks)
 
 

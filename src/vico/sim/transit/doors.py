@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import product
+
 #: Seconds that doors take to open or close.
 DOOR_TIME = 1.6
 _PLUG = 0.05  # metres that open leaves stand out from the side
@@ -45,5 +47,5 @@ def leaf_transforms(
         local = np.tile(np.eye(4), (n, 1, 1))
         local[:, 0, 3] = x + share * width * way
         local[:, 1, 3] = y + math.copysign(_PLUG, y) * np.minimum(share * 8.0, 1.0)
-        found.append(bases @ local)
+        found.append(product(bases, local))
     return np.concatenate(found) if found else np.zeros((0, 4, 4))

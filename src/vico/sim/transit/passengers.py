@@ -5,6 +5,7 @@ Where a bus is asked for, numbers from the number of buses on are trams, as with
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -167,7 +168,7 @@ class Passengers:
             door = int(np.argmin(np.hypot(*(fronts - here).T)))
             walkers.stand_kind[i], walkers.boards[i], walkers.spot[i] = BOARD, bus, NONE
             walkers.stand_xy[i] = fronts[door]
-            walkers.stand_yaw[i] = np.arctan2(*(doors[door] - fronts[door])[::-1])
+            walkers.stand_yaw[i] = math.atan2(*(doors[door] - fronts[door])[::-1])
 
     def _board(self, i: int, bus: int) -> None:
         """Let somebody in who stands before a door; who comes too late walks on."""

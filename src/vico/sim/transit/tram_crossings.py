@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.records import TRACK_CROSSING
 from vico.sim.transit.tram_outlines import first_taken
@@ -171,7 +173,7 @@ def _met(
     if len(track.xy) < 2:
         return found, first, last
     way = np.gradient(track.xy, axis=0)
-    yaw = np.arctan2(way[:, 1], way[:, 0])
+    yaw = each(math.atan2, way[:, 1], way[:, 0])
     # Few of a city's lanes are near the track: they are found by some of its points.
     around = tree.query_ball_point(track.xy[:: int(_FARTHEST / STEP)], 2.0 * _FARTHEST)
     near = np.unique(np.concatenate([np.asarray(part, np.int64) for part in around]))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import dot
 from vico.sim.traffic.records import DARK, GREEN
 from vico.world.lanes import LaneGraph
 from vico.world.rails import STEP, TRAM_BRAKING, Track
@@ -84,5 +86,5 @@ def _beside(
     """Return the point of a track that is nearest to another one, its distance, and the angle to a way there, rad."""
     apart = np.hypot(*(xy - point).T)
     k = int(np.argmin(apart))
-    cross, dot = heading[k, 0] * way[1] - heading[k, 1] * way[0], float(heading[k] @ way)
-    return k, float(apart[k]), abs(float(np.arctan2(cross, dot)))
+    across, along = heading[k, 0] * way[1] - heading[k, 1] * way[0], float(dot(heading[k], way))
+    return k, float(apart[k]), abs(math.atan2(across, along))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import each
 from vico.io.compiled import compiled
 from vico.world.rails import STEP, TRAM_LENGTH, Track
 
@@ -65,7 +67,7 @@ def _contested(tracks: Sequence[Track]) -> list[NDArray[np.bool_]]:
 
 def _heading(track: Track) -> NDArray[np.float64]:
     way = np.gradient(track.xy, axis=0)
-    return np.asarray(np.arctan2(way[:, 1], way[:, 0]), np.float64)
+    return each(math.atan2, way[:, 1], way[:, 0])
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ def heads_on(streets: TrafficNetwork, height: HeightField, seed: int) -> dict[st
     heads = []
     for (kind, day), transform in zip(days, placed.transforms.astype(np.float64), strict=True):
         head: dict[str, Any] = {"kind": kind, "at": np.round(transform[:3, 3], 3).tolist()}
-        head["yaw"] = round(float(np.arctan2(transform[1, 0], transform[0, 0])), 4)
+        head["yaw"] = round(math.atan2(transform[1, 0], transform[0, 0]), 4)
         head["scale"] = round(float(transform[2, 2]), 4)
         if day is not None:
             text = "".join(_LETTERS.get(light, "-") for light in day.light.tolist())

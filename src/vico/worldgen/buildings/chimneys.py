@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon
@@ -80,7 +82,7 @@ def party_wall_stacks(
     for k, (place, grow) in zip(longest.tolist(), draws.tolist(), strict=False):
         middle = edges.start[k] + edges.along[k] * edges.length[k] * (0.38 + 0.24 * place)
         centre = middle - edges.out[k] * (_THICK / 2 + 0.06)
-        yaw = float(np.arctan2(edges.along[k][1], edges.along[k][0]))
+        yaw = math.atan2(edges.along[k][1], edges.along[k][0])
         box = _box(centre, np.array([_STACK, _THICK]), yaw)
         if free.contains(box) and not any(box.intersects(m.polygon) for m in made):
             stack = _chimney(part, box, mesh, base, 0.35 * grow)
@@ -116,7 +118,7 @@ def height_of(mesh: Mesh, xy: NDArray[np.float64]) -> float:
 def _main_direction(polygon: Polygon) -> float:
     corners = edges_of(polygon)
     along = corners.along[int(corners.length.argmax())]
-    return float(np.arctan2(along[1], along[0]))
+    return math.atan2(along[1], along[0])
 
 
 def _box(centre: NDArray[np.float64], size: NDArray[np.float64], yaw: float) -> Polygon:

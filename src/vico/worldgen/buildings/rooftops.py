@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Sequence
 
@@ -227,7 +228,7 @@ def _spot(room: Polygon, at: NDArray[np.float64]) -> NDArray[np.float64]:
 def _main_direction(polygon: Polygon) -> float:
     box = np.asarray(shapely.minimum_rotated_rectangle(polygon).exterior.coords)
     side = box[1] - box[0]
-    return float(np.arctan2(side[1], side[0]))
+    return math.atan2(side[1], side[0])
 
 
 def _box(centre: NDArray[np.float64], size: NDArray[np.float64], yaw: float) -> Polygon:

@@ -112,7 +112,7 @@ def kerb_bays(street: Street, side: float, depth: float, breaks: BaseGeometry) -
             x, y = (a + b) / 2 + out * (depth / 2 - (0.0 if across else _INWARD))
             towards = out if across else u
             size = (depth, run) if across else (run, depth)
-            found.append(Bay((float(x), float(y)), float(np.arctan2(towards[1], towards[0])), *size))
+            found.append(Bay((float(x), float(y)), math.atan2(towards[1], towards[0]), *size))
     return found
 
 
@@ -162,5 +162,5 @@ def lot_bays(shape: Polygon) -> list[Bay]:
                 continue
             x, y = (one + other).mean(axis=0) / 2
             ahead = one[1] - one[0]
-            found.append(Bay((float(x), float(y)), float(np.arctan2(ahead[1], ahead[0])), LOT_DEPTH, LOT_PITCH))
+            found.append(Bay((float(x), float(y)), math.atan2(ahead[1], ahead[0]), LOT_DEPTH, LOT_PITCH))
     return found

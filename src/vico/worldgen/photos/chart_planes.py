@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -46,6 +48,6 @@ def level_turns(
         if len(ring) == 5:
             sides = np.diff(ring, axis=0)[:2]
             along = sides[int(np.linalg.norm(sides[1]) > np.linalg.norm(sides[0]) + 1e-6)]
-            angle = float(np.arctan2(along[1], along[0]))
+            angle = math.atan2(along[1], along[0])
             turn[k] = (angle + np.pi / 2) % np.pi - np.pi / 2
     return turn

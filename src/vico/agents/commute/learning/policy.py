@@ -37,6 +37,7 @@ from vico.agents.commute.learning.fields import (
 from vico.agents.commute.learning.kernels import see
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.errors import MissingFileError, SchemaError
+from vico.exact import each
 from vico.io.npz import read_npz
 from vico.rules import BIKE_SPEED, BUS_DWELL, WALK_SPEED
 from vico.seeds import rng
@@ -88,9 +89,10 @@ class Network:
         """Return the logit of each action, shape ``(actions,)``, for what is seen, shape ``(SEEN,)``."""
         x = seen
         for k in range(0, len(self._layers), 2):
-            x = x @ self._layers[k] + self._layers[k + 1]
+            # Summed input by input, in one order whatever the machine's BLAS.
+            x = (x[:, None] * self._layers[k]).sum(axis=0) + self._layers[k + 1]
             if k < len(self._layers) - 2:
-                x = np.tanh(x)
+                x = each(math.tanh, x).astype(np.float32)
         return x
 
 
@@ -119,7 +121,7 @@ class PolicyCommuter:
         take_in(self._state, observation, info["commute"])
         see(self._city, self._state, self._seen)
         logits = self._network.logits(self._seen).astype(np.float64)
-        chances = np.exp(logits - logits.max())
+        chances = each(math.exp, logits - logits.max())
         kind = int(np.searchsorted(np.cumsum(chances), self._rng.random() * chances.sum()))
         name = ACTIONS[min(kind, len(ACTIONS) - 1)]
         if name == "move_forward":

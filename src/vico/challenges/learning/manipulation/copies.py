@@ -19,6 +19,7 @@ from vico.challenges.learning.manipulation.rewards import NEAR
 from vico.challenges.learning.manipulation.scene import Array, Scene, Thing, compile_scene, listen, write_thing
 from vico.challenges.learning.manipulation.tasks import ManipulationTask
 from vico.errors import InputError, SchemaError
+from vico.exact import apply_matrix, product
 from vico.seeds import rng
 
 # Targets this much wider than the jaw when it was fastened to a box let go of it, metres.
@@ -202,9 +203,9 @@ class Copies:
         rotation = hand.rotation[0]
         joint = hand.position[0] - rotation[:, 2] * self.scene.chain.grip
         turn = np.zeros(4)
-        mujoco.mju_mat2Quat(turn, (rotation.T @ thing.rotation[0]).ravel())
+        mujoco.mju_mat2Quat(turn, product(rotation.T, thing.rotation[0]).ravel())
         # Anchor in the box's frame, place in the hand's, rotation, how much torque counts beside force.
-        return np.concatenate([np.zeros(3), rotation.T @ (thing.position[0] - joint), turn, [1.0]])
+        return np.concatenate([np.zeros(3), apply_matrix(thing.position[0] - joint, rotation.T), turn, [1.0]])
 
     def _joints(self) -> tuple[Array, Array]:
         """Return positions and speeds of the arm's joints and the jaw, shape ``(n, 8)`` each."""

@@ -15,6 +15,7 @@ from vico.challenges.learning.manipulation.environment import ManipulationEnv
 from vico.challenges.learning.manipulation.motors import ACTIONS
 from vico.challenges.learning.manipulation.readings import Readings, hand_poses
 from vico.challenges.learning.manipulation.scene import PAD, Array
+from vico.exact import apply_matrix, product
 from vico.kinematics.ways import downward, way_down
 
 #: Tilts of the hand that are tried, rad, and turns about the vertical of what is put down.
@@ -79,7 +80,7 @@ class ScriptedExpert:
             return
         way, down = found
         self._way, self._up = list(way[: down + 1]), list(way[down + 1 :])
-        across = r.thing_rotation[0, :2, :2].T @ self._hand_y(way[down])
+        across = apply_matrix(self._hand_y(way[down]), r.thing_rotation[0, :2, :2].T)
         self._opening = float(half[int(np.abs(across).argmax())]) - PAD + _ROOM
 
     def _hand_y(self, angles: Array) -> Array:
@@ -95,8 +96,8 @@ class ScriptedExpert:
             c, s = math.cos(turn), math.sin(turn)
             rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             at = goal.copy()
-            at[:2] = r.goal[0, :2] + (rotation @ (r.hand[0] - r.thing[0]))[:2]
-            turned.append(np.column_stack([rotation @ r.hand_rotation[0], at]))
+            at[:2] = r.goal[0, :2] + apply_matrix(r.hand[0] - r.thing[0], rotation)[:2]
+            turned.append(np.column_stack([product(rotation, r.hand_rotation[0]), at]))
         found = way_down(self._chain, r.joints[0, :7].copy(), turned, holds=True)
         if found is None:
             self.stage = Stage.DONE

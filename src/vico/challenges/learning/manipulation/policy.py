@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
+from vico.exact import apply_matrix, each
 from vico.io.files import new_file
 from vico.io.npz import read_npz
 
@@ -67,11 +69,11 @@ class ArrayPolicy:
                 f"policy: an observation of shape {x.shape} for a network of {self.inputs} inputs; make the "
                 "environment with the task and observation that it was trained on"
             )
-        x = (x - self.mean) / self.deviation
+        x = np.asarray((x - self.mean) / self.deviation, np.float32)
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            x = x @ weight.T + bias
+            x = np.asarray(apply_matrix(x, weight) + bias, np.float32)
             if layer < len(self.weights) - 1:
-                x = np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
+                x = np.where(x > 0.0, x, each(math.expm1, np.minimum(x, 0.0)).astype(np.float32))
         return np.clip(x, -1.0, 1.0).astype(np.float32)
 
 

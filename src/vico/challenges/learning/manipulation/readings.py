@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.challenges.learning.manipulation.scene import PAD, Array, Scene
+from vico.exact import each
 from vico.io.compiled import compiled
 from vico.kinematics.arm import hand_pose
 
@@ -113,7 +115,7 @@ class Readings(NamedTuple):
         k, up, first, second = self._level_axes()
         jaw = self.jaw_in_thing
         side = np.where(self.thing_rotation[k, 2, up] < 0.0, -1.0, 1.0)
-        return np.arctan2(side * jaw[k, second], jaw[k, first])
+        return each(math.atan2, side * jaw[k, second], jaw[k, first])
 
     @property
     def level_half(self) -> Array:
