@@ -7,6 +7,7 @@ sentence too, and where it happened; `vico --verbose` shows the traceback.
 
 import os
 import traceback
+from collections.abc import Sequence
 
 
 class VicoError(Exception):
@@ -72,3 +73,9 @@ def line_of(error: BaseException) -> str:
     """Return the file and line that an error came from."""
     frames = traceback.extract_tb(error.__traceback__)
     return f"{os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else "an unknown line"
+
+
+def some_of(names: Sequence[str], most: int = 12) -> str:
+    """Return names for a message, separated by commas; of many only the first, and how many there are."""
+    told = ", ".join(names[:most])
+    return told if len(names) <= most else f"{told}, ... ({len(names):,} in all)"

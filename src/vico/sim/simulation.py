@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import InputError
+from vico.errors import InputError, some_of
 from vico.sim.actions import AgentFault, apply_actions
 from vico.sim.base import SimulationBase
 from vico.sim.city import follow_city_events
@@ -396,7 +396,7 @@ def _indices(observe: Sequence[str], names: list[str]) -> list[int]:
     """Return the indices of agents by their names."""
     unknown = [name for name in observe if name not in names]
     if unknown:
-        raise InputError(f"observe: nobody is called {unknown[0]!r}; there are {', '.join(names)}")
+        raise InputError(f"observe: nobody is called {unknown[0]!r}; there are {some_of(names)}")
     return [names.index(name) for name in observe]
 
 

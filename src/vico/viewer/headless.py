@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from vico.errors import InputError
+from vico.errors import InputError, some_of
 from vico.io.files import write_bytes
 from vico.render.film import FilmWriter
 from vico.viewer.browser import BrowserPage, open_page
@@ -104,8 +104,7 @@ class Stage:
         if not agent:
             return 0
         if agent not in self._agents:
-            names = ", ".join(list(self._agents)[:12])
-            raise InputError(f"headless: nobody is called {agent!r}; there are {names}")
+            raise InputError(f"headless: nobody is called {agent!r}; there are {some_of(list(self._agents))}")
         return int(self._agents[agent])
 
 

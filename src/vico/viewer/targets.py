@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import InputError
+from vico.errors import InputError, some_of
 from vico.quaternions import matrix_of
 from vico.sim.bodies import Bodies
 from vico.sim.moves import eye_height
@@ -116,7 +116,7 @@ def _target_in_traffic(state: SimulationState, name: str) -> Target:
         if found:
             return _target_of_body(bodies, found[0], 0.85 * float(bodies.height[found[0]]))
     raise InputError(
-        f"follow: nobody is called {name!r}, or is not there now; there are {', '.join(state.names)}, and traffic, "
+        f"follow: nobody is called {name!r}, or is not there now; there are {some_of(state.names)}, and traffic, "
         "such as 'car 0'"
     )
 
