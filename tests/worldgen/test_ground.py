@@ -1,5 +1,6 @@
 """Streets and the ground: a partition that covers the world, drapes on it and carries paint."""
 
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -11,10 +12,11 @@ from stages_alone import ground_of
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmWay, read_osm
+from vico.geo.osm_parts import OsmParts
 from vico.world.mesh import Surface
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.facts.expendable import NamedShape
-from vico.worldgen.facts.ground_kinds import ground_partition, sea_polygons
+from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, sea_polygons
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width, lane_count
 from vico.worldgen.facts.tags import number
@@ -165,6 +167,40 @@ def test_the_sea_lies_to_the_right_of_the_coast() -> None:
     (sea,) = sea_polygons(osm, shapely.box(-200, -200, 200, 200))
     assert sea.contains(shapely.Point(0, -100))
     assert not sea.contains(shapely.Point(0, 100))
+
+
+def test_a_coast_that_ends_within_the_window_goes_straight_on_to_its_edge() -> None:
+    line = np.array([(-500.0, 0.0), (0.0, 20.0), (150.0, 0.0)])
+    osm = OsmData(
+        LocalFrame(43.73, 7.42), 200.0, 0.0, [], [OsmWay(1, [1, 2, 3], line, False, {"natural": "coastline"})], [], []
+    )
+    (sea,) = sea_polygons(osm, shapely.box(-200, -200, 200, 200))
+    assert sea.area == pytest.approx(400 * 200 + 4000, rel=0.03)
+    assert not sea.contains(shapely.Point(180, 50))
+
+
+def test_of_what_the_map_does_not_cover_nobody_knows_whether_it_is_sea() -> None:
+    line = np.array([(-500.0, 0.0), (500.0, 0.0)])
+    osm = OsmData(
+        LocalFrame(43.73, 7.42), 200.0, 0.0, [], [OsmWay(1, [1, 2], line, False, {"natural": "coastline"})], [], [],
+        covered=(-300.0, -150.0, 100.0, 300.0),
+    )  # fmt: skip
+    (sea,) = sea_polygons(osm, shapely.box(-200, -200, 200, 200))
+    assert sea.bounds == (-200.0, -150.0, 100.0, 0.0)
+    elsewhere = replace(osm, covered=(300.0, 300.0, 400.0, 400.0))
+    assert sea_polygons(elsewhere, shapely.box(-200, -200, 200, 200)) == []
+
+
+def test_a_part_of_a_map_in_the_open_sea_is_sea() -> None:
+    line = np.array([(-900.0, 0.0), (900.0, 0.0)])
+    osm = OsmData(
+        LocalFrame(43.73, 7.42), 800.0, 0.0, [], [OsmWay(1, [1, 2], line, False, {"natural": "coastline"})], [], []
+    )
+    whole = replace(osm, sea=sea_polygons(osm, shapely.box(-800, -800, 800, 800)))
+    part = OsmParts(whole).within(half=100.0, margin=20.0, east=300.0, north=-500.0)
+    assert not part.ways
+    areas = mapped_areas(site_facts(part), shapely.box(-100, -100, 100, 100))
+    assert sum(one.shape.area for one in areas["water"]) == pytest.approx(200.0 * 200.0)
 
 
 def test_monaco_s_harbour_is_water(shared_data: Path) -> None:

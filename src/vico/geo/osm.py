@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +124,10 @@ class OsmData:
     edges
         West, south, east and north of a rectangle in the window, metres, where streets and transit end; None where they
         end at the window's own sides.
+    covered
+        West, south, east and north of what the file says that it covers, metres; None where it says nothing.
+    sea
+        As it was found for a larger map that this is a part of; None where the coastlines of this one tell it.
     """
 
     frame: LocalFrame
@@ -137,6 +141,8 @@ class OsmData:
     timestamp: str | None = None
     broken: list[tuple[str, str]] = field(default_factory=list)
     edges: tuple[float, float, float, float] | None = None
+    covered: tuple[float, float, float, float] | None = None
+    sea: list[Polygon] | None = None
 
     @property
     def box(self) -> tuple[float, float, float, float]:
@@ -227,6 +233,7 @@ class _Reader:
         self.east += 360.0 * self.wraps
         self.newest = 0.0
         self.stamp = ""
+        self.covered: tuple[float, float, float, float] | None = None
         self.relations: list[OsmRelation] = []
         self.node_rows: list[tuple[int, float, float, Tags]] = []
         self.way_rows: list[tuple[int, list[int], list[float], list[float], Tags, bool]] = []
@@ -238,6 +245,7 @@ class _Reader:
     def read(self) -> None:
         with osmium.io.Reader(self.path, osmium.osm.NOTHING) as file:
             self.stamp = file.header().get("osmosis_replication_timestamp")
+            self.covered = self._box(file.header().box())
         wanted: set[int] = set()
         for relation in osmium.FileProcessor(self.path, osmium.osm.RELATION):
             self.objects += 1
@@ -256,6 +264,16 @@ class _Reader:
                 self._node(thing)
             else:
                 self._way(thing, thing.id in wanted)
+
+    def _box(self, told: osmium.osm.Box) -> tuple[float, float, float, float] | None:
+        """Return what a file's header says that it covers, metres; None where it says nothing."""
+        if self.wraps or not told.valid():
+            return None
+        low, high = told.bottom_left, told.top_right
+        lats, lons = np.array([low.lat, low.lat, high.lat, high.lat]), np.array([low.lon, high.lon, low.lon, high.lon])
+        # Meridians are not upright in the frame: the rectangle within the four corners.
+        x, y = self.frame.to_enu(lats, lons).T
+        return float(max(x[0], x[2])), float(max(y[0], y[1])), float(min(x[1], x[3])), float(min(y[2], y[3]))
 
     def _node(self, node: osmium.osm.Node) -> None:
         place = node.location
@@ -383,7 +401,8 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
                 areas.append(_plain(area, broken))
         if any((kind, ref) in kept for kind, ref, _ in relation.members):
             relations.append(relation)
-    return OsmData(reader.frame, half, margin, nodes, ways, areas, relations, digest, _newest(reader), broken)
+    found = OsmData(reader.frame, half, margin, nodes, ways, areas, relations, digest, _newest(reader), broken)
+    return replace(found, covered=reader.covered)
 
 
 def _nodes(reader: _Reader) -> list[OsmNode]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData
+from vico.geo.osm import OsmData, polygons_of
 
 
 class OsmParts:
@@ -68,12 +70,20 @@ class OsmParts:
             areas=areas,
             relations=relations,
             broken=broken,
+            covered=None,
+            sea=None if whole.sea is None else _parts_in(whole.sea, window, shift),
         )
 
 
 def _met(tree: shapely.STRtree, window: Polygon) -> list[int]:
     """Return the numbers of the shapes that touch a window, in their order."""
     return sorted(tree.query(window, predicate="intersects").tolist())
+
+
+def _parts_in(shapes: Sequence[Polygon], window: Polygon, shift: NDArray[np.float64]) -> list[Polygon]:
+    """Return what of shapes lies in a window, told from another middle."""
+    parts = [part for shape in shapes for part in polygons_of(overlay.intersection(shape, window))]
+    return [_moved(part, shift) for part in parts]
 
 
 def _moved(shape: BaseGeometry, shift: NDArray[np.float64]) -> BaseGeometry:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from contextlib import nullcontext
 
 import numpy as np
@@ -221,7 +223,10 @@ def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[NamedShape]
     # the sea comes last of the waters and gives way to everything mapped on it (piers, moles).
     sea: list[Polygon] = []
     with expendable("sea"):
-        sea = sea_polygons(osm, window)
+        if osm.sea is None:
+            sea = sea_polygons(osm, window)
+        else:
+            sea = [part for whole in osm.sea for part in polygons_of(overlay.intersection(whole, window))]
     if sea:
         land = united([shape for name, shapes in found.items() if name != "water" for shape in shapes], grid=_GRID)
         with expendable("sea"):
@@ -249,15 +254,23 @@ def _streams(osm: OsmData, window: Polygon, mapped: list[NamedShape]) -> list[Na
 
 
 def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:
-    """Find the sea within the window: what lies right of the coastlines, which OSM draws with land on their left."""
+    """Find the sea within the window: what lies right of the coastlines, which OSM draws with land on their left.
+
+    Beyond what the map covers nothing is known of it: there is none. A coastline that ends within goes straight on to
+    the nearest edge.
+    """
     coast: list[NDArray[np.float64]] = [way.line for way in osm.ways if way.tags.get("natural") == "coastline"]
-    lines = [shapely.LineString(line) for line in coast]
-    touching = [line for line in lines if shapely.intersects(line, window)]
+    if osm.covered is not None:
+        west, south, east, north = np.array([window.bounds, osm.covered]).T
+        window = shapely.box(west.max(), south.max(), east.min(), north.min())
+        if west.max() >= east.min() or south.max() >= north.min():
+            return []
+    touching = [line for line in map(shapely.LineString, coast) if shapely.intersects(line, window)]
     if not touching:
         return []
     faces = [
         face
-        for face in overlay.polygonize([*touching, window.exterior])
+        for face in overlay.polygonize([*touching, *_to_edge(touching, window), window.exterior])
         if overlay.common_area(face, window) > 1.0 and window.contains(face.representative_point())
     ]
     starts = np.concatenate([line[:-1] for line in coast])
@@ -276,3 +289,10 @@ def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:
         if cross[np.abs(cross).argmax()] < 0:
             sea.append(face)
     return sea
+
+
+def _to_edge(lines: Sequence[shapely.LineString], window: Polygon) -> list[shapely.LineString]:
+    """Return straight lines from where lines end within a window to its nearest edge."""
+    ends = Counter(tuple(point) for line in lines for point in (line.coords[0], line.coords[-1]))
+    alone = [shapely.Point(end) for end, times in ends.items() if times == 1]
+    return [shapely.shortest_line(end, window.exterior) for end in alone if window.contains(end)]
