@@ -100,6 +100,13 @@ class Profile:
             found[fits] = z[row, best][fits]
         return found
 
+    def covers(self, along: Floats, above: Floats) -> NDArray[np.bool_]:
+        """Return at which points, shape ``(n,)``, some edge lies well above a height."""
+        within = (self.start[None] <= along[:, None] + SAME) & (along[:, None] <= self.end[None] + SAME)
+        share = np.clip((along[:, None] - self.start[None]) / (self.end - self.start)[None], 0.0, 1.0)
+        z = self.low[None] + share * (self.high - self.low)[None]
+        return np.asarray((within & (z > above[:, None] + ALIKE)).any(axis=1))
+
     def ends(self, stuff: str) -> Floats:
         """Return where ground of one stuff begins and ends: metres along the side and heights, shape ``(m, 2)``."""
         own = np.array([name == stuff for name in self.stuff], np.bool_)
@@ -179,8 +186,9 @@ def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64
         if tile not in city:
             continue
         at, along = half - city.manifest.size * across, -city.manifest.size * aside
-        ends = [(at, along - half), (at, along + half)]
-        line = shapely.LineString(ends if axis == 0 else [end[::-1] for end in ends])
+        # As wide as counts as on the border: nobody draws the ground between it and a wall that is so near.
+        low, high = (at - ON_LINE, along - half), (at + ON_LINE, along + half)
+        line = shapely.box(*(low if axis == 0 else low[::-1]), *(high if axis == 0 else high[::-1]))
         for building in city.world(tile).buildings:
             for part in shapely.get_parts(overlay.intersection(line, shapely.Polygon(building.footprint[0]))):
                 met = shapely.get_coordinates(part)[:, 1 - axis] - along
@@ -190,7 +198,7 @@ def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64
 
 
 def _unmatched(one: Profile, other: Profile, houses: NDArray[np.float64]) -> list[str]:
-    """Say where the edges of one side are not met by those of the other; what lies under houses nobody sees."""
+    """Say where the edges of one side are not met by those of the other; what lies under others nobody sees."""
     found: list[str] = []
     for stuff in sorted(set(one.stuff)):
         own = np.array([name == stuff for name in one.stuff], np.bool_) & (one.end - one.start >= _LEAST)
@@ -198,6 +206,7 @@ def _unmatched(one: Profile, other: Profile, houses: NDArray[np.float64]) -> lis
         z = np.r_[one.low[own], one.high[own], (one.low + one.high)[own] / 2]
         there = other.heights(t, z, stuff)
         under = ((houses[:, 0] <= t[:, None]) & (t[:, None] <= houses[:, 1])).any(axis=1)
+        under |= one.covers(t, z) & other.covers(t, z)
         for k in np.flatnonzero(~(np.abs(there - z) <= _MOST_STEP) & ~under).tolist():
             what = "nothing meets" if np.isnan(there[k]) else f"{abs(there[k] - z[k]):.3f} m from"
             found.append(f"{what} {stuff} at {t[k]:.3f} m, {z[k]:.2f} m high")

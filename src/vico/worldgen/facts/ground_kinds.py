@@ -50,6 +50,8 @@ _SPORTS = {
 }
 _PAVED_KINDS = ("carriageway", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 _RAILS = ("rail", "light_rail", "narrow_gauge")
+# Square metres: smaller pieces of ground are left out; smaller ones still at the window's edge.
+_LEAST_PIECE, _SPECK = 0.02, 1e-4
 
 
 def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> dict[str, list[Polygon]]:
@@ -84,17 +86,17 @@ def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) 
         # A kind of ground that can't be laid stays a yard or a field; streets can't.
         with expendable(name) if name in soft else nullcontext():
             shape = overlay.areas_of(overlay.on_grid(shape, grid=_GRID))
-            mine = polygons_of(overlay.intersection(shape, left, grid=_GRID), 0.02)
+            mine = pieces_in(overlay.intersection(shape, left, grid=_GRID), window)
             if mine:
                 rest = overlay.areas_of(overlay.difference(left, shape, grid=_GRID))
-                result |= _by_paving(name, mine, streets.paved) if name in _PAVED_KINDS else {name: mine}
+                result |= _by_paving(name, mine, streets.paved, window) if name in _PAVED_KINDS else {name: mine}
                 left = rest
     built = [NamedShape(area.id, area.polygon) for area in site.osm.areas if area.tags.get("building", "no") != "no"]
     near = united([*built, NamedShape("carriageway", streets.carriageway)], grid=_GRID)
     near = overlay.buffer(near, 30.0, quad_segs=2)
     near = overlay.on_grid(near, grid=_GRID)
-    result["yard"] = polygons_of(overlay.intersection(left, near, grid=_GRID), 0.02)
-    result["field"] = polygons_of(overlay.difference(left, near, grid=_GRID), 0.02)
+    result["yard"] = pieces_in(overlay.intersection(left, near, grid=_GRID), window)
+    result["field"] = pieces_in(overlay.difference(left, near, grid=_GRID), window)
     return {name: shapes for name, shapes in result.items() if shapes}
 
 
@@ -132,21 +134,35 @@ def water_pieces(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> l
         streets.parking,
     ]
     near = overlay.union_all([overlay.intersection(overlay.areas_of(shape), water, grid=_GRID) for shape in taken])
-    return polygons_of(overlay.difference(water, overlay.areas_of(near), grid=_GRID), 0.02)
+    return pieces_in(overlay.difference(water, overlay.areas_of(near), grid=_GRID), window)
 
 
-def _by_paving(kind: str, shapes: list[Polygon], paved: dict[str, shapely.MultiPolygon]) -> dict[str, list[Polygon]]:
+def pieces_in(shape: BaseGeometry, window: Polygon) -> list[Polygon]:
+    """Return the polygons within a geometry that are large enough to be laid; at the window's edge any.
+
+    What the edge cuts to a corner is a part of something larger: who draws the ground beyond the edge draws the rest.
+    """
+    return [
+        part
+        for part in polygons_of(shape, _SPECK)
+        if part.area > _LEAST_PIECE or not shapely.contains_properly(window, part)
+    ]
+
+
+def _by_paving(
+    kind: str, shapes: list[Polygon], paved: dict[str, shapely.MultiPolygon], window: Polygon
+) -> dict[str, list[Polygon]]:
     """Part a kind's polygons by what they are paved with."""
     left: BaseGeometry = overlay.areas_of(shapely.MultiPolygon(shapes))
     parted: dict[str, list[Polygon]] = {}
     for name in dict.fromkeys(PAVINGS.values()):
         if name not in paved or left.is_empty:
             continue
-        mine = polygons_of(overlay.intersection(left, paved[name], grid=_GRID), 0.02)
+        mine = pieces_in(overlay.intersection(left, paved[name], grid=_GRID), window)
         if mine:
             parted[f"{kind}:{name}"] = mine
             left = overlay.areas_of(overlay.difference(left, paved[name], grid=_GRID))
-    rest = polygons_of(left, 0.02)
+    rest = pieces_in(left, window)
     return {**({kind: rest} if rest else {}), **parted}
 
 

@@ -22,7 +22,7 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined, quad_triangles
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
-from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas
+from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, pieces_in
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.facts.streets import StreetPolygons
@@ -110,7 +110,7 @@ def ground_from_osm(
 
     pieces, holes = ground_partition(site, streets, window), overlay.union_all(bridges.cuts)
     if bridges.cuts:
-        pieces = {name: _without(shapes, holes) for name, shapes in pieces.items()}
+        pieces = {name: _without(shapes, holes, window) for name, shapes in pieces.items()}
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
     hidden, gardens = _hidden(osm, standing), gardens_of(osm, reach)
@@ -153,7 +153,7 @@ def ground_from_osm(
         stepped=flights.area,
     )
     quads += _fields(osm, window)
-    quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), gardens)}, bearing)
+    quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), gardens, window)}, bearing)
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return joined(surfaces)
@@ -191,6 +191,7 @@ def _laid(
     gardens: BaseGeometry,
 ) -> list[_Piece]:
     """Lay the pieces of the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
+    window = shapely.box(-reach, -reach, reach, reach)
     steep, sloping = _slopes(terrain, reach)
     laid: list[_Piece] = []
     walls: list[Polygon] = []
@@ -199,23 +200,23 @@ def _laid(
     for name, shapes in pieces.items():
         base = name.partition(":")[0]
         if base in ("yard", "field"):
-            shapes = _without(shapes, hidden)
+            shapes = _without(shapes, hidden, window)
         if name == "water" and waters:
             continue
         if base in _HELD and not steep.is_empty:
-            walls += _within(shapes, steep)
-            shapes = _without(shapes, steep)
+            walls += _within(shapes, steep, window)
+            shapes = _without(shapes, steep, window)
         if name == "yard" and not sloping.is_empty:
             # A strip too narrow for a lawn stays as it is.
-            wide = [shape for shape in _within(shapes, sloping) if not overlay.buffer(shape, -_NARROW).is_empty]
+            wide = [shape for shape in _within(shapes, sloping, window) if not overlay.buffer(shape, -_NARROW).is_empty]
             hills += wide
-            shapes = _without(shapes, shapely.MultiPolygon(wide))
+            shapes = _without(shapes, shapely.MultiPolygon(wide), window)
         if name == "yard" and not gardens.is_empty:
-            lawns = _within(shapes, gardens)
-            shapes = _without(shapes, gardens)
+            lawns = _within(shapes, gardens, window)
+            shapes = _without(shapes, gardens, window)
         if name == "steps":
-            lower = _within(shapes, stairs)
-            shapes = _without(shapes, stairs)
+            lower = _within(shapes, stairs, window)
+            shapes = _without(shapes, stairs, window)
             laid.append(_Piece(lower, look(name), lambda xy: terrain.upper(xy) - _UNDER_STAIRS))
         street = base == "carriageway"
         natural = not street and base not in _PAVED
@@ -319,12 +320,12 @@ def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
     return [Quads(np.stack(lines), (236, 236, 230), low=False)] if lines else []
 
 
-def _without(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
-    return polygons_of(overlay.difference(shapely.MultiPolygon(list(shapes)), area), 0.02)
+def _without(shapes: Sequence[Polygon], area: BaseGeometry, window: Polygon) -> list[Polygon]:
+    return pieces_in(overlay.difference(shapely.MultiPolygon(list(shapes)), area), window)
 
 
-def _within(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
-    return polygons_of(overlay.intersection(shapely.MultiPolygon(list(shapes)), area), 0.02)
+def _within(shapes: Sequence[Polygon], area: BaseGeometry, window: Polygon) -> list[Polygon]:
+    return pieces_in(overlay.intersection(shapely.MultiPolygon(list(shapes)), area), window)
 
 
 def _surface(
