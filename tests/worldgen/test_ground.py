@@ -16,7 +16,7 @@ from vico.geo.osm_parts import OsmParts
 from vico.world.mesh import Surface
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.facts.expendable import NamedShape
-from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, sea_polygons
+from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, sea_of_map, sea_polygons
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width, lane_count
 from vico.worldgen.facts.tags import number
@@ -179,16 +179,20 @@ def test_a_coast_that_ends_within_the_window_goes_straight_on_to_its_edge() -> N
     assert not sea.contains(shapely.Point(180, 50))
 
 
-def test_of_what_the_map_does_not_cover_nobody_knows_whether_it_is_sea() -> None:
+def test_beyond_what_the_map_covers_the_sea_goes_straight_on() -> None:
     line = np.array([(-500.0, 0.0), (500.0, 0.0)])
     osm = OsmData(
         LocalFrame(43.73, 7.42), 200.0, 0.0, [], [OsmWay(1, [1, 2], line, False, {"natural": "coastline"})], [], [],
-        covered=(-300.0, -150.0, 100.0, 300.0),
+        covered=(-150.0, -100.0, 100.0, 300.0),
     )  # fmt: skip
-    (sea,) = sea_polygons(osm, shapely.box(-200, -200, 200, 200))
-    assert sea.bounds == (-200.0, -150.0, 100.0, 0.0)
-    elsewhere = replace(osm, covered=(300.0, 300.0, 400.0, 400.0))
-    assert sea_polygons(elsewhere, shapely.box(-200, -200, 200, 200)) == []
+    window = shapely.box(-200, -200, 200, 200)
+    sea = shapely.union_all(sea_of_map(osm, window))
+    assert sea.equals(shapely.box(-200, -200, 200, 0))
+    # Where land reaches the edge there is land beyond.
+    bay = np.array([(-500.0, 0.0), (0.0, 0.0), (0.0, -300.0)])
+    osm = replace(osm, ways=[OsmWay(1, [1, 2, 3], bay, False, {"natural": "coastline"})])
+    assert shapely.union_all(sea_of_map(osm, window)).equals(shapely.box(-200, -200, 0, 0))
+    assert sea_of_map(replace(osm, covered=(300.0, 300.0, 400.0, 400.0)), window) == []
 
 
 def test_a_part_of_a_map_in_the_open_sea_is_sea() -> None:
@@ -196,7 +200,7 @@ def test_a_part_of_a_map_in_the_open_sea_is_sea() -> None:
     osm = OsmData(
         LocalFrame(43.73, 7.42), 800.0, 0.0, [], [OsmWay(1, [1, 2], line, False, {"natural": "coastline"})], [], []
     )
-    whole = replace(osm, sea=sea_polygons(osm, shapely.box(-800, -800, 800, 800)))
+    whole = replace(osm, sea=sea_of_map(osm, shapely.box(-800, -800, 800, 800)))
     part = OsmParts(whole).within(half=100.0, margin=20.0, east=300.0, north=-500.0)
     assert not part.ways
     areas = mapped_areas(site_facts(part), shapely.box(-100, -100, 100, 100))

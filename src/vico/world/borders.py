@@ -186,9 +186,8 @@ def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64
         if tile not in city:
             continue
         at, along = half - city.manifest.size * across, -city.manifest.size * aside
-        # As wide as counts as on the border: nobody draws the ground between it and a wall that is so near.
-        low, high = (at - ON_LINE, along - half), (at + ON_LINE, along + half)
-        line = shapely.box(*(low if axis == 0 else low[::-1]), *(high if axis == 0 else high[::-1]))
+        ends = [(at, along - half), (at, along + half)]
+        line = shapely.LineString(ends if axis == 0 else [end[::-1] for end in ends])
         for building in city.world(tile).buildings:
             for part in shapely.get_parts(overlay.intersection(line, shapely.Polygon(building.footprint[0]))):
                 met = shapely.get_coordinates(part)[:, 1 - axis] - along
@@ -200,10 +199,15 @@ def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64
 def _unmatched(one: Profile, other: Profile, houses: NDArray[np.float64]) -> list[str]:
     """Say where the edges of one side are not met by those of the other; what lies under others nobody sees."""
     found: list[str] = []
+    # In the middle between any two ends, too: where a piece of the other side is missing none need end.
+    ends = np.unique(np.r_[one.start, one.end, other.start, other.end])
+    middles = ((ends[1:] + ends[:-1]) / 2)[np.diff(ends) >= _LEAST]
     for stuff in sorted(set(one.stuff)):
         own = np.array([name == stuff for name in one.stuff], np.bool_) & (one.end - one.start >= _LEAST)
-        t = np.r_[one.start[own], one.end[own], (one.start + one.end)[own] / 2]
-        z = np.r_[one.low[own], one.high[own], (one.low + one.high)[own] / 2]
+        within, at = np.nonzero((one.start[own, None] < middles) & (middles < one.end[own, None]))
+        share = (middles[at] - one.start[own][within]) / (one.end - one.start)[own][within]
+        t = np.r_[one.start[own], one.end[own], middles[at]]
+        z = np.r_[one.low[own], one.high[own], one.low[own][within] + share * (one.high - one.low)[own][within]]
         there = other.heights(t, z, stuff)
         under = ((houses[:, 0] <= t[:, None]) & (t[:, None] <= houses[:, 1])).any(axis=1)
         under |= one.covers(t, z) & other.covers(t, z)

@@ -31,7 +31,8 @@ from vico.worldgen.city_report import write_city_report
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import make_streets
 from vico.worldgen.city_tiles import GATES
-from vico.worldgen.facts.ground_kinds import sea_polygons
+from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.ground_kinds import sea_of_map
 from vico.worldgen.ground.terrain import APRON, terrain_from_dem
 from vico.worldgen.seams.grid import HALO, Tile, TileGrid, grid_of, grid_over, tile_name
 from vico.worldgen.seams.join import MAP
@@ -200,8 +201,10 @@ def divide_map(request: CityRequest) -> OsmData:
     """Read the map once, keep for each tile what of it lies there, and return that of the city."""
     frame, reach = LocalFrame(request.lat, request.lon), request.grid.half + HALO
     whole = read_osm(checked_extract(request.sources.osm), frame, reach, need_buildings=False)
-    # The sea is found for all tiles at once: of one that no coastline meets nobody could say whether it is land.
-    whole = replace(whole, sea=sea_polygons(whole, shapely.box(-reach, -reach, reach, reach)))
+    # The sea is found for all tiles at once: of one that no coastline meets nobody could say whether it is land. Where
+    # that fails each tile looks for its own, and reports what is wrong.
+    with expendable("sea"):
+        whole = replace(whole, sea=sea_of_map(whole, shapely.box(-reach, -reach, reach, reach)))
     known, key = request.plans / "map.json", {"map": whole.sha256, "reach": reach, "frame": str(frame), "version": 2}
     kept = [request.plans / tile_name(tile) / f"{MAP}{SUFFIX}" for tile in request.grid]
     if not (known.exists() and read_json(known) == key and all(path.exists() for path in kept)):

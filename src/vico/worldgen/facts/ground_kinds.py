@@ -272,15 +272,9 @@ def _streams(osm: OsmData, window: Polygon, mapped: list[NamedShape]) -> list[Na
 def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:
     """Find the sea within the window: what lies right of the coastlines, which OSM draws with land on their left.
 
-    Beyond what the map covers nothing is known of it: there is none. A coastline that ends within goes straight on to
-    the nearest edge.
+    A coastline that ends within goes straight on to the nearest edge.
     """
     coast: list[NDArray[np.float64]] = [way.line for way in osm.ways if way.tags.get("natural") == "coastline"]
-    if osm.covered is not None:
-        west, south, east, north = np.array([window.bounds, osm.covered]).T
-        window = shapely.box(west.max(), south.max(), east.min(), north.min())
-        if west.max() >= east.min() or south.max() >= north.min():
-            return []
     touching = [line for line in map(shapely.LineString, coast) if shapely.intersects(line, window)]
     if not touching:
         return []
@@ -304,6 +298,27 @@ def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:
         cross = cross / np.maximum(np.hypot(*along[near].T), 1e-9)
         if cross[np.abs(cross).argmax()] < 0:
             sea.append(face)
+    return sea
+
+
+def sea_of_map(osm: OsmData, window: Polygon) -> list[Polygon]:
+    """Find the sea in a window that may be larger than the map: from the edge of what it covers it goes straight on."""
+    if osm.covered is None:
+        return sea_polygons(osm, window)
+    known = shapely.clip_by_rect(window, *osm.covered)
+    if known.is_empty:
+        return []
+    sea = sea_polygons(osm, known)
+    low, high, far = np.array(known.bounds[:2]), np.array(known.bounds[2:]), np.array(window.bounds).reshape(2, 2)
+    for axis in (0, 1):  # eastwards and westwards, then what that made as well northwards and southwards
+        for edge, beyond in ((low, far[0]), (high, far[1])):
+            side = np.array([low, high]) if axis == 0 else np.array([[far[0, 0], low[1]], [far[1, 0], high[1]]])
+            side[:, axis] = edge[axis]
+            for part in shapely.get_parts(shapely.intersection(shapely.union_all(sea), shapely.LineString(side))):
+                if part.length > 0.0 and edge[axis] != beyond[axis]:
+                    box = np.array(part.bounds).reshape(2, 2)
+                    box[:, axis] = sorted((edge[axis], beyond[axis]))
+                    sea.append(shapely.box(*box.ravel()))
     return sea
 
 
