@@ -195,6 +195,17 @@ def test_beyond_what_the_map_covers_the_sea_goes_straight_on() -> None:
     assert sea_of_map(replace(osm, covered=(300.0, 300.0, 400.0, 400.0)), window) == []
 
 
+def test_helsinki_s_harbour_goes_on_beyond_its_map(shared_data: Path) -> None:
+    osm = read_osm(shared_data / "places" / "helsinki" / "helsinki.osm.pbf", LocalFrame(60.17, 24.941), 1100.0)
+    assert osm.covered is not None
+    east = osm.covered[2]
+    assert 600.0 < east < 700.0
+    sea = shapely.union_all(sea_of_map(osm, shapely.box(-1100, -1100, 1100, 1100)))
+    at_edge, far_out = (shapely.intersection(sea, shapely.LineString([(x, -1100), (x, 1100)])) for x in (east, 1099.0))
+    assert far_out.length > 20.0
+    assert shapely.bounds(far_out)[1::2].tolist() == shapely.bounds(at_edge)[1::2].tolist()
+
+
 def test_a_part_of_a_map_in_the_open_sea_is_sea() -> None:
     line = np.array([(-900.0, 0.0), (900.0, 0.0)])
     osm = OsmData(

@@ -125,7 +125,7 @@ class OsmData:
         West, south, east and north of a rectangle in the window, metres, where streets and transit end; None where they
         end at the window's own sides.
     covered
-        West, south, east and north of what the file says that it covers, metres; None where it says nothing.
+        West, south, east and north of what the file says that it covers, whole metres; None where it says nothing.
     sea
         As it was found for a larger map that this is a part of; None where the coastlines of this one tell it.
     """
@@ -266,14 +266,16 @@ class _Reader:
                 self._way(thing, thing.id in wanted)
 
     def _box(self, told: osmium.osm.Box) -> tuple[float, float, float, float] | None:
-        """Return what a file's header says that it covers, metres; None where it says nothing."""
+        """Return what a file's header says that it covers, whole metres; None where it says nothing."""
         if self.wraps or not told.valid():
             return None
         low, high = told.bottom_left, told.top_right
         lats, lons = np.array([low.lat, low.lat, high.lat, high.lat]), np.array([low.lon, high.lon, low.lon, high.lon])
         # Meridians are not upright in the frame: the rectangle within the four corners.
         x, y = self.frame.to_enu(lats, lons).T
-        return float(max(x[0], x[2])), float(max(y[0], y[1])), float(min(x[1], x[3])), float(min(y[2], y[3]))
+        west, south = np.ceil((max(x[0], x[2]), max(y[0], y[1]))).tolist()
+        east, north = np.floor((min(x[1], x[3]), min(y[2], y[3]))).tolist()
+        return west, south, east, north
 
     def _node(self, node: osmium.osm.Node) -> None:
         place = node.location
