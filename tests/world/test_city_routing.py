@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise, permutations
 from pathlib import Path
 
@@ -162,6 +163,15 @@ def test_steps_of_other_walks_are_refused(router: CityRouter, tmp_path: Path) ->
     write_gates(tmp_path, [tile_gates(cost, room, square_of((0, 0), GRID, SIDE), cell=0.5)])
     with pytest.raises(SchemaError, match="steps beside it"):
         Gates.read(tmp_path / GATES, mapped_array(tmp_path / STEPS)[1:])
+
+
+@pytest.mark.parametrize("direction", [0, 2, 5, 200])
+def test_damaged_steps_are_told_and_lead_nowhere(town: WalkableMap, router: CityRouter, direction: int) -> None:
+    cost, room = router._cost, router.walkable.clearance
+    gates = Gates.joined([tile_gates(cost, room, square_of(tile, GRID, SIDE), cell=0.5) for tile in GRID])
+    torn = replace(gates, steps=np.full_like(gates.steps, direction))
+    with pytest.raises(SchemaError, match=r"steps\.npy: the walk from cell \d+ to \d+ is damaged; build the city anew"):
+        CityRouter(router.walkable, cost, torn, SIDE).path((-215.0, -215.0), (210.0, 212.0))
 
 
 def test_there_is_no_way_into_a_yard_without_a_gate(tmp_path: Path) -> None:

@@ -15,8 +15,10 @@ from threading import Lock
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.errors import SchemaError
 from vico.io.arrays import drop_pages
 from vico.io.recent import Recent
+from vico.world.city_files import STEPS
 from vico.world.city_gates import Gates, Ints, Scratch, Window
 from vico.world.gate_graph import GateGraph
 from vico.world.grid_search import STRAIGHT, followed, nearest_free
@@ -219,6 +221,8 @@ class CityRouter(Router):
         if kept is not None:
             self._open()
             cells, costs = followed(self._cost, a, *kept)
+            if not len(cells) or cells[-1] != b:
+                raise SchemaError(f"{STEPS}: the walk from cell {a} to {b} is damaged; build the city anew")
             return cells, costs
         known = self._legs.get((ask.room, a, b))
         if known is None:

@@ -312,7 +312,7 @@ def steps_of(cells, width):  # type: ignore[no-untyped-def]
 
 @compiled
 def followed(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
-    """Return the cells of a walk, int64, and what it costs up to each.
+    """Return the cells of a walk, int64, and what it costs up to each; none where it leaves what may be walked on.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def followed(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
     steps
         Of `steps_of`.
     """
-    width = cost.shape[1]
+    height, width = cost.shape
     cells, costs = np.empty(len(steps) + 1, np.int64), np.zeros(len(steps) + 1, np.int64)
     cells[0] = start
     x, y = start % width, start // width
@@ -334,6 +334,8 @@ def followed(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
         if backwards:
             step_x, step_y = -step_x, -step_y
         x, y = x + step_x, y + step_y
+        if x < 0 or y < 0 or x >= width or y >= height or cost[y, x] == 0:
+            return cells[:0], costs[:0]
         there = np.int64(cost[y, x])
         length = STRAIGHT if direction < _FIRST_DIAGONAL else DIAGONAL
         costs[k + 1] = costs[k] + length * (here + there) // 2

@@ -314,7 +314,7 @@ def sea_of_map(osm: OsmData, window: Polygon) -> list[Polygon]:
         for edge, beyond in ((low, far[0]), (high, far[1])):
             side = np.array([low, high]) if axis == 0 else np.array([[far[0, 0], low[1]], [far[1, 0], high[1]]])
             side[:, axis] = edge[axis]
-            for part in shapely.get_parts(shapely.intersection(shapely.union_all(sea), shapely.LineString(side))):
+            for part in shapely.get_parts(overlay.intersection(overlay.union_all(sea), shapely.LineString(side))):
                 if part.length > 0.0 and edge[axis] != beyond[axis]:
                     box = np.array(part.bounds).reshape(2, 2)
                     box[:, axis] = sorted((edge[axis], beyond[axis]))
