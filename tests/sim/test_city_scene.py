@@ -17,6 +17,8 @@ from vico.render import Cameras
 from vico.sim import city_scene
 from vico.sim.city_scene import CityRenderer, Neighbourhood
 from vico.sim.config import SimConfig
+from vico.sim.drawn_people import DrawnPeople
+from vico.sim.rooms_in_sight import RoomsInSight
 from vico.sim.simulation import Simulation
 from vico.world.city_silhouettes import CitySilhouettes
 from vico.world.city_world import CityWorld
@@ -114,6 +116,29 @@ def test_what_is_seen_and_what_happens_depend_neither_on_the_budget_nor_on_who_l
     assert same == state
     assert _are_equal(seen, [{alone: step[alone]} for step in some])
     assert _run(city, people, observe=())[1] == state
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_two_tiles_in_full")
+def test_who_is_in_a_room_that_nobody_sees_has_no_body_and_pictures_are_the_same(
+    city: CityWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = build_community(city, 16)
+    chosen: list[int] = []
+    choose = DrawnPeople.choose
+
+    def counted(self: DrawnPeople, rows: NDArray[np.int64]) -> None:
+        chosen.append(len(rows))
+        choose(self, rows)
+
+    monkeypatch.setattr(DrawnPeople, "choose", counted)
+    some, state = _run(city, many, steps=40, quality="fine", start=28_500)
+    of_some, chosen = max(chosen), []
+    monkeypatch.setattr(RoomsInSight, "seen_from", lambda self, eyes: np.ones(len(city.rooms), np.bool_))
+    everybody, same = _run(city, many, steps=40, quality="fine", start=28_500)
+    assert state == same
+    assert _are_equal(some, everybody)
+    assert of_some < max(chosen)
 
 
 @pytest.fixture

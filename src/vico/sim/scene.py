@@ -39,6 +39,7 @@ from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_
 from vico.sim.observations import Views
 from vico.sim.passers_by import pedestrian_motion
 from vico.sim.room_lamps import RoomLamps
+from vico.sim.rooms_in_sight import RoomsInSight
 from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
@@ -182,6 +183,7 @@ class SceneRenderer:
         # Flow tells where each vertex has been: bodies keep their shape there.
         far = self._detail == "light" and "flow" not in self._viewers.outputs
         self._people = DrawnPeople(sim, detail=self._detail, far=far, everybody=part is None)
+        self._rooms_in_sight = None if part is None else RoomsInSight(sim.state.indoor, part)
 
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
@@ -263,7 +265,7 @@ class SceneRenderer:
             self._viewers.scene = self._scene
             self._set_light(state)
         self._people.follow(state)
-        motion = self._motion(state)
+        motion = self._motion(state, None if sights is None else sights.eyes)
         people, bodies = len(motion.clip), self._people.batch
         here = np.ones(people, np.bool_) if self._part is None else self._part.holds(motion.position)
         far = np.zeros(people, np.bool_)
@@ -292,22 +294,33 @@ class SceneRenderer:
         )
         self._scene.set_openings(NO_OPENINGS if doors is None else doors.openings)
 
-    def _motion(self, state: SimulationState) -> _Motion:
-        """Return how everybody on legs moves who has a body here; in parts of a city, give bodies to who is there."""
-        if self._part is not None:
-            self._choose_bodies(state, self._part)
+    def _motion(self, state: SimulationState, eyes: NDArray[np.float64] | None = None) -> _Motion:
+        """Return how everybody on legs moves who has a body here.
+
+        In parts of a city, give bodies to those who are there; where all that look are known, only to who may be seen.
+        """
+        if self._rooms_in_sight is not None:
+            self._choose_bodies(state, self._rooms_in_sight, eyes)
         motion = _motion_of_agents(state, self._sim.world.height)
         if state.traffic is not None:
             motion = _joined_motion(motion, self._motion_of_pedestrians(state))
         return motion if self._part is None else motion.of(self._people.rows)
 
-    def _choose_bodies(self, state: SimulationState, part: ScenePart) -> None:
+    def _choose_bodies(self, state: SimulationState, rooms: RoomsInSight, eyes: NDArray[np.float64] | None) -> None:
         """Give bodies to all within a part, and to those who may come there soon: choosing anew takes a while."""
+        part, people = rooms.part, state.people
         walkers = [] if state.traffic is None else [state.traffic.walkers.position]
-        position = np.concatenate([state.people.position, *walkers])
-        here, had = np.flatnonzero(part.holds(position, _BESIDE)), self._people.rows
-        if len(np.setdiff1d(here, had, assume_unique=True)) or len(had) > 2 * len(here) + _SPARE_BODIES:
-            self._people.choose(np.flatnonzero(part.holds(position, _SOON)))
+        position = np.concatenate([people.position, *walkers])
+        shown = np.ones(len(position), np.bool_)
+        if eyes is not None:
+            indoors = (people.room >= 0) & ~people.at_door() & (people.passing == 0)
+            shown[: len(people)] = ~indoors | rooms.seen_from(eyes)[people.room]
+        here, had = np.flatnonzero(part.holds(position, _BESIDE) & shown), self._people.rows
+        if len(had) > 2 * len(here) + _SPARE_BODIES:
+            self._people.choose(np.flatnonzero(part.holds(position, _SOON) & shown))
+        elif len(np.setdiff1d(here, had, assume_unique=True)):
+            shown[had] = True
+            self._people.choose(np.flatnonzero(part.holds(position, _SOON) & shown))
 
     def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
         place = motion.position, motion.yaw, motion.clip, motion.phase, motion.hands

@@ -7,7 +7,7 @@ place. Beside the shape it counts what would change in colour and in how the pla
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from vico.io.compiled import compiled
 LIGHT, FAR, FAR_PROCEDURAL = 1900, 600, 900
 # A place is hidden if something that moves with it lies within this many metres all around.
 _COVER = 0.05
+# Boxes are this much larger than what is looked for in them, metres: more than rounding makes of a hit.
+_SLACK = 1e-4
 # What a change of colour by the whole range, and of all of a place's joints, is worth, in metres of displacement.
 _COLOUR_METRES, _JOINT_METRES = 0.018, 0.010
 # Layers nearer than this must not come through each other.
@@ -167,46 +169,69 @@ def _hidden(points: Array, faces: Array, shares: Array) -> NDArray[np.bool_]:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-15)
     low, high = corners.min(1), corners.max(1)
-    order = np.argsort(low[:, 2], kind="stable")
-    tallest = float((high - low)[:, 2].max())
+    # Cells of a grid as large as what is looked through, and which triangles reach into each.
+    origin = low.min(0, initial=np.inf)
+    lowest, highest = (np.floor((ends - origin) / _COVER).astype(np.int64) for ends in (low, high))
+    shape = highest.max(0, initial=0) + 1
+    first, member = _members(lowest, highest, shape)
     carried = shares[faces].mean(1)
-    return _covered(corners, normals, low, high, order, tallest, carried)
+    return _covered(corners, normals, low, high, _Grid(origin, shape, first, member), carried)
+
+
+class _Grid(NamedTuple):
+    """Which boxes reach into each cell: `member` from `first` of the cell to `first` of the next."""
+
+    origin: Array
+    shape: Array
+    first: Array
+    member: Array
 
 
 @compiled(nogil=True)
-def _covered(
-    corners: Array, normals: Array, low: Array, high: Array, order: Array, tallest: float, carried: Array
-) -> Array:
+def _members(lowest: Array, highest: Array, shape: Array) -> tuple[Array, Array]:
+    """Return where the boxes of each cell begin, int64 ``(cells + 1,)``, and their numbers."""
+    first = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
+    for fill in range(2):
+        if fill:
+            member = np.empty(first[-1], np.int64)
+        for f in range(len(lowest) - 1, -1, -1):
+            for i in range(lowest[f, 0], highest[f, 0] + 1):
+                for j in range(lowest[f, 1], highest[f, 1] + 1):
+                    for k in range(lowest[f, 2], highest[f, 2] + 1):
+                        cell = (i * shape[1] + j) * shape[2] + k
+                        if fill:
+                            first[cell] -= 1
+                            member[first[cell]] = f
+                        else:
+                            first[cell] += 1
+        if not fill:
+            first = np.cumsum(first)
+    return first, member
+
+
+@compiled(nogil=True)
+def _covered(corners: Array, normals: Array, low: Array, high: Array, grid: Any, carried: Array) -> Array:
     count = len(corners)
     hidden = np.zeros(count, np.bool_)
-    floors = low[order, 2]
-    found = np.empty(count, np.int64)
+    near, found, asked = np.empty(count, np.int64), np.empty(count, np.int64), np.full(count, -1, np.int64)
     for f in range(count):
         n = normals[f]
-        nearby = 0
-        k = np.searchsorted(floors, low[f, 2] - _COVER - tallest)
-        while k < count and floors[k] <= high[f, 2] + _COVER:
-            g = order[k]
-            k += 1
-            if g == f or low[g, 0] > high[f, 0] + _COVER or high[g, 0] < low[f, 0] - _COVER:
-                continue
-            if low[g, 1] > high[f, 1] + _COVER or high[g, 1] < low[f, 1] - _COVER or high[g, 2] < low[f, 2] - _COVER:
-                continue
-            found[nearby] = g
-            nearby += 1
-        # Most triangles are seen straight from outside: only for the rest it matters who moves with them.
         middle = (corners[f, 0] + corners[f, 1] + corners[f, 2]) / 3
-        if not _leaves(middle, n, corners, normals, found[:nearby]):
+        end = middle + _COVER * n
+        # Most triangles are seen straight from outside: only for the rest it matters who moves with them.
+        nearby = _nearby(np.minimum(middle, end) - _SLACK, np.maximum(middle, end) + _SLACK, grid, near, asked, 2 * f)
+        if not _leaves(middle, n, corners, normals, low, high, near[:nearby], f):
             continue
         kept = 0
-        for k in range(nearby):
+        for g in near[: _nearby(low[f] - _COVER, high[f] + _COVER, grid, near, asked, 2 * f + 1)]:
+            if g == f:
+                continue
             together = 0.0
             for j in range(carried.shape[1]):
-                together += min(carried[f, j], carried[found[k], j])
+                together += min(carried[f, j], carried[g, j])
             if together > 0.5:
-                found[kept] = found[k]
+                found[kept] = g
                 kept += 1
-        nearby = kept
         # Two directions across the normal, to tilt rays by.
         axis = 0 if abs(n[0]) < 0.6 else 1
         e = np.zeros(3)
@@ -222,7 +247,7 @@ def _covered(
                 if d > 0:
                     tilt = u if d < 3 else v
                     way = 0.5 * n + (0.866 if d % 2 else -0.866) * tilt
-                seen = not _leaves(start, way, corners, normals, found[:nearby])
+                seen = not _leaves(start, way, corners, normals, low, high, found[:kept], f)
                 if seen:
                     break
             if seen:
@@ -232,22 +257,55 @@ def _covered(
 
 
 @compiled
-def _leaves(start: Array, way: Array, corners: Array, normals: Array, among: Array) -> bool:
-    """Whether a ray comes out of one of some triangles, close by (Moeller and Trumbore's test)."""
+def _nearby(low: Array, high: Array, grid: Any, near: Array, asked: Array, question: int) -> int:
+    """Note in `near` who reaches into cells of a box, each once by the question's number in `asked`; return how many."""
+    origin, shape, first, member = grid.origin, grid.shape, grid.first, grid.member
+    begin, end = np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):
+        begin[axis] = max(int(np.floor((low[axis] - origin[axis]) / _COVER)), 0)
+        end[axis] = min(int(np.floor((high[axis] - origin[axis]) / _COVER)), shape[axis] - 1)
+    count = 0
+    for i in range(begin[0], end[0] + 1):
+        for j in range(begin[1], end[1] + 1):
+            row = (i * shape[1] + j) * shape[2]
+            for m in range(first[row + begin[2]], first[row + end[2] + 1]):
+                g = member[m]
+                if asked[g] != question:
+                    asked[g] = question
+                    near[count] = g
+                    count += 1
+    return count
+
+
+@compiled
+def _leaves(
+    start: Array, way: Array, corners: Array, normals: Array, low: Array, high: Array, among: Array, but: int
+) -> bool:
+    """Whether a ray comes out of one of some triangles, all but one, close by (Moeller and Trumbore's test)."""
+    x, y, z = start[0], start[1], start[2]
+    wx, wy, wz = way[0], way[1], way[2]
+    ends = x + _COVER * wx, y + _COVER * wy, z + _COVER * wz
+    west, east = min(x, ends[0]) - _SLACK, max(x, ends[0]) + _SLACK
+    south, north = min(y, ends[1]) - _SLACK, max(y, ends[1]) + _SLACK
+    bottom, top = min(z, ends[2]) - _SLACK, max(z, ends[2]) + _SLACK
     for g in among:
-        if normals[g, 0] * way[0] + normals[g, 1] * way[1] + normals[g, 2] * way[2] < 0.05:
+        if low[g, 0] > east or high[g, 0] < west or low[g, 1] > north or high[g, 1] < south:
+            continue
+        if low[g, 2] > top or high[g, 2] < bottom or g == but:
+            continue
+        if normals[g, 0] * wx + normals[g, 1] * wy + normals[g, 2] * wz < 0.05:
             continue
         a, b, c = corners[g, 0], corners[g, 1], corners[g, 2]
         e1x, e1y, e1z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         e2x, e2y, e2z = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        px, py, pz = way[1] * e2z - way[2] * e2y, way[2] * e2x - way[0] * e2z, way[0] * e2y - way[1] * e2x
+        px, py, pz = wy * e2z - wz * e2y, wz * e2x - wx * e2z, wx * e2y - wy * e2x
         det = e1x * px + e1y * py + e1z * pz
         if abs(det) < 1e-14:
             continue
-        tx, ty, tz = start[0] - a[0], start[1] - a[1], start[2] - a[2]
+        tx, ty, tz = x - a[0], y - a[1], z - a[2]
         s = (tx * px + ty * py + tz * pz) / det
         qx, qy, qz = ty * e1z - tz * e1y, tz * e1x - tx * e1z, tx * e1y - ty * e1x
-        t = (way[0] * qx + way[1] * qy + way[2] * qz) / det
+        t = (wx * qx + wy * qy + wz * qz) / det
         if s < -1e-6 or t < -1e-6 or s + t > 1 + 1e-6:
             continue
         far = (e2x * qx + e2y * qy + e2z * qz) / det

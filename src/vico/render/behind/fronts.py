@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from vico.world.model import Entrance, Room
     from vico.world.world import World
 
-# What shows its room to the street.
-_OPEN_TO_SIGHT = frozenset({Category.STORE, Category.FOOD, Category.ENTERTAINMENT})
+#: What shows its rooms to the street.
+OPEN_TO_SIGHT = frozenset({Category.STORE, Category.FOOD, Category.ENTERTAINMENT})
 # Fronts on one wall: their doors lie no farther than this off each other's plane, metres.
 _SAME_WALL = 0.6
 # Panes that reach farther to the side than their room by so much show its wall, metres.
@@ -33,7 +33,7 @@ def room_fronts(world: World) -> NDArray[np.void]:
     first: dict[str, str] = {}
     have_rooms = {room.place for room in world.rooms if any(not door.to for door in room.doors)}
     for place in world.places:
-        if place.category in _OPEN_TO_SIGHT and place.entrance in entrances and place.id in have_rooms:
+        if place.category in OPEN_TO_SIGHT and place.entrance in entrances and place.id in have_rooms:
             first.setdefault(place.entrance or "", place.id)
     shown = {place: entrance for entrance, place in first.items()}
     found, where = [], []
