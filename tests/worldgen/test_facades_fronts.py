@@ -119,6 +119,21 @@ def test_a_door_covers_whole_bays_or_none(s: float) -> None:
     assert (np.abs(u - np.round(u)) < 0.23).all()
 
 
+@pytest.mark.parametrize("s", [0.5, 6.0, 17.6])
+@pytest.mark.parametrize(("tagged", "numbers"), [("12a", 1), ("5;7", 1), ("", 0), ("a number of many words", 0)])
+def test_the_number_of_a_house_is_beside_its_door(s: float, tagged: str, numbers: int) -> None:
+    house = _building("residential").model_copy(update={"tags": {"addr:housenumber": tagged}})
+    made = street_fronts([], [_entrance(s)], [house], [_wall("ground_plain")], seed=0)
+    assert made.counts["house_numbers"] == numbers
+    plates = [surface for surface in made.surfaces if surface.material.name == "signs_0"]
+    assert len(plates) == numbers
+    for plate in plates:
+        assert _along(plate).min() >= 0.0
+        assert _along(plate).max() <= 18.0
+        assert np.abs(_along(plate) - s).min() < 2.2
+        assert 10.0 + 1.8 < plate.positions[:, 2].min() < plate.positions[:, 2].max() < 10.0 + 2.4
+
+
 def test_the_sign_reads_from_left_to_right_and_stands_upright() -> None:
     made = street_fronts([_shop()], [_entrance(7.5)], [_building()], [_wall("ground_shops")], seed=0)
     sign = next(surface for surface in made.surfaces if surface.material.name == "signs_0")

@@ -10,7 +10,7 @@ from PIL import Image
 
 from vico.world.model import Category, Place
 from vico.worldgen.facades.lettering import lettered, spelled
-from vico.worldgen.facades.signs import board_text, paint_boards
+from vico.worldgen.facades.signs import Lettering, board_text, paint_boards
 
 
 def _place(name: str, key: str = "n1", category: Category = Category.STORE, kind: str = "clothes") -> Place:
@@ -74,6 +74,25 @@ def test_chains_share_one_board() -> None:
     boards = paint_boards([_place("Fazer", "a"), _place("Fazer", "b"), _place("東京", "c")])
     assert boards.by_place["a"] == boards.by_place["b"]
     assert boards.mute == ("c",)
+
+
+def test_plates_share_the_pages_and_do_not_shine() -> None:
+    plates = [
+        Lettering("Rue Grimaldi", (18, 62, 138), (244, 244, 240), (30, 92, 66), shines=False),
+        Lettering("12", (18, 62, 138), (244, 244, 240), shines=False),
+    ]
+    boards = paint_boards([_place("Fazer", "a")], [*plates, *plates])
+    assert set(plates) < set(boards.by_lettering)
+    (page,) = boards.materials
+    assert page.texture is not None
+    for plate in plates:
+        board = boards.by_lettering[plate]
+        left, bottom, right, top = (np.array(board.uv) * np.tile(page.texture.shape[1::-1], 2)).astype(int)
+        painted = page.texture[bottom : top + 1, left : right + 1]
+        assert (painted[..., 3] == 0).all()
+        assert {plate.ground, plate.letters} <= {tuple(c) for c in painted[..., :3].reshape(-1, 3).tolist()}
+        assert tuple(painted[0, 5, :3].tolist()) == (plate.rim or plate.ground)
+    assert (page.texture[..., 3] > 0).any()
 
 
 def test_a_thousand_names_fit_on_two_pages_of_three_megabytes() -> None:

@@ -50,6 +50,18 @@ def colours(quads: list[Quads]) -> set[tuple[int, int, int]]:
     return {group.colour for group in quads}
 
 
+def test_plates_are_those_of_the_country() -> None:
+    plates = {name: habits_at(*place).plates for name, place in
+              {"us": (40.72, -73.98), "uk": (51.51, -0.09), "de_mosaic": (52.51, 13.39), "fr": (43.73, 7.42),
+               "elsewhere": (35.7, 139.7)}.items()}  # fmt: skip
+    assert [plates[name].names_on for name in plates] == ["posts", "walls", "posts", "walls", "walls"]
+    assert sum(plates["uk"].ground) > sum(plates["uk"].letters)
+    assert sum(plates["fr"].ground) < sum(plates["fr"].letters)
+    assert plates["fr"].rim is not None
+    assert plates["elsewhere"].rim is None
+    assert len({(one.ground, one.rim) for one in plates.values()}) == 4
+
+
 def test_habits_are_those_of_the_country_that_lies_there() -> None:
     places = {
         "us": (40.72, -73.98), "uk": (51.51, -0.09), "de": (47.49, 11.09), "de_mosaic": (52.51, 13.39),

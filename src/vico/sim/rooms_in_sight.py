@@ -13,7 +13,7 @@ from vico.render.behind.fronts import OPEN_TO_SIGHT
 from vico.sim.indoor import Indoor
 from vico.sim.scene_part import ScenePart
 
-# Metres a camera may be outside the walls of the room it is in (in a doorway), below its floor, and above: on its stairs.
+# Metres a camera may be outside the walls of its room (in a doorway), below the floor, and above it (on stairs).
 _BESIDE, _BELOW, _ABOVE = 1.0, 1.0, 8.0
 
 

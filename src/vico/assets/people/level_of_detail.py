@@ -258,7 +258,7 @@ def _covered(corners: Array, normals: Array, low: Array, high: Array, grid: Any,
 
 @compiled
 def _nearby(low: Array, high: Array, grid: Any, near: Array, asked: Array, question: int) -> int:
-    """Note in `near` who reaches into cells of a box, each once by the question's number in `asked`; return how many."""
+    """Note in `near` who reaches into cells of a box, each once by the question's number; return how many."""
     origin, shape, first, member = grid.origin, grid.shape, grid.first, grid.member
     begin, end = np.empty(3, np.int64), np.empty(3, np.int64)
     for axis in range(3):

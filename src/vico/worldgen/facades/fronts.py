@@ -15,10 +15,15 @@ from vico.seeds import rng
 from vico.world.check.buildings import overlapping_faces
 from vico.world.mesh import Surface
 from vico.world.model import FAILED, Building, Category, Entrance, Place
+from vico.world.objects import Objects
+from vico.world.street_model import Roads
+from vico.worldgen.facades.lettering import spelled
 from vico.worldgen.facades.pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
-from vico.worldgen.facades.signs import Board, Boards, colours_of, paint_boards
+from vico.worldgen.facades.signs import Board, Boards, Lettering, colours_of, paint_boards
+from vico.worldgen.facades.street_names import name_plates
 from vico.worldgen.facades.walls import GroundFloors, Wall
 from vico.worldgen.facts.expendable import expendable, leave_out
+from vico.worldgen.facts.street_habits import Plates
 
 _WHITE: Rgb = (255, 255, 255)
 _STONE: Rgb = (222, 218, 210)
@@ -46,6 +51,7 @@ _SHELVES = {
     "wine",
 }
 _DUMMIES = {"clothes", "shoes", "fashion", "boutique", "fabric", "bag", "second_hand", "charity", "department_store"}
+_LONGEST_NUMBER = 7  # characters
 _MOST_SHIFT = 0.6  # metres a door may stand beside its entrance: the threshold is wider than that
 _TOUCH = 0.05  # metres within which the front of one house may come to lie in a face of another
 _SHARED_MATERIALS = ("ground_shops", "ground_cafes", "ground_loft", "ground_lobby")
@@ -57,6 +63,15 @@ class Fronts:
 
     surfaces: list[Surface]
     counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Streets:
+    """What plates with the names of streets are hung by: the streets, what stands in them, how plates look here."""
+
+    roads: Roads
+    objects: Objects
+    plates: Plates
 
 
 @dataclass(frozen=True)
@@ -80,8 +95,9 @@ def street_fronts(
     walls: Sequence[Surface],
     *,
     seed: int,
+    streets: Streets | None = None,
 ) -> Fronts:
-    """Put doors, shop fronts and signs at the entrances.
+    """Put doors, shop fronts, signs and numbers at the entrances, and the names of streets at corners.
 
     Parameters
     ----------
@@ -95,12 +111,14 @@ def street_fronts(
         The dressed walls: they say where bays begin and end, so that no window is cut in half.
     seed
         Decides between styles.
+    streets
+        What plates with the names of streets are hung by; none: there are no such plates.
 
     Returns
     -------
     Fronts
-        Surfaces of few materials; counts of doors, shop fronts, signs, and of signs left without letters because the
-        name's script can't be drawn.
+        Surfaces of few materials; counts of doors, shop fronts, signs and plates, and of signs left without letters
+        because the name's script can't be drawn.
     """
     known = {building.id: building for building in buildings}
     ground = GroundFloors(walls)
@@ -117,19 +135,27 @@ def street_fronts(
             spots.append(_Spot(entrance, building, wall, _kind(building, names), names))
     spots = _apportioned(spots)
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
-    boards = paint_boards(signed)
+    plates = Plates() if streets is None else streets.plates
+    hung = [] if streets is None else name_plates(streets.roads, buildings, streets.objects, ground, plates)
+    numbers = {building.id: number for building in buildings if (number := _number(building, plates)) is not None}
+    boards = paint_boards(signed, [*(plate.lettering for plate in hung), *numbers.values()])
     materials = {m.name: m for m in (*(s.material for s in walls), *boards.materials)}
     built: list[_Built] = []
     for spot in spots:
         with expendable(spot.entrance.id):
             one = _Built(spot, Pieces(materials), Counter())
-            _Front(spot, one.pieces, boards, one.counts, rng(seed, "front", spot.entrance.id)).build()
+            front = _Front(spot, one.pieces, boards, one.counts, rng(seed, "front", spot.entrance.id))
+            front.build()
+            front.number(numbers.get(spot.building.id))
             built.append(one)
     pieces = Pieces(materials)
-    counts: Counter[str] = Counter(doors=0, shop_fronts=0, signs=0, awnings=0, projecting_signs=0)
+    counts: Counter[str] = Counter(doors=0, shop_fronts=0, signs=0, awnings=0, projecting_signs=0, house_numbers=0)
     for one in _apart(built, buildings, walls):
         pieces.absorb(one.pieces)
         counts.update(one.counts)
+    for plate in hung:
+        plate.hang(boards, pieces)
+    counts["street_names"] = len(hung)
     counts["signs_without_letters"] = len(boards.mute)
     counts["sign_pages"] = len(boards.materials)
     return Fronts(pieces.surfaces(), dict(sorted(counts.items())))
@@ -178,6 +204,14 @@ def _near_others(built: Sequence[_Built], buildings: Sequence[Building]) -> tupl
     return near, set(owner[other[foreign]].tolist())
 
 
+def _number(building: Building, plates: Plates) -> Lettering | None:
+    """Return the plate with a house's number; None where the map names none, or one that no plate has room for."""
+    text = spelled(building.tags.get("addr:housenumber", "").split(";")[0].split(",")[0])
+    if text is None or len(text) > _LONGEST_NUMBER:
+        return None
+    return Lettering(text, plates.number_ground, plates.number_letters, shines=False)
+
+
 def _has_board(place: Place) -> bool:
     return place.kind not in ("apartments", "place_of_worship", "church") and place.category not in (
         Category.OPEN,
@@ -211,6 +245,9 @@ def _ground_area(building: Building) -> float:
     return abs(float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())) / 2
 
 
+# Doors that have the house's number beside them; how tall it is, how high, and how far beside the door, metres.
+_NUMBERED = ("house", "stairs", "office", "hotel")
+_NUMBER, _NUMBER_AT, _BESIDE_DOOR = 0.2, 2.0, 0.34
 _ASIDE = 0.13  # metres beside a shop front at which its projecting sign hangs
 _HEADROOM = 2.2  # metres below it
 _WIDTH = {
@@ -351,6 +388,25 @@ class _Front:
             self._door("double" if self.random.random() < 0.5 else "panelled", height, 0.05, colour)
             self._surround(height, stone)
         self._plates(height)
+
+    def number(self, number: Lettering | None) -> None:
+        """Add the house's number beside a door, on the side away from names, or on the other where that has no room."""
+        wall = self.spot.wall
+        if number is None or wall is None or self.spot.kind not in _NUMBERED:
+            return
+        board = self.boards.by_lettering[number]
+        tall, s = _NUMBER, self.spot.s
+        wide = tall * board.aspect
+        beside = self.width / 2 + _BESIDE_DOOR
+        left = s - beside - wide
+        if left < 0.05:
+            left = s + beside
+            if left + wide > wall.length - 0.05:
+                return
+        z = min(self.z + _NUMBER_AT, self.top - tall - 0.05)
+        stuff = self._page(board)
+        self.face.panel(left, left + wide, z, z + tall, 0.04, uv=board.uv, colour=_WHITE, stuff=stuff)
+        self.counts["house_numbers"] += 1
 
     def _tint(self) -> Rgb:
         return self.spot.wall.colour if self.spot.wall is not None else _WHITE

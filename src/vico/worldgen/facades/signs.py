@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,33 @@ from vico.worldgen.facades.records import BoardColours, Rgb, SignTrade
 
 _ROW, _FONT, _PAGE, _MOST_PAGES = 48, 30, 2048, 2
 _MOST_BOARDS = 6000
+_RIM = 2  # pixels
+
+
+@dataclass(frozen=True)
+class Lettering:
+    """What is painted on a board.
+
+    Attributes
+    ----------
+    text
+        As `spelled` gives it.
+    ground, letters, rim
+        Colours; None: no rim.
+    shines
+        Whether it does at night.
+    """
+
+    text: str
+    ground: Rgb
+    letters: Rgb
+    rim: Rgb | None = None
+    shines: bool = True
+
+    @property
+    def order(self) -> tuple[str, Rgb, Rgb, tuple[int, ...], bool]:
+        """What boards are sorted by."""
+        return self.text, self.ground, self.letters, self.rim or (), self.shines
 
 
 @dataclass(frozen=True)
@@ -45,11 +72,15 @@ class Board:
 
 @dataclass(frozen=True)
 class Boards:
-    """Boards by the id of their place; `mute` lists places whose name has letters that can't be drawn."""
+    """Boards by the id of their place, or the lettering that was asked for.
+
+    `mute` lists places whose name has letters that can't be drawn.
+    """
 
     by_place: dict[str, Board]
     materials: tuple[Material, ...]
     mute: tuple[str, ...]
+    by_lettering: dict[Lettering, Board] = field(default_factory=dict)
 
 
 def trade_of(place: Place) -> SignTrade:
@@ -90,12 +121,12 @@ def _cut_at_a_word(text: str) -> str:
     return " ".join(words)
 
 
-def paint_boards(places: Sequence[Place]) -> Boards:
-    """Paint a board for every place, equal ones once, on at most two pages.
+def paint_boards(places: Sequence[Place], plates: Iterable[Lettering] = ()) -> Boards:
+    """Paint a board for every place and the plates that are asked for, equal ones once, on at most two pages.
 
     Letters are made smaller where a city has more names than the pages hold.
     """
-    wanted: dict[tuple[str, Rgb, Rgb], list[str]] = {}
+    wanted: dict[Lettering, list[str]] = {plate: [] for plate in plates}
     mute = []
     for place in places:
         text = board_text(place)
@@ -103,27 +134,30 @@ def paint_boards(places: Sequence[Place]) -> Boards:
             mute.append(place.id)
             continue
         colours = colours_of(place)
-        wanted.setdefault((text, colours.ground, colours.letters), []).append(place.id)
+        wanted.setdefault(Lettering(text, colours.ground, colours.letters), []).append(place.id)
     if not wanted:
         return Boards({}, (), tuple(mute))
+    order = sorted(wanted, key=lambda one: one.order)
     for share in (1.0, 0.75, 0.5, 0.375, 0.25):
         row, font = round(_ROW * share / 4) * 4, max(round(_FONT * share), 7)
-        pages = _packed([_board_width(key[0], font) for key in sorted(wanted)], row)
+        pages = _packed([_board_width(one.text, font) for one in order], row)
         if pages is not None:
             break
     else:  # more names than even the smallest letters leave room for: the last ones stay without
-        for key in sorted(wanted)[_MOST_BOARDS:]:
-            mute += wanted.pop(key)
-        pages = _packed([_board_width(key[0], font) for key in sorted(wanted)], row)
+        for one in order[_MOST_BOARDS:]:
+            mute += wanted.pop(one)
+        order = order[:_MOST_BOARDS]
+        pages = _packed([_board_width(one.text, font) for one in order], row)
         assert pages is not None
-    made = {key: _board(key[0], key[1], key[2], font, row) for key in sorted(wanted)}
     count = max(page for page, _, _ in pages) + 1
     highest = max(y for page, _, y in pages if page == count - 1) + row
     canvases = [np.zeros((_PAGE, _PAGE, 4), np.uint8) for _ in range(count)]
     if count == 1:  # a small place needs a small page
         canvases = [np.zeros((1 << max(highest - 1, 1).bit_length(), _PAGE, 4), np.uint8)]
     by_place: dict[str, Board] = {}
-    for (key, picture), (page, x, y) in zip(made.items(), pages, strict=True):
+    by_lettering: dict[Lettering, Board] = {}
+    for one, (page, x, y) in zip(order, pages, strict=True):
+        picture = _painted(one, font, row)
         height, width = picture.shape[:2]
         canvas = canvases[page]
         canvas[y : y + height, x : x + width] = picture
@@ -134,14 +168,15 @@ def paint_boards(places: Sequence[Place]) -> Boards:
             (x + width - e) / _PAGE,
             (y + height - e) / canvas.shape[0],
         )
-        board = Board(page, uv, width / height, key[1], key[2])
-        by_place.update(dict.fromkeys(wanted[key], board))
+        by_lettering[one] = Board(page, uv, width / height, one.ground, one.letters)
+        by_place.update(dict.fromkeys(wanted[one], by_lettering[one]))
     materials = tuple(Material(f"signs_{k}", canvas, emission=1.0) for k, canvas in enumerate(canvases))
-    return Boards(by_place, materials, tuple(mute))
+    return Boards(by_place, materials, tuple(mute), by_lettering)
 
 
-def _board(text: str, ground: Rgb, letters: Rgb, font: int, row: int) -> NDArray[np.uint8]:
+def _painted(board: Lettering, font: int, row: int) -> NDArray[np.uint8]:
     """One board: coverage of the letters mixes the colours; letters shine, the board a little. Row 0 is the bottom."""
+    text, ground, letters = board.text, board.ground, board.letters
     mask = lettered(text, font)
     margin = round(0.45 * font)
     wide = _board_width(text, font)
@@ -158,6 +193,12 @@ def _board(text: str, ground: Rgb, letters: Rgb, font: int, row: int) -> NDArray
     )
     bright = sum(letters) > sum(ground)
     glow = 40 + 215 * cover if bright else 190 - 120 * cover
+    if not board.shines:
+        glow = np.zeros_like(cover)
+    if board.rim is not None:
+        edge = np.ones((row, wide), bool)
+        edge[_RIM:-_RIM, _RIM:-_RIM] = False
+        colour[edge] = board.rim
     return np.concatenate([colour, glow[..., None]], axis=2).round().astype(np.uint8)[::-1]
 
 

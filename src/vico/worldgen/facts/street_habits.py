@@ -44,6 +44,15 @@ class _Markings(DataRecord):
     kerb_lines: Literal["none", "double_yellow"] | None = None
 
 
+class _Plates(DataRecord):
+    names_on: Literal["walls", "posts", "nothing"] | None = None
+    ground: Rgb | None = None
+    letters: Rgb | None = None
+    rim: Rgb | Literal["none"] | None = None
+    number_ground: Rgb | None = None
+    number_letters: Rgb | None = None
+
+
 class _Entry(DataRecord):
     name: str
     like: str | None = None
@@ -51,6 +60,7 @@ class _Entry(DataRecord):
     outlines: tuple[Ring, ...] = ()
     only: tuple[Ring, ...] = ()
     markings: _Markings = _Markings()
+    plates: _Plates = _Plates()
     pavings: dict[str, Paving] = Field(default_factory=dict)
 
 
@@ -90,6 +100,29 @@ class Markings:
 
 
 @dataclass(frozen=True)
+class Plates:
+    """What plates with the names of streets and the numbers of houses look like.
+
+    Attributes
+    ----------
+    names_on
+        Whether streets' names are on the walls of corner houses, or on posts that stand at the corner; nothing: no
+        street has one.
+    ground, letters, rim
+        Colours of these; None: no rim.
+    number_ground, number_letters
+        Colours of the numbers of houses.
+    """
+
+    names_on: str = "walls"
+    ground: Rgb = (22, 58, 132)
+    letters: Rgb = (244, 244, 240)
+    rim: Rgb | None = None
+    number_ground: Rgb = (22, 58, 132)
+    number_letters: Rgb = (244, 244, 240)
+
+
+@dataclass(frozen=True)
 class StreetHabits:
     """What is usual in the streets of a place.
 
@@ -99,11 +132,14 @@ class StreetHabits:
         Of the entry, and of the one that it is `like` at last.
     markings, pavings
         Paint, and pavings by kind of ground.
+    plates
+        Names of streets and numbers of houses.
     """
 
     name: str
     family: str
     markings: Markings
+    plates: Plates
     pavings: dict[str, Paving]
 
 
@@ -167,10 +203,14 @@ def _resolved(entry: _Entry, entries: dict[str, _Entry]) -> StreetHabits:
     family = line[-1].name
     line.append(next(iter(entries.values())))
     said: dict[str, object] = {}
+    plates: dict[str, object] = {}
     pavings: dict[str, Paving] = {}
     for one in reversed(line):
         said |= one.markings.model_dump(exclude_none=True)
+        plates |= one.plates.model_dump(exclude_none=True)
         pavings |= one.pavings
     if said.get("cycle_lane") == "none":
         said["cycle_lane"] = None
-    return StreetHabits(entry.name, family, Markings(**said), pavings)  # type: ignore[arg-type]
+    if plates.get("rim") == "none":
+        plates["rim"] = None
+    return StreetHabits(entry.name, family, Markings(**said), Plates(**plates), pavings)  # type: ignore[arg-type]

@@ -1,0 +1,146 @@
+"""Names of streets are read at corners: on the walls that stand there, or on posts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vico.world.mesh import Surface
+from vico.world.model import Building
+from vico.world.objects import Objects
+from vico.world.street_model import Road, Roads
+from vico.worldgen.facades.pieces import Pieces
+from vico.worldgen.facades.signs import paint_boards
+from vico.worldgen.facades.street_names import NamePlate, name_plates
+from vico.worldgen.facades.textures.materials import material
+from vico.worldgen.facades.textures.walls import BAYS
+from vico.worldgen.facades.walls import GroundFloors
+from vico.worldgen.facts.street_habits import Plates
+
+HALF, HIGH = 6.0, 3.6  # metres from a street's axis to a house, and a ground floor's height
+
+
+def road(name: str | None, *line: tuple[float, float], key: str = "r", lanes: int = 2) -> Road:
+    return Road(
+        id=f"{key}{line}", osm_id=1, name=name, kind="residential", line=list(line), width=7.0, lanes=lanes,
+        oneway=False, sidewalk="both", speed=8.0,
+    )  # fmt: skip
+
+
+#: Four arms of two streets that cross at the origin.
+CROSS = Roads(
+    roads=[
+        road("High Street", (0.0, 0.0), (60.0, 0.0)),
+        road("High Street", (-60.0, 0.0), (0.0, 0.0)),
+        road("Mill Lane", (0.0, 0.0), (0.0, 60.0)),
+        road("Mill Lane", (0.0, -60.0), (0.0, 0.0)),
+        road(None, (0.0, 0.0), (40.0, 40.0), lanes=0),
+    ],
+    junctions=[],
+    crossings=[],
+)
+
+
+def house(number: int, x: float, y: float, *, levels: int = 3) -> tuple[Building, Surface]:
+    """A house with a corner near the origin in the quadrant of a point, and the walls of its ground floor."""
+    xs, ys = sorted((np.sign(x) * HALF, np.sign(x) * 26.0)), sorted((np.sign(y) * HALF, np.sign(y) * 26.0))
+    ring = [(xs[0], ys[0]), (xs[1], ys[0]), (xs[1], ys[1]), (xs[0], ys[1])]
+    parts, uvs = [], []
+    for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
+        parts.append([(*a, 0.0), (*b, 0.0), (*b, HIGH), (*a, HIGH)])
+        uvs.append([(0.0, 0.004), (6.0 / BAYS, 0.004), (6.0 / BAYS, 0.996), (0.0, 0.996)])
+    faces = [(4 * k, 4 * k + i, 4 * k + i + 1) for k in range(4) for i in (1, 2)]
+    walls = Surface.from_triangles(
+        np.array(parts).reshape(-1, 3), np.array(faces), uv=np.array(uvs).reshape(-1, 2), colour=(240, 230, 220),
+        entity=1000 + number, material=material("ground_plain"),
+    )  # fmt: skip
+    building = Building(
+        id=f"w{number}", entity=1000 + number, name=None, use="residential", footprint=[ring], base=0.0,
+        height=3.2 * levels, levels=levels, roof_shape="flat", colour="#ffffff", accessible=True,
+    )  # fmt: skip
+    return building, walls
+
+
+def hung(plates: list[NamePlate]) -> np.ndarray:
+    """Corners of all plates, once they hang."""
+    pieces = Pieces()
+    boards = paint_boards([], [plate.lettering for plate in plates])
+    pieces.materials |= {page.name: page for page in boards.materials}
+    for plate in plates:
+        plate.hang(boards, pieces)
+    return pieces.triangles()
+
+
+def on_walls(levels: int = 3, roads: Roads = CROSS) -> list[NamePlate]:
+    built = [house(k, x, y, levels=levels) for k, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)])]
+    objects = Objects.from_rows([])
+    return name_plates(roads, [b for b, _ in built], objects, GroundFloors([w for _, w in built]), Plates())
+
+
+def test_each_arm_has_its_name_on_a_wall_along_it_above_the_ground_floor() -> None:
+    plates = on_walls()
+    assert sorted(plate.lettering.text for plate in plates) == ["High Street"] * 2 + ["Mill Lane"] * 2
+    for plate in plates:
+        assert plate.wall is not None
+        east = plate.lettering.text == "High Street"
+        assert abs(plate.wall.right[0 if east else 1]) == pytest.approx(1.0)
+        corners = hung([plate]).reshape(-1, 3)
+        # On the outside of its wall, at the end that is nearer to the corner.
+        assert (np.abs(corners[:, 1 if east else 0]) > HALF - 0.2).all()
+        assert (np.abs(corners[:, 1 if east else 0]) < HALF).all()
+        assert (np.abs(corners[:, 0 if east else 1]) < HALF + 3.0).all()
+        assert (np.abs(corners[:, 0 if east else 1]) > HALF).all()
+        assert (corners[:, 2] >= HIGH).all()
+        assert (corners[:, 2] < HIGH + 0.4).all()
+
+
+def test_low_houses_and_streets_that_go_on_under_one_name_have_none() -> None:
+    assert not on_walls(levels=1)
+    same = [one.model_copy(update={"name": "High Street"}) for one in CROSS.roads]
+    assert not on_walls(roads=Roads(roads=same, junctions=[], crossings=[]))
+    unread = [one.model_copy(update={"name": "東京"}) for one in CROSS.roads[:2]] + CROSS.roads[2:4]
+    assert {plate.lettering.text for plate in on_walls(roads=Roads(roads=unread, junctions=[], crossings=[]))} == {
+        "Mill Lane"
+    }
+
+
+def lamps(*places: tuple[float, float], kind: str = "street_lamp", tall: float = 8.0) -> Objects:
+    about = {
+        "group": "amenity", "prototype": kind, "room": "", "z": 0.5, "yaw": 0.0, "scale": 1.0, "size_x": 0.3,
+        "size_y": 0.3, "size_z": tall, "solid": True,
+    }  # fmt: skip
+    rows = [{"id": f"n{k}", "entity": 50 + k, "kind": kind, "x": x, "y": y} | about for k, (x, y) in enumerate(places)]
+    return Objects.from_rows(rows)
+
+
+@pytest.mark.parametrize(
+    ("kind", "tall", "low"), [("street_lamp", 8.0, 3.0), ("traffic_signals", 3.5, 3.5), ("street_lamp", 1.0, None)]
+)
+def test_on_posts_both_names_hang_one_above_the_other_each_along_its_street(
+    kind: str, tall: float, low: float | None
+) -> None:
+    posts = lamps((5.0, 5.0), (40.0, 5.0), kind=kind, tall=tall)
+    plates = name_plates(CROSS, [], posts, GroundFloors([]), replace(Plates(), names_on="posts"))
+    if low is None:
+        assert not plates
+        return
+    assert sorted(plate.lettering.text for plate in plates) == ["High Street", "Mill Lane"]
+    assert {plate.entity for plate in plates} == {50}
+    heights = []
+    for plate in plates:
+        corners = hung([plate]).reshape(-1, 3) - [5.0, 5.0, 0.5]
+        along = 0 if plate.lettering.text == "High Street" else 1
+        assert np.ptp(corners[:, along]) > 0.5
+        assert np.ptp(corners[:, 1 - along]) < 0.1
+        assert np.abs(corners[:, along]).min() > 0.01
+        # Both sides of one blade: on the same side of the post.
+        assert abs(np.sign(corners[:, along]).sum()) == len(corners)
+        heights.append((corners[:, 2].min(), corners[:, 2].max()))
+    (a, b), (c, d) = sorted(heights)
+    assert low <= a < b < c < d < low + 0.8
+
+
+def test_where_nothing_carries_names_there_are_none() -> None:
+    assert not name_plates(CROSS, [], lamps((5.0, 5.0)), GroundFloors([]), replace(Plates(), names_on="nothing"))
