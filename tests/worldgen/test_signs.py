@@ -118,3 +118,13 @@ def test_a_thousand_names_fit_on_two_pages_of_three_megabytes() -> None:
     for page, (left, bottom, right, top) in sorted(rectangles)[:200]:
         others = [uv for p, uv in rectangles if p == page and uv != (left, bottom, right, top)]
         assert not any(x0 < right and x1 > left and y0 < top and y1 > bottom for x0, y0, x1, y1 in others)
+
+
+def test_of_more_names_than_pages_hold_the_last_have_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vico.worldgen.facades.signs._MOST_PAGES", 1)
+    monkeypatch.setattr("vico.worldgen.facades.signs._MOST_BOARDS", 40)
+    monkeypatch.setattr("vico.worldgen.facades.signs._PAGE", 256)
+    plates = [Lettering(f"{k:03d}", (0, 0, 0), (255, 255, 255), shines=False) for k in range(4000)]
+    boards = paint_boards([_place("Zuletzt", "z")], plates)
+    assert set(boards.by_lettering) == set(plates[:40])
+    assert boards.mute == ("z",)

@@ -314,7 +314,8 @@ class SceneRenderer:
         shown = np.ones(len(position), np.bool_)
         if eyes is not None:
             indoors = (people.room >= 0) & ~people.at_door() & (people.passing == 0)
-            shown[: len(people)] = ~indoors | rooms.seen_from(eyes)[people.room]
+            if indoors.any():
+                shown[: len(people)][indoors] = rooms.seen_from(eyes)[people.room[indoors]]
         here, had = np.flatnonzero(part.holds(position, _BESIDE) & shown), self._people.rows
         if len(had) > 2 * len(here) + _SPARE_BODIES:
             self._people.choose(np.flatnonzero(part.holds(position, _SOON) & shown))

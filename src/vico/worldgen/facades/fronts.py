@@ -392,9 +392,9 @@ class _Front:
     def number(self, number: Lettering | None) -> None:
         """Add the house's number beside a door, on the side away from names, or on the other where that has no room."""
         wall = self.spot.wall
-        if number is None or wall is None or self.spot.kind not in _NUMBERED:
+        board = None if number is None else self.boards.by_lettering.get(number)
+        if board is None or wall is None or self.spot.kind not in _NUMBERED:
             return
-        board = self.boards.by_lettering[number]
         tall, s = _NUMBER, self.spot.s
         wide = tall * board.aspect
         beside = self.width / 2 + _BESIDE_DOOR

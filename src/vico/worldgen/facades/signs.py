@@ -124,7 +124,7 @@ def _cut_at_a_word(text: str) -> str:
 def paint_boards(places: Sequence[Place], plates: Iterable[Lettering] = ()) -> Boards:
     """Paint a board for every place and the plates that are asked for, equal ones once, on at most two pages.
 
-    Letters are made smaller where a city has more names than the pages hold.
+    Letters are made smaller where a city has more names than the pages hold; the last names of very many have none.
     """
     wanted: dict[Lettering, list[str]] = {plate: [] for plate in plates}
     mute = []

@@ -58,8 +58,10 @@ class NamePlate:
     along: tuple[float, float]
 
     def hang(self, boards: Boards, pieces: Pieces) -> None:
-        """Add the plate to some pieces."""
-        board = boards.by_lettering[self.lettering]
+        """Add the plate to some pieces, if there was room to paint it."""
+        board = boards.by_lettering.get(self.lettering)
+        if board is None:
+            return
         stuff = boards.materials[board.page].name
         wide = min(_TALL * board.aspect, _LONGEST)
         tall = wide / board.aspect
