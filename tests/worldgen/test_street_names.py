@@ -68,9 +68,14 @@ def hung(plates: list[NamePlate]) -> np.ndarray:
     pieces = Pieces()
     boards = paint_boards([], [plate.lettering for plate in plates])
     pieces.materials |= {page.name: page for page in boards.materials}
-    for plate in plates:
-        plate.hang(boards, pieces)
+    assert all(plate.hang(boards, pieces) for plate in plates)
     return pieces.triangles()
+
+
+def test_a_plate_that_there_was_no_room_to_paint_does_not_hang() -> None:
+    pieces = Pieces()
+    assert not on_walls()[0].hang(paint_boards([]), pieces)
+    assert not len(pieces.triangles())
 
 
 def on_walls(levels: int = 3, roads: Roads = CROSS) -> list[NamePlate]:

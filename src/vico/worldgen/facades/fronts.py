@@ -137,7 +137,8 @@ def street_fronts(
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
     plates = Plates() if streets is None else streets.plates
     hung = [] if streets is None else name_plates(streets.roads, buildings, streets.objects, ground, plates)
-    numbers = {building.id: number for building in buildings if (number := _number(building, plates)) is not None}
+    numbered = {spot.building.id: spot.building for spot in spots if spot.kind in _NUMBERED}
+    numbers = {name: number for name, house in numbered.items() if (number := _number(house, plates)) is not None}
     boards = paint_boards(signed, [*(plate.lettering for plate in hung), *numbers.values()])
     materials = {m.name: m for m in (*(s.material for s in walls), *boards.materials)}
     built: list[_Built] = []
@@ -153,9 +154,7 @@ def street_fronts(
     for one in _apart(built, buildings, walls):
         pieces.absorb(one.pieces)
         counts.update(one.counts)
-    for plate in hung:
-        plate.hang(boards, pieces)
-    counts["street_names"] = len(hung)
+    counts["street_names"] = sum(plate.hang(boards, pieces) for plate in hung)
     counts["signs_without_letters"] = len(boards.mute)
     counts["sign_pages"] = len(boards.materials)
     return Fronts(pieces.surfaces(), dict(sorted(counts.items())))

@@ -57,11 +57,11 @@ class NamePlate:
     at: tuple[float, ...]
     along: tuple[float, float]
 
-    def hang(self, boards: Boards, pieces: Pieces) -> None:
-        """Add the plate to some pieces, if there was room to paint it."""
+    def hang(self, boards: Boards, pieces: Pieces) -> bool:
+        """Add the plate to some pieces; return whether there was room to paint it."""
         board = boards.by_lettering.get(self.lettering)
         if board is None:
-            return
+            return False
         stuff = boards.materials[board.page].name
         wide = min(_TALL * board.aspect, _LONGEST)
         tall = wide / board.aspect
@@ -70,7 +70,7 @@ class NamePlate:
             s = min(max(s, wide / 2 + _END), self.wall.length - wide / 2 - _END)
             face = Face.on(pieces, self.entity, self.wall)
             face.panel(s - wide / 2, s + wide / 2, z, z + tall, _OFF, uv=board.uv, colour=(255, 255, 255), stuff=stuff)
-            return
+            return True
         x, y, z = self.at
         (c, s), (out_x, out_y) = self.along, (-self.along[1], self.along[0])
         for side in (1.0, -1.0):
@@ -80,6 +80,7 @@ class NamePlate:
             # Away from the post, along the street: seen from one side it begins there, from the other it ends there.
             a, b = (-_GAP - wide, -_GAP) if side > 0 else (_GAP, _GAP + wide)
             face.panel(a, b, z, z + tall, 0.0, uv=board.uv, colour=(255, 255, 255), stuff=stuff)
+        return True
 
 
 def name_plates(
