@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building
 from vico.world.objects import Objects
 from vico.world.street_model import Road, Roads
 from vico.worldgen.facades.pieces import Pieces
 from vico.worldgen.facades.signs import paint_boards
-from vico.worldgen.facades.street_names import NamePlate, name_plates
+from vico.worldgen.facades.street_names import NamePlate, Streets, name_plates
 from vico.worldgen.facades.textures.materials import material
 from vico.worldgen.facades.textures.walls import BAYS
 from vico.worldgen.facades.walls import GroundFloors
@@ -78,10 +79,11 @@ def test_a_plate_that_there_was_no_room_to_paint_does_not_hang() -> None:
     assert not len(pieces.triangles())
 
 
-def on_walls(levels: int = 3, roads: Roads = CROSS) -> list[NamePlate]:
+def on_walls(levels: int = 3, roads: Roads = CROSS, low: float = 0.0) -> list[NamePlate]:
     built = [house(k, x, y, levels=levels) for k, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)])]
     objects = Objects.from_rows([])
-    return name_plates(roads, [b for b, _ in built], objects, GroundFloors([w for _, w in built]), Plates())
+    streets = Streets(roads, objects, HeightField.flat(100.0, low), Plates())
+    return name_plates(streets, [b for b, _ in built], GroundFloors([w for _, w in built]))
 
 
 def test_each_arm_has_its_name_on_a_wall_along_it_above_the_ground_floor() -> None:
@@ -111,6 +113,17 @@ def test_low_houses_and_streets_that_go_on_under_one_name_have_none() -> None:
     }
 
 
+@pytest.mark.parametrize(("low", "hang"), [(1.0, True), (2.5, False), (-2.5, True), (-4.5, False)])
+def test_a_plate_that_would_be_under_or_high_above_the_ground_before_it_does_not_hang(low: float, hang: bool) -> None:
+    assert bool(on_walls(low=low)) == hang
+
+
+@pytest.mark.parametrize("kind", ["service", "primary_link"])
+def test_ramps_and_ways_out_have_no_plate(kind: str) -> None:
+    ramps = [one.model_copy(update={"kind": kind}) for one in CROSS.roads[:2]] + CROSS.roads[2:]
+    assert not on_walls(roads=Roads(roads=ramps, junctions=[], crossings=[]))
+
+
 def lamps(*places: tuple[float, float], kind: str = "street_lamp", tall: float = 8.0) -> Objects:
     about = {
         "group": "amenity", "prototype": kind, "room": "", "z": 0.5, "yaw": 0.0, "scale": 1.0, "size_x": 0.3,
@@ -120,6 +133,10 @@ def lamps(*places: tuple[float, float], kind: str = "street_lamp", tall: float =
     return Objects.from_rows(rows)
 
 
+def around(objects: Objects, *, names_on: str) -> Streets:
+    return Streets(CROSS, objects, HeightField.flat(100.0), replace(Plates(), names_on=names_on))
+
+
 @pytest.mark.parametrize(
     ("kind", "tall", "low"), [("street_lamp", 8.0, 3.0), ("traffic_signals", 3.5, 3.5), ("street_lamp", 1.0, None)]
 )
@@ -127,7 +144,7 @@ def test_on_posts_both_names_hang_one_above_the_other_each_along_its_street(
     kind: str, tall: float, low: float | None
 ) -> None:
     posts = lamps((5.0, 5.0), (40.0, 5.0), kind=kind, tall=tall)
-    plates = name_plates(CROSS, [], posts, GroundFloors([]), replace(Plates(), names_on="posts"))
+    plates = name_plates(around(posts, names_on="posts"), [], GroundFloors([]))
     if low is None:
         assert not plates
         return
@@ -148,4 +165,4 @@ def test_on_posts_both_names_hang_one_above_the_other_each_along_its_street(
 
 
 def test_where_nothing_carries_names_there_are_none() -> None:
-    assert not name_plates(CROSS, [], lamps((5.0, 5.0)), GroundFloors([]), replace(Plates(), names_on="nothing"))
+    assert not name_plates(around(lamps((5.0, 5.0)), names_on="nothing"), [], GroundFloors([]))

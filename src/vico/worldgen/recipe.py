@@ -23,7 +23,8 @@ from vico.world.transit_model import Transit
 from vico.world.world import World
 from vico.worldgen.buildings.stage import BuildingsResult
 from vico.worldgen.evidence import Evidence
-from vico.worldgen.facades.fronts import Streets, street_fronts
+from vico.worldgen.facades.fronts import street_fronts
+from vico.worldgen.facades.street_names import Streets
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.ground.backdrop import backdrop_of
 from vico.worldgen.ground.stage import ground_from_osm
@@ -134,7 +135,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     ground = joined([*ground, *around, *wires])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):
-        names = Streets(roads, outdoors, street_habits(site.osm).plates)
+        names = Streets(roads, outdoors, levels, street_habits(site.osm).plates)
         fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed, streets=names)
     stages.report("fronts", fronts.counts)
 

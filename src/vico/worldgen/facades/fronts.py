@@ -15,12 +15,10 @@ from vico.seeds import rng
 from vico.world.check.buildings import overlapping_faces
 from vico.world.mesh import Surface
 from vico.world.model import FAILED, Building, Category, Entrance, Place
-from vico.world.objects import Objects
-from vico.world.street_model import Roads
 from vico.worldgen.facades.lettering import spelled
 from vico.worldgen.facades.pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
 from vico.worldgen.facades.signs import Board, Boards, Lettering, colours_of, paint_boards
-from vico.worldgen.facades.street_names import name_plates
+from vico.worldgen.facades.street_names import Streets, name_plates
 from vico.worldgen.facades.walls import GroundFloors, Wall
 from vico.worldgen.facts.expendable import expendable, leave_out
 from vico.worldgen.facts.street_habits import Plates
@@ -63,15 +61,6 @@ class Fronts:
 
     surfaces: list[Surface]
     counts: dict[str, int]
-
-
-@dataclass(frozen=True)
-class Streets:
-    """What plates with the names of streets are hung by: the streets, what stands in them, how plates look here."""
-
-    roads: Roads
-    objects: Objects
-    plates: Plates
 
 
 @dataclass(frozen=True)
@@ -136,7 +125,7 @@ def street_fronts(
     spots = _apportioned(spots)
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
     plates = Plates() if streets is None else streets.plates
-    hung = [] if streets is None else name_plates(streets.roads, buildings, streets.objects, ground, plates)
+    hung = [] if streets is None else name_plates(streets, buildings, ground)
     numbered = {spot.building.id: spot.building for spot in spots if spot.kind in _NUMBERED}
     numbers = {name: number for name, house in numbered.items() if (number := _number(house, plates)) is not None}
     boards = paint_boards(signed, [*(plate.lettering for plate in hung), *numbers.values()])

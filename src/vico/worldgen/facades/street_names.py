@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from vico.world.heights import HeightField
 from vico.world.model import Building
 from vico.world.objects import Objects
 from vico.world.street_model import Road, Roads
@@ -26,11 +27,14 @@ _ABOVE = 0.02  # metres above the ground floor: over its band, below windows
 _ALONG, _ASIDE = 26.0, 10.0
 _PARALLEL = math.cos(math.radians(25.0))
 _LEAST_WALL = 3.0  # metres
+# Of the ground before a wall, metres below a plate: where houses stand on slopes, a storey may be below the street.
+_BEFORE, _LEAST_UP, _MOST_UP = 1.0, 2.0, 7.0
 # Of posts: metres from the corner at most, and heights that carry a name.
 _NEAR, _LOW, _HIGH = 16.0, 3.2, 14.0
 _ON_LAMP, _GAP, _THICK = 3.1, 0.05, 0.02  # metres
 _POSTS = ("street_lamp", "traffic_signals")  # those that are taken first come first
 _MOST_CHARACTERS = 36
+_NO_STREETS = ("service", "_link")  # kinds of roads whose names are those of ramps and ways out
 
 
 @dataclass(frozen=True)
@@ -83,32 +87,51 @@ class NamePlate:
         return True
 
 
-def name_plates(
-    roads: Roads, buildings: Sequence[Building], objects: Objects, ground: GroundFloors, plates: Plates
-) -> list[NamePlate]:
+@dataclass(frozen=True)
+class Streets:
+    """What plates are hung by.
+
+    Attributes
+    ----------
+    roads
+        Streets and footways.
+    objects
+        What stands in them.
+    height
+        Of the ground.
+    plates
+        What plates look like here.
+    """
+
+    roads: Roads
+    objects: Objects
+    height: HeightField
+    plates: Plates
+
+
+def name_plates(streets: Streets, buildings: Sequence[Building], ground: GroundFloors) -> list[NamePlate]:
     """Choose where the names of streets are read.
 
     Parameters
     ----------
-    roads
-        Streets and footways.
-    buildings, objects
-        What carries plates.
+    streets
+        The streets, and what stands in them.
+    buildings
+        Those whose walls may carry plates.
     ground
-        The walls of the buildings.
-    plates
-        What they look like here.
+        Their walls.
 
     Returns
     -------
     list of NamePlate
         One for each end of a street at a corner, where something carries it; none of names whose script can't be drawn.
     """
-    if plates.names_on == "nothing":
-        return []
-    if plates.names_on == "posts":
-        return _on_posts(roads, objects, plates)
-    return _on_walls(roads, buildings, ground, plates)
+    match streets.plates.names_on:
+        case "walls":
+            return _on_walls(streets, buildings, ground)
+        case "posts":
+            return _on_posts(streets)
+    return []
 
 
 def _lettering(name: str, plates: Plates) -> Lettering | None:
@@ -122,7 +145,8 @@ def _corners(roads: Roads) -> dict[tuple[float, float], list[tuple[Road, tuple[f
     """Return where streets of different names meet: the roads there, and the way each leads from it."""
     ends: dict[tuple[float, float], list[tuple[Road, tuple[float, float]]]] = {}
     for road in roads.roads:
-        if road.name and road.layer == 0 and (road.lanes or road.kind == "pedestrian"):
+        is_street = road.kind == "pedestrian" or (road.lanes and not road.kind.endswith(_NO_STREETS))
+        if road.name and road.layer == 0 and is_street:
             for line in (road.line, road.line[::-1]):
                 way = _way(line)
                 if way is not None:
@@ -141,16 +165,16 @@ def _way(line: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
     return (dx / size, dy / size) if size > 0.5 else None
 
 
-def _arms(roads: Roads, plates: Plates) -> Iterator[tuple[tuple[float, float], Road, tuple[float, float], Lettering]]:
+def _arms(streets: Streets) -> Iterator[tuple[tuple[float, float], Road, tuple[float, float], Lettering]]:
     """Yield the arms of all corners, of each name once a direction, in a fixed order."""
-    for point, here in sorted(_corners(roads).items(), key=lambda one: one[0]):
+    for point, here in sorted(_corners(streets.roads).items(), key=lambda one: one[0]):
         for road, way in sorted(here, key=lambda one: (one[0].name or "", one[1])):
-            lettering = _lettering(road.name or "", plates)
+            lettering = _lettering(road.name or "", streets.plates)
             if lettering is not None:
                 yield point, road, way, lettering
 
 
-def _on_walls(roads: Roads, buildings: Sequence[Building], ground: GroundFloors, plates: Plates) -> list[NamePlate]:
+def _on_walls(streets: Streets, buildings: Sequence[Building], ground: GroundFloors) -> list[NamePlate]:
     edges, owner = _edges(buildings)
     if not len(edges):
         return []
@@ -160,7 +184,7 @@ def _on_walls(roads: Roads, buildings: Sequence[Building], ground: GroundFloors,
     along /= np.maximum(length, 1e-9)[:, None]
     taken: dict[tuple[int, tuple[float, float]], list[float]] = {}
     found = []
-    for point, road, way, lettering in _arms(roads, plates):
+    for point, road, way, lettering in _arms(streets):
         near = np.sort(tree.query(shapely.Point(point).buffer(_ALONG + _ASIDE)))
         near = near[length[near] >= _LEAST_WALL]
         # Outlines run counter-clockwise: outside is to the right of an edge.
@@ -177,12 +201,20 @@ def _on_walls(roads: Roads, buildings: Sequence[Building], ground: GroundFloors,
             plate = _on_wall(buildings[owner[k]], edges[k], along[k], point, lettering, ground)
             if plate is None or plate.wall is None:
                 continue
+            if not _LEAST_UP < _up(plate.wall, plate.at[0], plate.at[1], streets.height) < _MOST_UP:
+                continue
             key = plate.entity, (round(plate.wall.start[0], 1), round(plate.wall.start[1], 1))
             if all(abs(plate.at[0] - other) > _LONGEST for other in taken.get(key, ())):
                 taken.setdefault(key, []).append(plate.at[0])
                 found.append(plate)
             break
     return found
+
+
+def _up(wall: Wall, s: float, z: float, height: HeightField) -> float:
+    """Return how high a plate hangs above the ground before it, metres."""
+    x, y = (wall.start[k] + wall.right[k] * s + wall.out[k] * _BEFORE for k in range(2))
+    return z - float(height((x, y)))
 
 
 def _edges(buildings: Sequence[Building]) -> tuple[np.ndarray, np.ndarray]:
@@ -218,14 +250,15 @@ def _on_wall(
     return NamePlate(lettering, building.entity, wall, (s, wall.high + _ABOVE), (float(along[0]), float(along[1])))
 
 
-def _on_posts(roads: Roads, objects: Objects, plates: Plates) -> list[NamePlate]:
+def _on_posts(streets: Streets) -> list[NamePlate]:
     """Hang the names of a corner's streets on one post each, one above the other."""
+    objects = streets.objects
     tall = np.isin(objects.kind, _POSTS) & (objects.size_z >= _LOW) & (objects.size_z <= _HIGH)
     posts = np.flatnonzero(tall)
     rank = np.array([_POSTS.index(kind) for kind in objects.kind[posts].tolist()], np.int64)
     found, used = [], set()
     last: tuple[float, float] | None = None
-    for point, road, way, lettering in _arms(roads, plates):
+    for point, road, way, lettering in _arms(streets):
         if not len(posts):
             break
         if point != last:
