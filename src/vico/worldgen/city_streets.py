@@ -10,6 +10,7 @@ from hashlib import sha256
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.geo.osm import OsmData
 from vico.io.files import read_json, write_bytes, write_json
@@ -111,9 +112,13 @@ def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write_record(whole / TRANSIT, transit)
     _report(stages, roads, lanes, transit)
-    cutter = NetworkCutter(network.net_xml)
+    cutter, boxes = NetworkCutter(network.net_xml), _boxes(roads)
     for tile in shapes:
-        keep_product(request.plans / tile_name(tile), CUT, _part(cutter, roads, transit, tile, request.grid))
+        shift = _Shift(request.grid, tile)
+        net = cutter.within(half=request.grid.size / 2 + _AROUND, east=shift.by[0], north=shift.by[1])
+        served = {name.decode() for name in _LANE.findall(net)}
+        part = TileStreets(_roads_in(roads, boxes, shift), RoadNetwork(net, None), _transit_in(transit, shift, served))
+        keep_product(request.plans / tile_name(tile), CUT, part)
     return stages.reports
 
 
@@ -153,10 +158,10 @@ class _Shift:
     """Tells coordinates of a city from the middle of a tile, and whether they lie in it."""
 
     def __init__(self, grid: TileGrid, tile: Tile) -> None:
-        self._by, self._size, self._grid, self._tile = grid.centre(tile), grid.size, grid, tile
+        self.by, self._size, self._grid, self._tile = grid.centre(tile), grid.size, grid, tile
 
     def point(self, xy: Point2) -> Point2:
-        return round(xy[0] - self._by[0], 3), round(xy[1] - self._by[1], 3)
+        return round(xy[0] - self.by[0], 3), round(xy[1] - self.by[1], 3)
 
     def point3(self, xyz: Point3) -> Point3:
         return (*self.point(xyz[:2]), xyz[2])
@@ -165,26 +170,23 @@ class _Shift:
         own = math.floor(xy[0] / self._size + 0.5), math.floor(xy[1] / self._size + 0.5)
         return self._grid.nearest(own) == self._tile
 
-    def reached_by(self, line: list[Point2]) -> bool:
-        points = np.array(line) - self._by
+    def reached_by(self, boxes: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return which of some boxes (west, south, east, north) reach into the tile or near it."""
         half = self._size / 2 + _AROUND
-        return bool((points.min(axis=0) <= half).all() and (points.max(axis=0) >= -half).all())
+        low, high = boxes[:, :2] - self.by, boxes[:, 2:] - self.by
+        return np.flatnonzero((low <= half).all(axis=1) & (high >= -half).all(axis=1))
 
 
-def _part(cutter: NetworkCutter, roads: Roads, transit: Transit, tile: Tile, grid: TileGrid) -> TileStreets:
-    shift, (east, north) = _Shift(grid, tile), grid.centre(tile)
-    net = cutter.within(half=grid.size / 2 + _AROUND, east=east, north=north)
-    lanes = {name.decode() for name in _LANE.findall(net)}
-    return TileStreets(_roads_in(roads, shift), RoadNetwork(net, None), _transit_in(transit, shift, lanes))
+def _boxes(roads: Roads) -> NDArray[np.float64]:
+    """Return the box of every road: west, south, east and north, metres, shape ``(n, 4)``."""
+    lines = [np.array(road.line) for road in roads.roads]
+    return np.array([[*line.min(axis=0), *line.max(axis=0)] for line in lines]).reshape(-1, 4)
 
 
-def _roads_in(roads: Roads, shift: _Shift) -> Roads:
+def _roads_in(roads: Roads, boxes: NDArray[np.float64], shift: _Shift) -> Roads:
+    near = [roads.roads[k] for k in shift.reached_by(boxes).tolist()]
     return Roads(
-        roads=[
-            road.model_copy(update={"line": [shift.point(xy) for xy in road.line]})
-            for road in roads.roads
-            if shift.reached_by(road.line)
-        ],
+        roads=[road.model_copy(update={"line": [shift.point(xy) for xy in road.line]}) for road in near],
         junctions=[
             junction.model_copy(update={"position": shift.point(junction.position)})
             for junction in roads.junctions

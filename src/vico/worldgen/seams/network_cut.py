@@ -30,6 +30,16 @@ class NetworkCutter:
             self._by_tag.setdefault(element.tag, []).append(element)
         self._streets = [edge for edge in self._of("edge") if not edge.get("function")]
         self._boxes = np.array([_box(edge) for edge in self._streets]).reshape(-1, 4)
+        # Where things of a tag stand in the file: a tile looks at those that are near alone.
+        self._edge_at = {edge.get("id"): k for k, edge in enumerate(self._of("edge"))}
+        self._junction_at = {junction.get("id"): k for k, junction in enumerate(self._of("junction"))}
+        self._links_from: dict[Any, list[int]] = {}
+        for k, link in enumerate(self._of("connection")):
+            self._links_from.setdefault(link.get("from"), []).append(k)
+        self._walked: dict[str, list[Any]] = {}
+        for edge in self._of("edge"):
+            if edge.get("function") in ("walkingarea", "crossing"):
+                self._walked.setdefault(str(edge.get("id"))[1:].rpartition("_")[0], []).append(edge.get("id"))
 
     def _of(self, tag: str) -> list[Element]:
         return self._by_tag.get(tag, [])
@@ -49,19 +59,17 @@ class NetworkCutter:
         edges = {self._streets[k].get("id") for k in np.flatnonzero(near)}
         junctions = {self._streets[k].get(end) for k in np.flatnonzero(near) for end in ("from", "to")}
         edges |= self._through(edges, junctions)
-        lanes = {lane.get("id") for edge in self._of("edge") if edge.get("id") in edges for lane in edge}
-        links = [link for link in self._of("connection") if {link.get("from"), link.get("to")} <= edges]
+        kept = [self._of("edge")[k] for k in sorted(self._edge_at[name] for name in edges if name in self._edge_at)]
+        lanes = {lane.get("id") for edge in kept for lane in edge}
+        links = [link for link in self._leaving(edges) if link.get("to") in edges]
         programs = {link.get("tl") for link in links}
         root = Element("net", self._attributes)
         root.extend(self._of("location"))
         root.extend(self._of("type"))
-        root.extend(_moved(edge, east, north) for edge in self._of("edge") if edge.get("id") in edges)
+        root.extend(_moved(edge, east, north) for edge in kept)
         root.extend(program for program in self._of("tlLogic") if program.get("id") in programs)
-        root.extend(
-            _joining(_moved(junction, east, north), lanes)
-            for junction in self._of("junction")
-            if junction.get("id") in junctions or junction.get("id") in lanes
-        )
+        at = sorted(self._junction_at[name] for name in junctions | lanes if name in self._junction_at)
+        root.extend(_joining(_moved(self._of("junction")[k], east, north), lanes) for k in at)
         root.extend(links)
         return b'<?xml version="1.0" encoding="UTF-8"?>\n' + bytes(tostring(root)) + b"\n"
 
@@ -69,13 +77,16 @@ class NetworkCutter:
         """Return the parts of junctions that lead from one of some streets to another, and where people cross them."""
         kept, known = set(streets), set(junctions)
         inside: set[Any] = set()
-        links = [link for link in self._of("connection") if link.get("to") in kept and link.get("via")]
-        found = {_edge(str(link.get("via"))) for link in links if link.get("from") in kept}
+        found = kept
         while found:
+            links = (link for link in self._leaving(found) if link.get("to") in kept and link.get("via"))
+            found = {_edge(str(link.get("via"))) for link in links} - inside
             inside |= found
-            found = {_edge(str(link.get("via"))) for link in links if link.get("from") in found} - inside
-        walked = (edge for edge in self._of("edge") if edge.get("function") in ("walkingarea", "crossing"))
-        return inside | {edge.get("id") for edge in walked if str(edge.get("id"))[1:].rpartition("_")[0] in known}
+        return inside | {edge for junction in known for edge in self._walked.get(str(junction), ())}
+
+    def _leaving(self, edges: Iterable[Any]) -> list[Element]:
+        """Return the connections that leave some edges, in the order of the file."""
+        return [self._of("connection")[k] for k in sorted(k for name in edges for k in self._links_from.get(name, ()))]
 
 
 def _edge(lane: str) -> str:

@@ -36,6 +36,8 @@ _FROM_BUS, _FROM_WALL = 0.8, 0.4
 _FROM_TRACK = TRAM_WIDTH / 2 + 0.5
 # A stop that nothing serves is on the pavement if that is so near, metres.
 _NOT_SERVED = 8.0
+# The pavement of a city is looked at in parts as large as this at most.
+_PART = 100.0
 
 
 def front_door(lanes: LaneGraph, lane: str, offset: float) -> Point2:
@@ -105,7 +107,7 @@ class _Finder:
         rails = overlay.union_all([shapely.LineString(track).buffer(_FROM_TRACK) for track in tracks], grid=None)
         pavement = overlay.union_all([streets.sidewalk, streets.pedestrian], grid=None)
         inside = [overlay.buffer(pavement, -inset) for inset in _FROM_EDGE]
-        self._pavements = [overlay.difference(area, rails, grid=None) for area in inside]
+        self._pavements = [_Parted(overlay.difference(area, rails, grid=None)) for area in inside]
         self._carriageway, self._lanes = streets.carriageway, lanes
         self._walls = shapely.STRtree(list(solids))
         shapely.prepare(self._carriageway)
@@ -121,7 +123,7 @@ class _Finder:
             return found
         widest = self._pavements[-1]
         if not served:
-            near = overlay.intersection(widest, overlay.buffer(here, _NOT_SERVED), grid=None)
+            near = widest.within(overlay.buffer(here, _NOT_SERVED))
             near = overlay.difference(near, self._near_walls(near), grid=None)
             if not near.is_empty:
                 return _nearest(near, here)
@@ -130,7 +132,7 @@ class _Finder:
             (x, y), (u, v) = _bus_door(self._lanes, stop.lane, stop.offset, BUS_DOOR_BEHIND_FRONT)
             return x + u * _FROM_BUS, y + v * _FROM_BUS
         # The pavement is out of reach: as near to it as one can board from.
-        return _nearest(room, here if widest.is_empty else widest)
+        return _nearest(room, here if widest.whole.is_empty else widest.whole)
 
     def place_for_tram(self, stop: TramStop, line: TramLine) -> Point2:
         """Return where people wait for a tram of a line: beside a door on the side of the kerb, off the roadway."""
@@ -153,7 +155,7 @@ class _Finder:
             return here.x, here.y
         for room in rooms:
             for pavement in self._pavements:
-                found = overlay.intersection(room, pavement, grid=None)
+                found = pavement.within(room)
                 if not found.is_empty:
                     return _nearest(found, here)
         return None
@@ -169,6 +171,36 @@ class _Finder:
     def _near_walls(self, area: shapely.Geometry) -> shapely.Geometry:
         near = self._walls.query(overlay.buffer(area, _FROM_WALL)).tolist()
         return overlay.union_all([overlay.buffer(self._walls.geometries[k], _FROM_WALL) for k in near], grid=None)
+
+
+class _Parted:
+    """An area as large as a city, cut into squares: what of it lies somewhere is found without all the rest."""
+
+    def __init__(self, whole: shapely.Geometry) -> None:
+        self.whole = whole
+        self._tree = shapely.STRtree(_parted(whole))
+
+    def within(self, other: shapely.Geometry) -> shapely.Geometry:
+        """Return what lies in another area."""
+        near = sorted(self._tree.query(other).tolist())
+        parts = [overlay.intersection(self._tree.geometries[k], other, grid=None) for k in near]
+        return overlay.union_all(parts, grid=None)
+
+
+def _parted(area: shapely.Geometry) -> list[shapely.Polygon]:
+    """Halve an area until its parts are small."""
+    if area.is_empty:
+        return []
+    west, south, east, north = area.bounds
+    if max(east - west, north - south) <= _PART:
+        return overlay.polygons_of(area)
+    if east - west > north - south:
+        middle = (west + east) / 2
+        halves = (west, south, middle, north), (middle, south, east, north)
+    else:
+        middle = (south + north) / 2
+        halves = (west, south, east, middle), (west, middle, east, north)
+    return [part for half in halves for part in _parted(shapely.clip_by_rect(area, *half))]
 
 
 def _half_plane(start: shapely.Point, outward: Point2) -> shapely.Polygon:
