@@ -16,6 +16,7 @@ from vico.community.model import ActivityTag, Resident
 from vico.community.place_index import PlaceIndex
 from vico.community.staff import staff_capacity
 from vico.errors import EmptyInputError
+from vico.world.model import Category
 from vico.world.world import World
 
 Measured = list[tuple[Resident, dict[str, float]]]
@@ -144,3 +145,14 @@ def test_sunday_closing_is_heeded_by_visitors() -> None:
     stores = {p.id for p in world.places if p.category == "store"}
     assert [i.activity for r in community.residents for i in r.schedule if i.place in stores] == []
     assert any(i.tag is not ActivityTag.SHOP for r in community.residents for i in r.schedule)
+
+
+def test_the_nearest_places_of_some_kinds_are_those_of_the_whole_order(helsinki: World) -> None:
+    index = PlaceIndex(helsinki, 0)
+    for home in [place.id for place in index.homes()[0]][::40]:
+        order = index.by_nearness(home)
+        food = [place.id for place in order if place.category is Category.FOOD][:3]
+        bars = [place.id for place in order if place.kind in ("bar", "pub")][:2]
+        assert index.nearest(home, (Category.FOOD, 3), (("pub", "bar"), 2)) == food + bars
+        everything = [place.id for place in order if place.category is Category.OPEN]
+        assert index.nearest(home, (Category.OPEN, 10_000), (("none such",), 2)) == everything

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from datetime import date as Date  # parameters of that name would hide it
 from datetime import timedelta
 from functools import partial
-from itertools import islice
 from typing import Protocol
 
 import numpy as np
@@ -321,11 +320,10 @@ def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
 def _known(index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]) -> list[str]:
     """Where they go, where they meet, where their hobbies could take them, and what they pass on their own street."""
     known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
-    near = index.by_nearness(draft.home)
-    for hobby in draft.hobbies:
-        known += islice((p.id for p in near if p.kind in hobby.kinds), 2)
-    for category in (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT):
-        known += islice((p.id for p in near if p.category is category), 3)
+    passed = (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT)
+    known += index.nearest(
+        draft.home, *((hobby.kinds, 2) for hobby in draft.hobbies), *((category, 3) for category in passed)
+    )
     return list(dict.fromkeys(known))
 
 

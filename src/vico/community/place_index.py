@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -60,6 +60,7 @@ class PlaceIndex:
         self._inside = self._rooms.inside
         self._estimates: Recent[str, NDArray[np.int16]] = Recent(_ESTIMATES)
         self._reachable: dict[str, bool] = {}
+        self._lists: dict[Category | frozenset[str], NDArray[np.int64]] = {}
         self._hours: dict[tuple[str, int], list[Span]] = {}
 
     @cached_property
@@ -184,6 +185,29 @@ class PlaceIndex:
         reachable, numbers = self._all_reachable
         far = np.round(np.hypot(*(self._positions[numbers] - (x, y)).T), 3)
         return [reachable[k] for k in np.lexsort((self._names[numbers], far)).tolist()]
+
+    def nearest(self, a: str, *wanted: tuple[Category | Collection[str], int]) -> list[str]:
+        """Ids of the reachable places nearest to one: so many of each category, or of some kinds, in that order."""
+        x, y = self.place_by_id[a].position[:2]
+        reachable, numbers = self._all_reachable
+        found: list[str] = []
+        for what, count in wanted:
+            among = self._among(what if isinstance(what, Category) else frozenset(what))
+            far = np.round(np.hypot(*(self._positions[numbers[among]] - (x, y)).T), 3)
+            if len(far) > count:
+                near = np.flatnonzero(far <= np.partition(far, count - 1)[count - 1])
+                among, far = among[near], far[near]
+            order = np.lexsort((self._names[numbers[among]], far))[:count]
+            found += [reachable[k].id for k in among[order].tolist()]
+        return found
+
+    def _among(self, what: Category | frozenset[str]) -> NDArray[np.int64]:
+        """Return which of all reachable places are of a category, or of some kinds."""
+        if what not in self._lists:
+            places = self._all_reachable[0]
+            of = [p.category is what if isinstance(what, Category) else p.kind in what for p in places]
+            self._lists[what] = np.flatnonzero(of)
+        return self._lists[what]
 
     @cached_property
     def _all_reachable(self) -> tuple[list[Place], NDArray[np.int64]]:
