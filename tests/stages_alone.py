@@ -10,8 +10,9 @@ from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges.stage import bridges_of
-from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.stage import APRON, ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
+from vico.worldgen.ground.yards import yards_of
 
 
 def buildings_of(osm: OsmData, terrain: HeightField, *, seed: int) -> BuildingsResult:
@@ -23,4 +24,5 @@ def ground_of(osm: OsmData, terrain: HeightField, streets: StreetPolygons) -> li
     """The ground of a map, its bridges with it."""
     site = site_facts(osm)
     flights = flights_of(site, terrain, streets.steps)
-    return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets), flights)
+    yards = yards_of(osm, streets.carriageway, reach=osm.half + APRON)
+    return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets), flights, yards)

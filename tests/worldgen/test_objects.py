@@ -13,15 +13,15 @@ from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
 from vico.world.world import World
-from vico.worldgen.objects.stage import objects_from_osm
+from vico.worldgen.objects.stage import Grounds, objects_from_osm
 
 NOTHING = shapely.Polygon()
 
 
 def placed(nodes: list[OsmNode], *, ways: Sequence[OsmWay] = (), **given: object) -> tuple[Objects, list[str]]:
     osm = OsmData(LocalFrame(60.0, 25.0), 50.0, 60.0, nodes, list(ways), [], [])
-    arguments = {"solids": [], "carriageway": NOTHING, "openings": NOTHING, "height": HeightField.flat(60.0)} | given
-    objects, dropped = objects_from_osm(osm, **arguments)
+    grounds = Grounds(**{name: given.pop(name) for name in ("solids", "carriageway", "openings") if name in given})
+    objects, dropped = objects_from_osm(osm, grounds, **{"height": HeightField.flat(60.0)} | given)
     return objects, [entry.reason for entry in dropped]
 
 

@@ -17,7 +17,7 @@ from vico.world.heights import HeightField
 from vico.world.objects import Objects
 from vico.worldgen.objects import catalogue
 from vico.worldgen.objects.kinds import region, sign_of, thing_of
-from vico.worldgen.objects.stage import objects_from_osm
+from vico.worldgen.objects.stage import Grounds, objects_from_osm
 from vico.worldgen.objects.trees import climate, spread, tree_wish
 
 NOTHING = shapely.Polygon()
@@ -33,9 +33,7 @@ def placed(
     solids: list[shapely.Polygon] | None = None,
 ) -> Objects:
     osm = OsmData(LocalFrame(50.0, 10.0), 60.0, 60.0, nodes or [], ways or [], areas or [], [])
-    objects, _ = objects_from_osm(
-        osm, solids=solids or [], carriageway=carriageway, openings=openings, height=HeightField.flat(60.0)
-    )
+    objects, _ = objects_from_osm(osm, Grounds(solids or [], carriageway, openings), height=HeightField.flat(60.0))
     return objects
 
 
@@ -300,6 +298,5 @@ def test_what_vehicles_sweep_is_kept_free_beyond_the_carriageway() -> None:
             return np.array([[-60.0, 0.0, 0.0], [60.0, 0.0, 0.0]])
 
     osm = OsmData(LocalFrame(50.0, 10.0), 60.0, 60.0, [OsmNode(1, np.zeros(2), {"amenity": "bench"})], [], [], [])
-    given = {"solids": [], "carriageway": NOTHING, "openings": NOTHING, "height": HeightField.flat(60.0)}
-    objects, _ = objects_from_osm(osm, **given, lanes=Lanes())
+    objects, _ = objects_from_osm(osm, Grounds(), height=HeightField.flat(60.0), lanes=Lanes())
     assert shapely.distance(shapely.Polygon(objects.feet()[0]), shapely.LineString([(-60, 0), (60, 0)])) > 1.2

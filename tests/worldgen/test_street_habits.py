@@ -11,7 +11,7 @@ from shapely import MultiPolygon
 
 from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
+from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.io.data_files import VARIABLE
 from vico.world.heights import HeightField
 from vico.worldgen.facts.site import site_facts
@@ -23,7 +23,6 @@ from vico.worldgen.ground.pavings import LOOKS, look_of
 from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.wires import CONTACT, contact_wires
-from vico.worldgen.ground.yards import gardens_of
 from vico.worldgen.objects.kinds import thing_of
 from vico.worldgen.streets.crossings import crossings_of
 
@@ -177,19 +176,6 @@ def test_trees_on_paving_stand_in_pits_and_those_on_lawns_do_not() -> None:
     assert quads[0].corners[0].mean(axis=0) == pytest.approx([5.0, 2.0])
 
 
-def test_small_houses_that_stand_by_themselves_have_gardens_and_blocks_have_yards() -> None:
-    def areas(size: float, pitch: float) -> OsmData:
-        places = np.arange(-60.0, 61.0, pitch)
-        built = [
-            OsmArea(f"w{k}", shapely.box(x, y, x + size, y + size), {"building": "yes"})
-            for k, (x, y) in enumerate((x, y) for x in places for y in places)
-        ]
-        return OsmData(LocalFrame(47.5, 11.1), 80.0, 0.0, [], [], built, [])
-
-    assert gardens_of(areas(11.0, 24.0), 80.0).area > 8000.0
-    assert gardens_of(areas(40.0, 50.0), 80.0).area < 200.0
-
-
 def test_hydrants_signals_and_lamps_are_those_of_the_country() -> None:
     hydrant, pillar = {"emergency": "fire_hydrant"}, {"emergency": "fire_hydrant", "fire_hydrant:type": "pillar"}
     assert [thing_of(hydrant, where=where) for where in ("us", "de", "fr")] == [
@@ -239,3 +225,16 @@ def test_wires_hang_over_tram_tracks_and_are_held_by_walls_at_both_sides() -> No
         )
         == []
     )
+
+
+def test_tracks_lie_on_sleepers_but_where_a_street_or_a_footway_leads_across() -> None:
+    streets, window = city(street(1, (0.0, -30.0), (0.0, 30.0))), shapely.box(-50, -50, 50, 50)
+    groups = road_markings(streets, window, tracks=[np.array([[-20.0, 0.0], [20.0, 0.0]])])
+    sleepers, rails = (
+        next(group.corners for group in groups if not group.low and (len(group.corners) == 2) == is_rail)
+        for is_rail in (False, True)
+    )
+    assert len(sleepers) == pytest.approx((40.0 - 8.0 - 2 * 4.0) / 0.65, abs=3)
+    assert np.abs(sleepers.mean(axis=1)[:, 0]).min() > 8.0
+    assert (rails[..., 0].min(), rails[..., 0].max()) == (-20.0, 20.0)
+    assert all(group.low for group in road_markings(streets, window))

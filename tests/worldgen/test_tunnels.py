@@ -20,9 +20,10 @@ from vico.worldgen.facts.site import site_facts
 from vico.worldgen.ground.bridges.stage import Bridges, bridges_of
 from vico.worldgen.ground.bridges.tunnels import HEADROOM
 from vico.worldgen.ground.grading import graded
-from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.stage import APRON, ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain
+from vico.worldgen.ground.yards import Yards
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import UNDERGROUND, is_traffic_street, roads_from_osm, streets_from_osm
@@ -113,7 +114,9 @@ def test_the_ground_is_open_over_the_ways_in_and_nowhere_else() -> None:
     cuts = shapely.union_all(bridges.cuts)
     site = site_facts(_town())
     bare, streets = replace(height, decks=None), road_polygons(site)
-    surfaces = ground_from_osm(site, bare, streets, bridges, flights_of(site, bare, streets.steps))
+    surfaces = ground_from_osm(
+        site, bare, streets, bridges, flights_of(site, bare, streets.steps), Yards(site.osm.half + APRON)
+    )
     x = np.arange(-66.0, 66.0, 1.5)
     corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).astype(np.float64)
     level = np.abs(corners[..., 2]).max(axis=1) < 0.4

@@ -27,15 +27,16 @@ from vico.worldgen.facades.fronts import street_fronts
 from vico.worldgen.facades.street_names import Streets
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.ground.backdrop import backdrop_of
-from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.stage import APRON, ground_from_osm
 from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.ground.wires import contact_wires
+from vico.worldgen.ground.yards import yards_of
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
 from vico.worldgen.objects.detections.matching import things_from_detections
 from vico.worldgen.objects.models import models_of
 from vico.worldgen.objects.parking import parking_from_osm
-from vico.worldgen.objects.stage import objects_from_osm
+from vico.worldgen.objects.stage import Grounds, objects_from_osm
 from vico.worldgen.photos.streetview.renders import photographer_of
 from vico.worldgen.photos.texturing import (
     Texturing,
@@ -77,13 +78,14 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         _streets_of(shape, request, stages, write) if request.place is None else _cut(request.place, stages, write)
     )
 
+    # A tile ends where the next one begins: nothing is drawn beyond it.
+    apron = APRON if request.place is None else 0.0
+    yards = run("yards", yards_of, site.osm, streets.carriageway, reach=site.osm.half + apron)
     outdoors, dropped = run(
         "objects",
         objects_from_osm,
         _with_detections(site.osm, evidence, height, seed, folder, stages),
-        solids=[*solids, *bridges.cuts],
-        carriageway=streets.carriageway,
-        openings=streets.footways(),
+        Grounds([*solids, *bridges.cuts], streets.carriageway, streets.footways(), yards.green()),
         height=height,
         transit=transit,
         lanes=lanes,
@@ -125,13 +127,20 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     objects = write.objects(outdoors, indoors)
 
     trees = outdoors.position[outdoors.kind == "tree", :2]
-    # A tile ends where the next one begins: nothing is drawn beyond it.
-    apron = {} if request.place is None else {"apron": 0.0}
     ground = run(
-        "ground", ground_from_osm, site, height, streets, bridges, shape.flights, standing=solids, trees=trees, **apron
+        "ground",
+        ground_from_osm,
+        site,
+        height,
+        streets,
+        bridges,
+        shape.flights,
+        standing=solids,
+        trees=trees,
+        yards=yards,
     )
     wires = run("wires", contact_wires, site, height, solids, reach=request.half)
-    around = [] if apron else run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed)
+    around = run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed) if apron else []
     ground = joined([*ground, *around, *wires])
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):

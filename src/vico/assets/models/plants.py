@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -253,19 +254,24 @@ def _palm(name: str, *, trunk: float = 6.2, girth: float = 0.21, fronds: int = 2
 def _bush(name: str, radii: tuple[float, float, float], leaves: Colour, cards: int, card: float) -> Model:
     random = rng(0, "bush", name)
     core = ball(
-        (radii[0] * 0.8, radii[1] * 0.8, radii[2] * 0.85),
-        (0, 0, radii[2] * 0.85),
+        (radii[0] * 0.8, radii[1] * 0.8, radii[2] * 0.9),
+        (0, 0, radii[2] * 0.55),
         colour=(int(leaves[0] * 0.35), int(leaves[1] * 0.38), int(leaves[2] * 0.35)),
         sides=7,
         rings=4,
     )
+    core = replace(core, positions=np.maximum(core.positions, np.array([-np.inf, -np.inf, 0.0], np.float32)))
     k = np.arange(cards) + 0.5
-    z = 1 - 1.6 * k / cards
+    z = 1 - 1.5 * k / cards
     turn = k * (np.pi * (3 - np.sqrt(5)))
     rim = np.sqrt(np.clip(1 - z * z, 0, 1))
     out = np.column_stack([rim * np.cos(turn), rim * np.sin(turn), z])
-    centres = np.array([0, 0, radii[2] * 0.9]) + out * radii * random.uniform(0.78, 0.98, (cards, 1))
-    facing = _unit(out + random.normal(0, 0.5, (cards, 3)))
+    # Lobes about an uneven middle, and leaves down to the ground: no ball that stands on a point.
+    lobes = 1 + 0.13 * np.sin(3 * turn + random.uniform(0, 6)) + 0.09 * np.sin(5 * turn + random.uniform(0, 6))
+    spread = np.column_stack([lobes, lobes, 1 + 0.16 * np.sin(2 * turn)])
+    centres = np.array([0, 0, radii[2] * 0.6]) + out * radii * spread * random.uniform(0.78, 0.98, (cards, 1))
+    centres[:, 2] = np.maximum(centres[:, 2], card * 0.5)
+    facing = _unit(out + random.normal(0, 0.35, (cards, 3)))
     spin = _unit(np.cross(facing, random.normal(0, 1, (cards, 3))))
     light = 0.7 + 0.25 * out[:, 2] + random.uniform(-0.12, 0.12, cards)
     colours = np.clip(np.array(leaves) * light[:, None], 0, 255).astype(np.uint8)
@@ -428,9 +434,9 @@ def plant_models() -> list[Model]:
         _palm("tree_palm"),
         _palm("tree_palm_tall", trunk=11.5, girth=0.19, fronds=18, reach=1.8),
         _palm("tree_palm_date", trunk=4.2, girth=0.34, fronds=26, reach=3.0),
-        _bush("shrub", (0.75, 0.75, 0.55), (112, 152, 74), 46, 0.3),
-        _bush("shrub_tall", (0.9, 0.9, 0.95), (98, 136, 70), 58, 0.36),
-        _bush("shrub_flowering", (0.8, 0.8, 0.65), (206, 130, 196), 50, 0.3),
+        _bush("shrub", (0.75, 0.75, 0.65), (112, 152, 74), 50, 0.3),
+        _bush("shrub_tall", (0.9, 0.9, 1.1), (98, 136, 70), 64, 0.36),
+        _bush("shrub_flowering", (0.8, 0.8, 0.75), (206, 130, 196), 56, 0.3),
         _hedge("hedge", 2.0, 0.7, 1.2),
         _hedge("hedge_low", 2.0, 0.5, 0.6),
         _hedge("hedge_high", 2.0, 0.9, 2.0),

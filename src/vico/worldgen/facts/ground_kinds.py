@@ -50,6 +50,7 @@ _SPORTS = {
 }
 _PAVED_KINDS = ("carriageway", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 _RAILS = ("rail", "light_rail", "narrow_gauge")
+_BED = 2.6  # metres of ballast on each side of a track: tracks side by side share it
 # Square metres: smaller pieces of ground are left out; smaller ones still at the window's edge.
 _LEAST_PIECE, _SPECK = 0.02, 1e-4
 
@@ -232,7 +233,7 @@ def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[NamedShape]
     for way in osm.ways:
         if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and way.id not in above:
             with expendable(f"w{way.id}"):
-                strip = overlay.buffer(shapely.LineString(way.line), 1.8, cap_style="flat")
+                strip = overlay.buffer(shapely.LineString(way.line), _BED, cap_style="flat")
                 found["ballast"].append(NamedShape(f"w{way.id}", strip))
     found["water"] += _streams(osm, window, found["water"])
     # A pond within a park is water, a lawn within a wood is lawn: small before large comes with the kinds' order, but

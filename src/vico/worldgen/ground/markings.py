@@ -27,7 +27,9 @@ _PAINT = (232, 232, 228)
 _YELLOW = (226, 184, 70)
 _FADED = (206, 205, 200)
 _CYCLE_WIDTH = 1.5
-_STEEL = (112, 108, 104)
+_STEEL, _GROOVE, _SLEEPERS = (134, 131, 127), (46, 45, 44), (84, 77, 70)
+# Metres: breadth of a rail's head and of the groove beside it; between sleepers; a sleeper along and across the track.
+_HEAD, _GROOVE_WIDTH, _SLEEPER_GAP, _SLEEPER = 0.075, 0.05, 0.65, (0.26, 2.5)
 _LINED = {"motorway", "trunk", "primary", "secondary", "tertiary"}
 _AT_KERB = 0.8  # metres from a kerb within which lines follow it
 _USUAL = Markings()
@@ -93,10 +95,8 @@ def road_markings(
                 target += quads
     if habits.kerb_lines == "double_yellow":
         yellow += _kerb_lines(streets, parting, longest)
-    rails: list[NDArray[np.float64]] = []
-    for line in (*streets.rails, *tracks):
-        for side in (-0.5, 0.5):
-            rails += ribbon(divided(line, longest), side * _GAUGE, 0.09)
+    rails, grooves = _rails(streets.rails, longest)
+    bare, sleepers = _rails(tracks, longest)[0], _sleepers(tracks, streets)
     painted = streets.steps if stepped is None else overlay.difference(streets.steps, overlay.buffer(stepped, 0.1))
     treads: list[NDArray[np.float64]] = []
     for shape in polygons_of(painted, 0.5):
@@ -111,11 +111,53 @@ def road_markings(
         Quads(_within(lanes if habits.cycle_lane else [], window), habits.cycle_lane or _PAINT, rank=0),
         Quads(_within(zebra + dashes + edges, window), _PAINT),
         Quads(_within(yellow, window), _YELLOW),
-        Quads(_within(rails, window), _STEEL),
+        Quads(_within(sleepers, window), _SLEEPERS, low=False, rank=0),
+        Quads(_within(bare, window), _STEEL, low=False),
+        Quads(_within(grooves, window), _GROOVE),
+        Quads(_within(rails, window), _STEEL, rank=2),
         Quads(_within(treads, window), (112, 108, 104), low=False),
         Quads(_within(bays, window), _FADED, low=False),
     ]
     return [group for group in groups if len(group.corners)]
+
+
+def _rails(
+    lines: Sequence[NDArray[np.float64]], longest: float | None
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Return the heads of the rails of tracks, and the grooves beside them where they lie in streets."""
+    rails: list[NDArray[np.float64]] = []
+    grooves: list[NDArray[np.float64]] = []
+    for line in lines:
+        for side in (-0.5, 0.5):
+            rails += ribbon(divided(line, longest), side * _GAUGE, _HEAD)
+            grooves += ribbon(divided(line, longest), side * (_GAUGE - _HEAD - _GROOVE_WIDTH), _GROOVE_WIDTH)
+    return rails, grooves
+
+
+def _sleepers(tracks: Sequence[NDArray[np.float64]], streets: StreetPolygons) -> list[NDArray[np.float64]]:
+    """Return the sleepers of tracks, but where a street or a footway leads across."""
+    found = [quad for line in tracks for quad in _across(line)]
+    if not found:
+        return []
+    x, y = np.mean(found, axis=1).T
+    paved = [shapely.contains_xy(shape, x, y) for shape in (streets.carriageway, streets.sidewalk, streets.pedestrian)]
+    return [quad for quad, covered in zip(found, np.any(paved, axis=0).tolist(), strict=True) if not covered]
+
+
+def _across(line: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the sleepers of a track."""
+    lengths = np.hypot(*np.diff(line, axis=0).T)
+    ends = np.cumsum(lengths)
+    at = np.arange(_SLEEPER_GAP / 2, ends[-1], _SLEEPER_GAP)
+    piece = np.minimum(np.searchsorted(ends, at), len(lengths) - 1)
+    along = np.diff(line, axis=0)[piece] / np.maximum(lengths[piece], 1e-9)[:, None]
+    middle = line[piece] + along * (at - ends[piece] + lengths[piece])[:, None]
+    forward, left = along * _SLEEPER[0] / 2, np.stack([-along[:, 1], along[:, 0]], axis=1) * _SLEEPER[1] / 2
+    return list(
+        np.stack(
+            [middle - forward - left, middle + forward - left, middle + forward + left, middle - forward + left], axis=1
+        )
+    )
 
 
 def _placed(what: str, shape: Polygon) -> str:

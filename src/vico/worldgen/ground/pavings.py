@@ -63,7 +63,7 @@ LOOKS: dict[str, GroundStyle] = {
     "steps": GroundStyle("ground_concrete", 6.0, (206, 200, 192), ENTITY_GROUND, 0.03),
     "path": GroundStyle("ground_gravel", 5.0, (255, 246, 228), ENTITY_GROUND, 0.07),
     "playground": GroundStyle("ground_rubber", 4.0, (196, 120, 92), ENTITY_GROUND, 0.04),
-    "ballast": GroundStyle("ground_gravel", 5.0, (150, 140, 132), ENTITY_GROUND, 0.06),
+    "ballast": GroundStyle("ground_gravel", 5.0, (150, 151, 156), ENTITY_GROUND, 0.06),
     "court": GroundStyle("ground_rubber", 4.0, (92, 128, 150), ENTITY_GROUND, 0.02),
     "clay": GroundStyle("ground_rubber", 4.0, (190, 104, 74), ENTITY_GROUND, 0.03),
     "turf": GroundStyle("ground_turf", 24.0, (255, 255, 255), ENTITY_GREEN, 0.03),

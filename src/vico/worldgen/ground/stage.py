@@ -42,8 +42,10 @@ from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.thinning import thinned
 from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
-from vico.worldgen.ground.yards import gardens_of
+from vico.worldgen.ground.yards import Yards
 
+#: Metres of ground beyond the square of a world by itself: its edge is not in sight from within streets.
+APRON = 40.0
 _UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
 _UNDER_STAIRS = 0.3
 _LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
@@ -67,10 +69,10 @@ def ground_from_osm(
     streets: StreetPolygons,
     bridges: Bridges,
     flights: Flights,
+    yards: Yards,
     *,
     standing: Sequence[BaseGeometry] = (),
     trees: NDArray[np.float64] = _NO_TREES,
-    apron: float = 40.0,
 ) -> list[Surface]:
     """Make the ground's surfaces.
 
@@ -86,13 +88,13 @@ def ground_from_osm(
         `bridges_of` the same streets and terrain.
     flights
         `flights_of` the same streets and terrain.
+    yards
+        `yards_of` the same map: which of the open ground is not paved. The square they were decided in is drawn.
     standing
         Footprints of the buildings as they were built, where they stand on the ground: nobody sees what lies well
         within them, and it is not drawn.
     trees
         Where trees stand, metres, shape ``(n, 2)``: those on paving have pits.
-    apron
-        How far the ground is drawn beyond the square, metres, so that its edge is not in sight from within streets.
 
     Returns
     -------
@@ -100,7 +102,7 @@ def ground_from_osm(
         One a material, for the layer "ground"; entities tell ground, road, water and green apart.
     """
     osm = site.osm
-    reach = osm.half + apron
+    reach = yards.reach
     window = shapely.box(-reach, -reach, reach, reach)
     habits = street_habits(osm)
     bearing = street_bearing(streets)
@@ -113,8 +115,8 @@ def ground_from_osm(
         pieces = {name: _without(shapes, holes, window) for name, shapes in pieces.items()}
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
-    hidden, gardens = _hidden(osm, standing), gardens_of(osm, reach)
-    laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, gardens=gardens)
+    hidden = _hidden(osm, standing)
+    laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, yards=yards)
     wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [
         shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
@@ -153,7 +155,7 @@ def ground_from_osm(
         stepped=flights.area,
     )
     quads += _fields(osm, window)
-    quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), gardens, window)}, bearing)
+    quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), yards.green(), window)}, bearing)
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return joined(surfaces)
@@ -188,7 +190,7 @@ def _laid(
     hidden: BaseGeometry,
     stairs: BaseGeometry,
     look: Callable[[str], GroundStyle],
-    gardens: BaseGeometry,
+    yards: Yards,
 ) -> list[_Piece]:
     """Lay the pieces of the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
     window = shapely.box(-reach, -reach, reach, reach)
@@ -196,7 +198,7 @@ def _laid(
     laid: list[_Piece] = []
     walls: list[Polygon] = []
     hills: list[Polygon] = []
-    lawns: list[Polygon] = []
+    open_ground: dict[str, list[Polygon]] = {}
     for name, shapes in pieces.items():
         base = name.partition(":")[0]
         if base in ("yard", "field"):
@@ -211,9 +213,9 @@ def _laid(
             wide = [shape for shape in _within(shapes, sloping, window) if not overlay.buffer(shape, -_NARROW).is_empty]
             hills += wide
             shapes = _without(shapes, shapely.MultiPolygon(wide), window)
-        if name == "yard" and not gardens.is_empty:
-            lawns = _within(shapes, gardens, window)
-            shapes = _without(shapes, gardens, window)
+        for kind, region in yards.by_look().items() if name in ("yard", "field") else ():
+            open_ground.setdefault(kind, []).extend(_within(shapes, region, window))
+            shapes = _without(shapes, region, window)
         if name == "steps":
             lower = _within(shapes, stairs, window)
             shapes = _without(shapes, stairs, window)
@@ -221,7 +223,7 @@ def _laid(
         street = base == "carriageway"
         natural = not street and base not in _PAVED
         laid.append(_Piece(shapes, look(name), terrain.lower if street else terrain.upper, street, natural=natural))
-    laid.append(_Piece(lawns, LOOKS["garden"], terrain.upper, natural=True))
+    laid += [_Piece(shapes, LOOKS[kind], terrain.upper, natural=True) for kind, shapes in open_ground.items()]
     laid.append(_Piece(hills, LOOKS["field"], terrain.upper, natural=True))
     laid.append(_Piece(walls, LOOKS["wall"], terrain.upper, natural=True))
     laid += [_Piece([water.polygon], LOOKS["water"], water.level, water=k) for k, water in enumerate(waters)]

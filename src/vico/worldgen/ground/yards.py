@@ -1,14 +1,18 @@
-"""Which yards are gardens: the open ground among small houses that stand by themselves."""
+"""What the open ground between houses is, where no map says so: gardens, lawns, lots of asphalt; else it is paved."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmArea, OsmData, polygons_of
 from vico.worldgen.facts.expendable import NamedShape, united
 from vico.worldgen.facts.tags import on_the_ground
 from vico.worldgen.ground.contours import region_above
@@ -17,32 +21,116 @@ from vico.worldgen.ground.kerbs import filled
 _SMALL = 320.0  # square metres of houses, wall to wall, up to which they have gardens
 _MOSTLY = 0.55  # share of the built ground near by that such houses have, at least
 _DENSE, _BARE = 0.36, 0.015  # shares of built ground from which nothing is green, and below which nobody lives
+_OPEN = 0.2  # share of built ground up to which yards are lawns: between slabs, not within blocks
+_LEAST = 0.002  # share of built ground from which open ground is a lawn and no field
 _AROUND = 20.0  # metres, spread of what counts as near by
+_BEYOND = 80.0  # metres beyond the square that are looked at, where the map has them: four spreads
 _CELL = 4.0
+# Metres along walls and kerbs that stay paved, and width up to which a lawn is none.
+_PAVED, _NARROW = 3.0, 6.0
+_WORK = 15.0  # metres round a shed that belong to it
+_SHEDS = {"industrial", "warehouse", "supermarket", "garages", "manufacture", "hangar", "depot", "factory", "silo"}
+_WORKED, _TRADED = {"industrial", "garages", "port", "depot", "harbour"}, {"commercial", "retail"}
 
 
-def gardens_of(osm: OsmData, reach: float) -> BaseGeometry:
-    """Return where yards are gardens within a square of half side `reach`: a region with round borders."""
-    built = [
-        NamedShape(area.id, area.polygon)
-        for area in osm.areas
-        if area.tags.get("building", "no") not in ("no", "roof", "carport", "bridge", "ruins")
-        and on_the_ground(area.tags)
-    ]
+@dataclass(frozen=True)
+class Yards:
+    """Regions in which the open ground is not paved as yards usually are; they overlap nowhere.
+
+    Attributes
+    ----------
+    reach
+        Half the side of the square they lie in, metres.
+    gardens
+        Among small houses that stand by themselves.
+    lawns
+        Where little is built: between slabs, round villas, on vacant land.
+    lots
+        Where land is used for work, round large sheds, and where little is built on land of trade: asphalt.
+    """
+
+    reach: float
+    gardens: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+    lawns: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+    lots: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+
+    def by_look(self) -> dict[str, BaseGeometry]:
+        """Return those that there are, by the kind of ground they look like."""
+        regions = {"garden": self.gardens, "grass": self.lawns, "parking": self.lots}
+        return {kind: region for kind, region in regions.items() if not region.is_empty}
+
+    def green(self) -> BaseGeometry:
+        """Return what is green."""
+        return overlay.union(self.gardens, self.lawns)
+
+
+def yards_of(osm: OsmData, carriageway: BaseGeometry, *, reach: float) -> Yards:
+    """Decide what yards are within a square of half side `reach`: regions with round borders.
+
+    Parameters
+    ----------
+    osm
+        The map: its houses, and what land is used for.
+    carriageway
+        Where vehicles drive: yards are paved beside it.
+    reach
+        Metres.
+    """
+    built = [area for area in osm.areas if _is_house(area)]
     if not built:
-        return shapely.MultiPolygon()
-    houses = polygons_of(united(built, grid=0.01))
-    n = round(2 * reach / _CELL)
-    cell = 2 * reach / n
-    half = reach - cell / 2
-    spread = _AROUND / cell
+        return Yards(reach)
+    houses = polygons_of(united([NamedShape(area.id, area.polygon) for area in built], grid=0.01))
+    beyond = min(_BEYOND, max(osm.half + osm.margin - reach, 0.0) // _CELL * _CELL)
+    n = round(2 * (reach + beyond) / _CELL)
+    cell = 2 * (reach + beyond) / n
+    # What a lawn is at the edge of the square is decided by what lies beyond it, too: a neighbour goes on with it.
+    outer = reach + min(beyond, 3 * _CELL)
+    around, window = shapely.box(-outer, -outer, outer, outer), shapely.box(-reach, -reach, reach, reach)
+    total = _share(houses, n, cell)
+    small = _share([house for house in houses if house.area <= _SMALL], n, cell)
+    gardens = _region(np.minimum(small - _MOSTLY * np.maximum(total, _BARE), _DENSE - total), cell, around)
+    kept = [overlay.buffer(shape, _PAVED) for shape in (*houses, *polygons_of(carriageway)) if shape.intersects(around)]
+    free = overlay.difference(
+        overlay.difference(_region(_OPEN - total, cell, around), overlay.union_all(kept)), gardens
+    )
+    wide = overlay.buffer(overlay.buffer(free, -_NARROW / 2, quad_segs=2), _NARROW / 2, quad_segs=2)
+    wide = overlay.difference(overlay.on_grid(overlay.simplify(wide, 0.2), grid=0.001), gardens)
+    traded = overlay.intersection(wide, _land(osm, _TRADED, around))
+    lots = overlay.difference(
+        overlay.union_all([_land(osm, _WORKED, around), _round_sheds(built, around), traded]), gardens
+    )
+    parts = (gardens, overlay.difference(wide, lots), lots)
+    return Yards(reach, *(overlay.areas_of(overlay.intersection(part, window)) for part in parts))
 
-    def share(shapes: list[shapely.Polygon]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        mask = filled(shapes, n, half, cell).astype(np.float64)
-        return np.asarray(ndimage.gaussian_filter(mask, spread, mode="nearest"), np.float64)
 
-    total = share(houses)
-    small = share([house for house in houses if house.area <= _SMALL])
-    fit = np.minimum(small - _MOSTLY * np.maximum(total, _BARE), _DENSE - total)
-    region = overlay.simplify(region_above(fit, 0.0, low=-half, cell=cell), 0.4)
-    return overlay.on_grid(region, grid=0.001)
+def _is_house(area: OsmArea) -> bool:
+    kind = area.tags.get("building", "no")
+    return kind not in ("no", "roof", "carport", "bridge", "ruins") and on_the_ground(area.tags)
+
+
+def _share(shapes: Sequence[shapely.Polygon], n: int, cell: float) -> NDArray[np.float64]:
+    """Return what share of the ground near by shapes cover, at the middles of the cells of a grid."""
+    mask = filled(shapes, n, (n - 1) * cell / 2, cell).astype(np.float64)
+    return np.asarray(ndimage.gaussian_filter(mask, _AROUND / cell, mode="nearest"), np.float64)
+
+
+def _region(values: NDArray[np.float64], cell: float, window: shapely.Polygon) -> BaseGeometry:
+    """Return where values are positive, within a window."""
+    bent = overlay.simplify(region_above(values, 0.0, low=-(len(values) - 1) * cell / 2, cell=cell), 0.4)
+    return overlay.on_grid(overlay.areas_of(overlay.intersection(bent, window)), grid=0.001)
+
+
+def _land(osm: OsmData, uses: set[str], window: shapely.Polygon) -> BaseGeometry:
+    """Return the land that is mapped as used for something."""
+    found = [NamedShape(area.id, area.polygon) for area in osm.areas if area.tags.get("landuse") in uses]
+    return united([area for area in found if area.shape.intersects(window)], grid=0.01)
+
+
+def _round_sheds(built: Sequence[OsmArea], window: shapely.Polygon) -> BaseGeometry:
+    """Return the land round large sheds."""
+    found = [
+        NamedShape(area.id, overlay.buffer(area.polygon, _WORK, quad_segs=2))
+        for area in built
+        if area.tags["building"] in _SHEDS and area.polygon.area > _SMALL and area.polygon.intersects(window)
+    ]
+    return united(found, grid=0.01)

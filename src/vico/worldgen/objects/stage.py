@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -42,12 +43,32 @@ _KERB_REACH = 9.0  # signals and signs are mapped on the street's middle
 _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a little less than `vico check` allows
 
 
+@dataclass(frozen=True)
+class Grounds:
+    """What is there before things are put up.
+
+    Attributes
+    ----------
+    solids
+        Footprints that nothing may stand in.
+    carriageway
+        Where vehicles drive: nothing may stand there either.
+    openings
+        Where walkers pass through fences, walls and hedges.
+    lawns
+        Where trees and shrubs grow though no map says so.
+    """
+
+    solids: Sequence[BaseGeometry] = ()
+    carriageway: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+    openings: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+    lawns: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+
+
 def objects_from_osm(
     osm: OsmData,
+    grounds: Grounds,
     *,
-    solids: Sequence[BaseGeometry],
-    carriageway: BaseGeometry,
-    openings: BaseGeometry,
     height: HeightField,
     transit: Transit | None = None,
     lanes: LaneGraph | None = None,
@@ -59,18 +80,14 @@ def objects_from_osm(
     ----------
     osm
         The map, local metres.
-    solids
-        Footprints that nothing may stand in.
-    carriageway
-        Where vehicles drive: nothing may stand there either.
-    openings
-        Where walkers pass through fences, walls and hedges.
+    grounds
+        Houses, streets and lawns.
     height
         Ground heights.
     transit
         Stops and bicycle stations to put poles and docks at; their objects carry the entities of the records.
     lanes
-        Lanes that vehicles follow; what they sweep is kept free too, where it leaves `carriageway`.
+        Lanes that vehicles follow; what they sweep is kept free too, where it leaves the carriageway.
     seed
         Decides facings, sizes and species that the map leaves open.
 
@@ -80,9 +97,9 @@ def objects_from_osm(
         By rank, and in the map's order; what found no room within reach, with the reason. What was planted only to
         fill an area, or put up to light a street without mapped lamps, and found no room, is no loss and not listed.
     """
-    half = osm.half
+    half, carriageway, openings = osm.half, grounds.carriageway, grounds.openings
     models = street_models()
-    site = Site(solids=solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
+    site = Site(solids=grounds.solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
     zone, where = planting(osm, height), region(osm)
     mapped = mapped_wishes(osm, height, seed)
     lamps = np.array([wish.xy for wish in mapped if models[wish.prototype].kind in _LAMPS]).reshape(-1, 2)
@@ -91,8 +108,13 @@ def objects_from_osm(
         (barrier_wishes(osm, carriageway, openings, half), True),
         (mapped, True),
         (group_wishes(osm, openings, half, seed, where=where), True),
-        (planted_wishes(osm, height, carriageway, openings, half, seed, zone), False),
-        (lamp_wishes(osm, carriageway, solids, lamps, lamp=thing_of({"highway": "street_lamp"}, where=where)), False),
+        (planted_wishes(osm, height, carriageway, openings, grounds.lawns, half, seed, zone), False),
+        (
+            lamp_wishes(
+                osm, carriageway, grounds.solids, lamps, lamp=thing_of({"highway": "street_lamp"}, where=where)
+            ),
+            False,
+        ),
     ]
     rows: list[dict[str, Any]] = []
     dropped: list[Dropped] = []

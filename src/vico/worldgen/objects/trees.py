@@ -29,6 +29,8 @@ _BARE = {
     "man_made": ("pier", "bridge", "pontoon"),
     "public_transport": ("platform",), "railway": ("platform",), "waterway": ("riverbank", "dock"),
 }  # fmt: skip
+_RAILS = ("rail", "light_rail", "narrow_gauge", "subway", "tram")
+_BESIDE_RAILS = 4.0  # metres from the middle of a track
 _MOST = 700  # plants that no map has, in a world
 # Green that is kept short.
 _MOWN = {
@@ -39,6 +41,9 @@ _MOWN = {
 # Rise per metre from which nobody mows, and side of the cells it is measured in, metres; square metres that a plant has
 # there, and the share of shrubs.
 _STEEP, _STEEP_CELL, _WILD_ROOM, _SHRUBS = 0.25, 10.0, 55.0, 0.6
+
+# The same on lawns: side of the cells, metres, the share in which something grows, and of that of shrubs.
+_LAWN_CELL, _LAWN_GROWN, _LAWN_SHRUBS = 11.0, 0.5, 0.25
 
 
 def climate(frame: LocalFrame, height: HeightField) -> str:
@@ -197,13 +202,14 @@ def planted_wishes(
     height: HeightField,
     carriageway: BaseGeometry,
     openings: BaseGeometry,
+    lawns: BaseGeometry,
     half: float,
     seed: int,
     zone: str,
 ) -> list[Wish]:
     """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways.
 
-    Where nothing is mapped and the ground is too steep to be a lawn, it grows wild.
+    Where nothing is mapped there are some on `lawns`, and where the ground is too steep to be one, it grows wild.
     """
     window = shapely.box(-half, -half, half, half)
     keep_off = _kept_free(osm, carriageway, openings, window)
@@ -222,9 +228,9 @@ def planted_wishes(
                 done = overlay.union(done, ground)
                 found += _planted(area, use, ground, trunks, seed, zone)
     mown = [NamedShape(area.id, area.polygon) for area in osm.areas if _is_mown(area)]
-    found += _grown_wild(
-        height, united([NamedShape("kept", keep_off), NamedShape("planted", done), *mown]), half, seed, zone
-    )
+    elsewhere = united([NamedShape("kept", keep_off), NamedShape("planted", done), *mown])
+    found += _grown_wild(height, elsewhere, half, seed, zone)
+    found += _on_lawns(overlay.difference(lawns, elsewhere), half, seed, zone)
     if len(found) <= _MOST:
         return [wish for _, wish in found]
     # Every area is thinned alike.
@@ -268,12 +274,45 @@ def _grown_wild(
     return found
 
 
+def _on_lawns(lawns: BaseGeometry, half: float, seed: int, zone: str) -> list[tuple[float, Wish]]:
+    """Return what grows on lawns that no map has: a tree or a shrub at most in each cell of them."""
+    found: list[tuple[float, Wish]] = []
+    if lawns.is_empty:
+        return found
+    shapely.prepare(lawns)
+    count = max(int(2 * half // _LAWN_CELL), 1)
+    side = 2 * half / count
+    for row in range(count):
+        for column in range(count):
+            corner = np.array([column * side - half, row * side - half])
+            if not lawns.intersects(shapely.box(*corner, *(corner + side))):
+                continue
+            random = rng(seed, "lawn", row, column)
+            grows, kind, rank = random.random(3).tolist()
+            xy = corner + random.uniform(0.15, 0.85, 2) * side
+            if grows > _LAWN_GROWN or not shapely.contains_xy(lawns, *xy):
+                continue
+            key = f"lawn.{row}.{column}"
+            if kind < _LAWN_SHRUBS:
+                name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
+                wish = Wish(key, name, xy, None, float(random.uniform(0.8, 1.2)))
+            else:
+                wish = tree_wish(key, {}, xy, seed, zone)
+            wish.reach = 0.0
+            found.append((rank, wish))
+    return found
+
+
 def _kept_free(
     osm: OsmData, carriageway: BaseGeometry, openings: BaseGeometry, window: shapely.Polygon
 ) -> BaseGeometry:
     """Return where nothing is planted: on and beside ways, houses, and areas that are bare."""
     kept = [NamedShape("footways", overlay.buffer(openings, 0.8))]
     kept.append(NamedShape("carriageways", overlay.buffer(carriageway, 1.6)))
+    for way in osm.ways:
+        if way.tags.get("railway") in _RAILS and way.tags.get("tunnel", "no") == "no":
+            with expendable(f"w{way.id}"):
+                kept.append(NamedShape(f"w{way.id}", overlay.buffer(shapely.LineString(way.line), _BESIDE_RAILS)))
     for area in osm.areas:
         bare = any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
         built = ("building" in area.tags or "building:part" in area.tags) and area.polygon.intersects(window)

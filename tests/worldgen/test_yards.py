@@ -1,0 +1,85 @@
+"""What the open ground between houses is where no map says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmArea, OsmData
+from vico.world.heights import HeightField
+from vico.worldgen.ground.yards import Yards, yards_of
+from vico.worldgen.objects.stage import Grounds, objects_from_osm
+
+_NONE = shapely.MultiPolygon()
+_HALF = 100.0
+
+
+def _map(size: float, pitch: float, *more: OsmArea, tags: dict[str, str] | None = None, east: float = 0.0) -> OsmData:
+    """A map of square houses in rows, seen from `east` metres east of its middle."""
+    places = np.arange(-220.0, 221.0, pitch)
+    built = [
+        OsmArea(f"w{k}", shapely.box(x - east, y, x - east + size, y + size), tags or {"building": "yes"})
+        for k, (x, y) in enumerate((x, y) for x in places for y in places)
+    ]
+    return OsmData(LocalFrame(55.8, 37.6), _HALF, 100.0, [], [], [*built, *more], [])
+
+
+def _parts(yards: Yards) -> tuple[float, float, float]:
+    return yards.gardens.area, yards.lawns.area, yards.lots.area
+
+
+def test_small_houses_that_stand_by_themselves_have_gardens_slabs_lawns_and_blocks_paved_yards() -> None:
+    gardens, lawns, lots = _parts(yards_of(_map(11.0, 24.0), _NONE, reach=80.0))
+    assert gardens > 8000.0
+    assert lawns + lots == 0.0
+    assert sum(_parts(yards_of(_map(40.0, 50.0), _NONE, reach=80.0))) < 200.0
+    gardens, lawns, lots = _parts(yards_of(_map(28.0, 75.0), _NONE, reach=80.0))
+    assert lawns > 8000.0
+    assert gardens + lots == 0.0
+    assert yards_of(OsmData(LocalFrame(55.8, 37.6), _HALF, 0.0, [], [], [], []), _NONE, reach=80.0) == Yards(80.0)
+
+
+def test_lots_lie_where_land_is_used_for_work_and_beside_sheds() -> None:
+    land = OsmArea("w9", shapely.box(-80.0, -80.0, 0.0, 80.0), {"landuse": "industrial"})
+    yards = yards_of(_map(28.0, 75.0, land), _NONE, reach=80.0)
+    assert yards.lots.within(land.polygon.buffer(0.01))
+    assert yards.lots.area > 3000.0
+    assert yards.lawns.area > 3000.0
+    assert yards.lawns.intersection(yards.lots).area == pytest.approx(0.0, abs=1e-6)
+    sheds = yards_of(_map(28.0, 75.0, tags={"building": "warehouse"}), _NONE, reach=80.0)
+    assert sheds.lots.area > 0.4 * (sheds.lots.area + sheds.lawns.area)
+
+
+def test_yards_stay_paved_along_walls_and_kerbs() -> None:
+    osm, street = _map(28.0, 75.0), shapely.box(-80.0, -4.0, 80.0, 4.0)
+    green = yards_of(osm, street, reach=80.0).green()
+    assert green.area > 4000.0
+    assert green.distance(street) > 2.6
+    assert green.distance(shapely.union_all([area.polygon for area in osm.areas])) > 2.6
+
+
+def test_neighbours_in_a_city_see_the_same_yards_at_their_border() -> None:
+    west, east = (yards_of(_map(28.0, 75.0, east=at), _NONE, reach=_HALF) for at in (-90.0, 110.0))
+    lines = [shapely.LineString([(x, -90.0), (x, 90.0)]) for x in (99.5, -99.5)]
+    one, other = west.lawns.intersection(lines[0]), east.lawns.intersection(lines[1])
+    assert 40.0 < one.length < 179.0
+    assert one.length == pytest.approx(other.length, abs=1.0)
+    assert shapely.affinity.translate(one, -200.0 + 1.0).hausdorff_distance(other) < 1.0
+
+
+def test_trees_and_shrubs_grow_on_lawns_and_off_streets() -> None:
+    osm = _map(28.0, 75.0)
+    street = shapely.MultiPolygon([shapely.box(-100.0, -4.0, 100.0, 4.0)])
+    lawns = yards_of(osm, street, reach=_HALF).green()
+    houses, height = [area.polygon for area in osm.areas], HeightField.flat(160.0)
+    bare, _ = objects_from_osm(osm, Grounds(houses, street), height=height)
+    grown, dropped = objects_from_osm(osm, Grounds(houses, street, lawns=lawns), height=height)
+    plants = np.isin(grown.kind, ("tree", "shrub"))
+    assert not np.isin(bare.kind, ("tree", "shrub")).any()
+    assert plants.sum() > 30
+    assert not dropped
+    assert shapely.contains_xy(lawns, *grown.position[plants, :2].T).all()
+    again, _ = objects_from_osm(osm, Grounds(houses, street, lawns=lawns), height=height)
+    assert np.array_equal(grown.position, again.position)
