@@ -193,7 +193,8 @@ class PlaceIndex:
         found: list[str] = []
         for what, count in wanted:
             among = self._among(what if isinstance(what, Category) else frozenset(what))
-            far = np.round(np.hypot(*(self._positions[numbers[among]] - (x, y)).T), 3)
+            metres = np.hypot(*(self._positions[numbers[among]] - (x, y)).T)
+            far = np.asarray(np.round(metres, 3), np.float64)
             if len(far) > count:
                 near = np.flatnonzero(far <= np.partition(far, count - 1)[count - 1])
                 among, far = among[near], far[near]
