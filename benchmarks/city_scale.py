@@ -4,8 +4,8 @@
         [--table benchmarks/results/city_scale.md]
 
 The region is EXTRACT laid side by side as often as the largest size asks for (`repeated_region.py`): no real map of
-that size is at hand everywhere. Each size is built by two processes and run for some minutes with 200 residents, 80
-vehicles and 100 pedestrians a square kilometre, or as many as a run can have, nobody's views rendered. What is built,
+that size is at hand everywhere. Each size is built by two processes and run for some minutes with 185 residents, 74
+vehicles and 20 pedestrians a square kilometre, or as many as a run can have, nobody's views rendered. What is built,
 and how long it took, is kept in OUT, so the same command goes on after a kill: a build that was cut short counts only
 what was left to do. Delete OUT to measure anew.
 """
@@ -24,7 +24,8 @@ from reporting import machine, publish, vico
 from vico.sim.config import LIMITS
 
 TILE, WORKERS, STEPS = 400, 2, 300
-_RESIDENTS, _CARS, _PEDESTRIANS = 200, 80, 100
+# A square kilometre: 5,000 residents and 2,000 vehicles in 27 of them.
+_RESIDENTS, _CARS, _PEDESTRIANS = 185, 74, 20
 
 
 def measured(region: Path, center: str, size: int, out: Path) -> list[str]:
