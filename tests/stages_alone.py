@@ -24,5 +24,5 @@ def ground_of(osm: OsmData, terrain: HeightField, streets: StreetPolygons) -> li
     """The ground of a map, its bridges with it."""
     site = site_facts(osm)
     flights = flights_of(site, terrain, streets.steps)
-    yards = yards_of(osm, streets.carriageway, reach=osm.half + APRON)
+    yards = yards_of(site, streets.carriageway, reach=osm.half + APRON)
     return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets), flights, yards)

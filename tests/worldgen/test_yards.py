@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmArea, OsmData
+from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.world.heights import HeightField
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.ground.yards import Yards, yards_of
 from vico.worldgen.objects.stage import Grounds, objects_from_osm
 
@@ -26,42 +29,46 @@ def _map(size: float, pitch: float, *more: OsmArea, tags: dict[str, str] | None 
     return OsmData(LocalFrame(55.8, 37.6), _HALF, 100.0, [], [], [*built, *more], [])
 
 
+def _yards(osm: OsmData, carriageway: shapely.Geometry, reach: float) -> Yards:
+    return yards_of(site_facts(osm), carriageway, reach=reach)
+
+
 def _parts(yards: Yards) -> tuple[float, float, float]:
     return yards.gardens.area, yards.lawns.area, yards.lots.area
 
 
 def test_small_houses_that_stand_by_themselves_have_gardens_slabs_lawns_and_blocks_paved_yards() -> None:
-    gardens, lawns, lots = _parts(yards_of(_map(11.0, 24.0), _NONE, reach=80.0))
+    gardens, lawns, lots = _parts(_yards(_map(11.0, 24.0), _NONE, reach=80.0))
     assert gardens > 8000.0
     assert lawns + lots == 0.0
-    assert sum(_parts(yards_of(_map(40.0, 50.0), _NONE, reach=80.0))) < 200.0
-    gardens, lawns, lots = _parts(yards_of(_map(28.0, 75.0), _NONE, reach=80.0))
+    assert sum(_parts(_yards(_map(40.0, 50.0), _NONE, reach=80.0))) < 200.0
+    gardens, lawns, lots = _parts(_yards(_map(28.0, 75.0), _NONE, reach=80.0))
     assert lawns > 8000.0
     assert gardens + lots == 0.0
-    assert yards_of(OsmData(LocalFrame(55.8, 37.6), _HALF, 0.0, [], [], [], []), _NONE, reach=80.0) == Yards(80.0)
+    assert _yards(OsmData(LocalFrame(55.8, 37.6), _HALF, 0.0, [], [], [], []), _NONE, reach=80.0) == Yards(80.0)
 
 
 def test_lots_lie_where_land_is_used_for_work_and_beside_sheds() -> None:
     land = OsmArea("w9", shapely.box(-80.0, -80.0, 0.0, 80.0), {"landuse": "industrial"})
-    yards = yards_of(_map(28.0, 75.0, land), _NONE, reach=80.0)
+    yards = _yards(_map(28.0, 75.0, land), _NONE, reach=80.0)
     assert yards.lots.within(land.polygon.buffer(0.01))
     assert yards.lots.area > 3000.0
     assert yards.lawns.area > 3000.0
     assert yards.lawns.intersection(yards.lots).area == pytest.approx(0.0, abs=1e-6)
-    sheds = yards_of(_map(28.0, 75.0, tags={"building": "warehouse"}), _NONE, reach=80.0)
+    sheds = _yards(_map(28.0, 75.0, tags={"building": "warehouse"}), _NONE, reach=80.0)
     assert sheds.lots.area > 0.4 * (sheds.lots.area + sheds.lawns.area)
 
 
 def test_yards_stay_paved_along_walls_and_kerbs() -> None:
     osm, street = _map(28.0, 75.0), shapely.box(-80.0, -4.0, 80.0, 4.0)
-    green = yards_of(osm, street, reach=80.0).green()
+    green = _yards(osm, street, reach=80.0).green()
     assert green.area > 4000.0
     assert green.distance(street) > 2.6
     assert green.distance(shapely.union_all([area.polygon for area in osm.areas])) > 2.6
 
 
 def test_neighbours_in_a_city_see_the_same_yards_at_their_border() -> None:
-    west, east = (yards_of(_map(28.0, 75.0, east=at), _NONE, reach=_HALF) for at in (-90.0, 110.0))
+    west, east = (_yards(_map(28.0, 75.0, east=at), _NONE, reach=_HALF) for at in (-90.0, 110.0))
     lines = [shapely.LineString([(x, -90.0), (x, 90.0)]) for x in (99.5, -99.5)]
     one, other = west.lawns.intersection(lines[0]), east.lawns.intersection(lines[1])
     assert 40.0 < one.length < 179.0
@@ -72,7 +79,7 @@ def test_neighbours_in_a_city_see_the_same_yards_at_their_border() -> None:
 def test_trees_and_shrubs_grow_on_lawns_and_off_streets() -> None:
     osm = _map(28.0, 75.0)
     street = shapely.MultiPolygon([shapely.box(-100.0, -4.0, 100.0, 4.0)])
-    lawns = yards_of(osm, street, reach=_HALF).green()
+    lawns = _yards(osm, street, reach=_HALF).green()
     houses, height = [area.polygon for area in osm.areas], HeightField.flat(160.0)
     bare, _ = objects_from_osm(osm, Grounds(houses, street), height=height)
     grown, dropped = objects_from_osm(osm, Grounds(houses, street, lawns=lawns), height=height)
@@ -83,3 +90,20 @@ def test_trees_and_shrubs_grow_on_lawns_and_off_streets() -> None:
     assert shapely.contains_xy(lawns, *grown.position[plants, :2].T).all()
     again, _ = objects_from_osm(osm, Grounds(houses, street, lawns=lawns), height=height)
     assert np.array_equal(grown.position, again.position)
+
+
+def test_nothing_grows_in_water_nor_beside_rails() -> None:
+    pond = OsmArea("w9", shapely.box(-60.0, -60.0, -10.0, -10.0), {"natural": "water"})
+    lines = {"waterway": "canal", "railway": "rail"}
+    ways = [
+        OsmWay(k, [2 * k, 2 * k + 1], np.array([[-100.0, y], [100.0, y]]), False, {key: lines[key]})
+        for k, (key, y) in enumerate((("waterway", 45.0), ("railway", -70.0)))
+    ]
+    osm = replace(_map(28.0, 75.0, pond), ways=ways)
+    yards = _yards(osm, _NONE, reach=_HALF)
+    grown, _ = objects_from_osm(osm, Grounds(lawns=yards.green(), mapped=yards.mapped), height=HeightField.flat(160.0))
+    points = shapely.points(grown.position[:, :2])
+    assert len(points) > 20
+    assert not shapely.intersects(pond.polygon, points).any()
+    assert shapely.distance(shapely.LineString(ways[0].line), points).min() > 3.5
+    assert shapely.distance(shapely.LineString(ways[1].line), points).min() >= 4.0

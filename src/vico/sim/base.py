@@ -31,6 +31,7 @@ from vico.sim.traffic.standing_spots import with_spots
 from vico.sim.traffic.stopping_places import with_stopping_places
 from vico.sim.transit import BusPlan, plan_buses
 from vico.sim.transit.tram_network import TramNetwork
+from vico.world.city_world import CityWorld
 from vico.world.model import Entrance
 from vico.world.objects import Objects
 from vico.world.routing import Router
@@ -120,7 +121,10 @@ class SimulationBase:
     def streets(self) -> TrafficNetwork:
         """What traffic moves on."""
         world = self.world
-        network = TrafficNetwork.of(world.lanes, self.solids, self._signal_poles, world.height, world.edges)
+        # Of a city that lies on the disk alone: a world of one tile takes a second or two, and may be made up.
+        known = world.digest if isinstance(world, CityWorld) else ""
+        poles = self._signal_poles
+        network = TrafficNetwork.of(world.lanes, self.solids, poles, world.height, world.edges, kept_as=known)
         driven = with_stopping_places(network.driven, network.lanes, network.walks, self.world, self.solids)
         walked = with_spots(network.walked, network.walks, self.world, self.solids)
         return replace(network, driven=driven, walked=walked)

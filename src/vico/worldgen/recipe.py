@@ -80,12 +80,12 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
 
     # A tile ends where the next one begins: nothing is drawn beyond it.
     apron = APRON if request.place is None else 0.0
-    yards = run("yards", yards_of, site.osm, streets.carriageway, reach=site.osm.half + apron)
+    yards = run("yards", yards_of, site, streets.carriageway, reach=site.osm.half + apron)
     outdoors, dropped = run(
         "objects",
         objects_from_osm,
         _with_detections(site.osm, evidence, height, seed, folder, stages),
-        Grounds([*solids, *bridges.cuts], streets.carriageway, streets.footways(), yards.green()),
+        Grounds([*solids, *bridges.cuts], streets.carriageway, streets.footways(), yards.green(), yards.mapped),
         height=height,
         transit=transit,
         lanes=lanes,

@@ -15,6 +15,7 @@ from vico.sim.traffic.records import LANE, SPOT, STOPPING_PLACE, TRACK_CROSSING,
 from vico.sim.traffic.state import LaneNetwork, WalkwayNetwork
 from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, stop_lines
 from vico.world.heights import HeightField
+from vico.world.kept_walkways import walkways_past
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
@@ -63,6 +64,8 @@ class TrafficNetwork:
         poles: Objects | None = None,
         ground: HeightField | None = None,
         edges: Edges | None = None,
+        *,
+        kept_as: str = "",
     ) -> TrafficNetwork:
         """Make the network of a world's lanes.
 
@@ -77,8 +80,10 @@ class TrafficNetwork:
         edges
             Where the map ends: west, south, east and north, metres; None for a square, which ends where the outermost
             of its streets do.
+        kept_as
+            Digest of the city that the ground is of: walkways are found once for it; empty where they are not kept.
         """
-        walks = connected_walkways(lanes.walks.clear_of(list(solids), ground))
+        walks = connected_walkways(walkways_past(lanes.walks, solids, ground, kept_as=kept_as))
         driven = _lane_network(lanes, walks, edges)
         starts = lanes_to_start_on(lanes, driven, edges)
         return cls(lanes, walks, driven, walkway_network(walks), *starts, poles or Objects.none())

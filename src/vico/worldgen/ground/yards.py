@@ -14,6 +14,8 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData, polygons_of
 from vico.worldgen.facts.expendable import NamedShape, united
+from vico.worldgen.facts.ground_kinds import mapped_areas
+from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import on_the_ground
 from vico.worldgen.ground.contours import region_above
 from vico.worldgen.ground.kerbs import filled
@@ -21,8 +23,8 @@ from vico.worldgen.ground.kerbs import filled
 _SMALL = 320.0  # square metres of houses, wall to wall, up to which they have gardens
 _MOSTLY = 0.55  # share of the built ground near by that such houses have, at least
 _DENSE, _BARE = 0.36, 0.015  # shares of built ground from which nothing is green, and below which nobody lives
+_LONELY = 0.002  # share of built ground up to which open ground is a field
 _OPEN = 0.2  # share of built ground up to which yards are lawns: between slabs, not within blocks
-_LEAST = 0.002  # share of built ground from which open ground is a lawn and no field
 _AROUND = 20.0  # metres, spread of what counts as near by
 _BEYOND = 80.0  # metres beyond the square that are looked at, where the map has them: four spreads
 _CELL = 4.0
@@ -35,7 +37,7 @@ _WORKED, _TRADED = {"industrial", "garages", "port", "depot", "harbour"}, {"comm
 
 @dataclass(frozen=True)
 class Yards:
-    """Regions in which the open ground is not paved as yards usually are; they overlap nowhere.
+    """Regions in which open ground that no map tells more of is not paved as yards usually are; they don't overlap.
 
     Attributes
     ----------
@@ -47,12 +49,15 @@ class Yards:
         Where little is built: between slabs, round villas, on vacant land.
     lots
         Where land is used for work, round large sheds, and where little is built on land of trade: asphalt.
+    mapped
+        Areas of which the map says what the ground is, water among them: whatever lies there is no yard.
     """
 
     reach: float
     gardens: BaseGeometry = field(default_factory=shapely.MultiPolygon)
     lawns: BaseGeometry = field(default_factory=shapely.MultiPolygon)
     lots: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+    mapped: list[BaseGeometry] = field(default_factory=list)
 
     def by_look(self) -> dict[str, BaseGeometry]:
         """Return those that there are, by the kind of ground they look like."""
@@ -64,18 +69,19 @@ class Yards:
         return overlay.union(self.gardens, self.lawns)
 
 
-def yards_of(osm: OsmData, carriageway: BaseGeometry, *, reach: float) -> Yards:
+def yards_of(site: SiteFacts, carriageway: BaseGeometry, *, reach: float) -> Yards:
     """Decide what yards are within a square of half side `reach`: regions with round borders.
 
     Parameters
     ----------
-    osm
-        The map: its houses, and what land is used for.
+    site
+        The map: its houses, what land is used for, and what the ground is where it says so.
     carriageway
         Where vehicles drive: yards are paved beside it.
     reach
         Metres.
     """
+    osm = site.osm
     built = [area for area in osm.areas if _is_house(area)]
     if not built:
         return Yards(reach)
@@ -90,9 +96,8 @@ def yards_of(osm: OsmData, carriageway: BaseGeometry, *, reach: float) -> Yards:
     small = _share([house for house in houses if house.area <= _SMALL], n, cell)
     gardens = _region(np.minimum(small - _MOSTLY * np.maximum(total, _BARE), _DENSE - total), cell, around)
     kept = [overlay.buffer(shape, _PAVED) for shape in (*houses, *polygons_of(carriageway)) if shape.intersects(around)]
-    free = overlay.difference(
-        overlay.difference(_region(_OPEN - total, cell, around), overlay.union_all(kept)), gardens
-    )
+    lived_in = _region(np.minimum(_OPEN - total, total - _LONELY), cell, around)
+    free = overlay.difference(overlay.difference(lived_in, overlay.union_all(kept)), gardens)
     wide = overlay.buffer(overlay.buffer(free, -_NARROW / 2, quad_segs=2), _NARROW / 2, quad_segs=2)
     wide = overlay.difference(overlay.on_grid(overlay.simplify(wide, 0.2), grid=0.001), gardens)
     traded = overlay.intersection(wide, _land(osm, _TRADED, around))
@@ -100,7 +105,9 @@ def yards_of(osm: OsmData, carriageway: BaseGeometry, *, reach: float) -> Yards:
         overlay.union_all([_land(osm, _WORKED, around), _round_sheds(built, around), traded]), gardens
     )
     parts = (gardens, overlay.difference(wide, lots), lots)
-    return Yards(reach, *(overlay.areas_of(overlay.intersection(part, window)) for part in parts))
+    mapped = [named.shape for areas in mapped_areas(site, window).values() for named in areas]
+    gardens, lawns, lots = (overlay.areas_of(overlay.intersection(part, window)) for part in parts)
+    return Yards(reach, gardens, lawns, lots, mapped)
 
 
 def _is_house(area: OsmArea) -> bool:

@@ -34,7 +34,7 @@ from vico.worldgen.objects.kinds import region, thing_of
 from vico.worldgen.objects.lamps import lamp_wishes
 from vico.worldgen.objects.points import mapped_wishes
 from vico.worldgen.objects.site import Site
-from vico.worldgen.objects.trees import planted_wishes, planting
+from vico.worldgen.objects.trees import lawn_wishes, planted_wishes, planting
 from vico.worldgen.objects.wishes import Wish
 
 _LAMPS = ("street_lamp", "lamp")  # kinds
@@ -55,14 +55,15 @@ class Grounds:
         Where vehicles drive: nothing may stand there either.
     openings
         Where walkers pass through fences, walls and hedges.
-    lawns
-        Where trees and shrubs grow though no map says so.
+    lawns, mapped
+        Where trees and shrubs grow though no map says so, unless it says what the ground is: areas of that.
     """
 
     solids: Sequence[BaseGeometry] = ()
     carriageway: BaseGeometry = field(default_factory=shapely.MultiPolygon)
     openings: BaseGeometry = field(default_factory=shapely.MultiPolygon)
     lawns: BaseGeometry = field(default_factory=shapely.MultiPolygon)
+    mapped: Sequence[BaseGeometry] = ()
 
 
 def objects_from_osm(
@@ -108,7 +109,8 @@ def objects_from_osm(
         (barrier_wishes(osm, carriageway, openings, half), True),
         (mapped, True),
         (group_wishes(osm, openings, half, seed, where=where), True),
-        (planted_wishes(osm, height, carriageway, openings, grounds.lawns, half, seed, zone), False),
+        (planted_wishes(osm, height, carriageway, openings, half, seed, zone), False),
+        (lawn_wishes(osm, grounds.lawns, openings, grounds.mapped, seed, zone), False),
         (
             lamp_wishes(
                 osm, carriageway, grounds.solids, lamps, lamp=thing_of({"highway": "street_lamp"}, where=where)

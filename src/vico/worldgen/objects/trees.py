@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -202,14 +203,13 @@ def planted_wishes(
     height: HeightField,
     carriageway: BaseGeometry,
     openings: BaseGeometry,
-    lawns: BaseGeometry,
     half: float,
     seed: int,
     zone: str,
 ) -> list[Wish]:
     """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways.
 
-    Where nothing is mapped there are some on `lawns`, and where the ground is too steep to be one, it grows wild.
+    Where nothing is mapped and the ground is too steep to be a lawn, it grows wild.
     """
     window = shapely.box(-half, -half, half, half)
     keep_off = _kept_free(osm, carriageway, openings, window)
@@ -230,7 +230,6 @@ def planted_wishes(
     mown = [NamedShape(area.id, area.polygon) for area in osm.areas if _is_mown(area)]
     elsewhere = united([NamedShape("kept", keep_off), NamedShape("planted", done), *mown])
     found += _grown_wild(height, elsewhere, half, seed, zone)
-    found += _on_lawns(overlay.difference(lawns, elsewhere), half, seed, zone)
     if len(found) <= _MOST:
         return [wish for _, wish in found]
     # Every area is thinned alike.
@@ -274,33 +273,48 @@ def _grown_wild(
     return found
 
 
-def _on_lawns(lawns: BaseGeometry, half: float, seed: int, zone: str) -> list[tuple[float, Wish]]:
-    """Return what grows on lawns that no map has: a tree or a shrub at most in each cell of them."""
-    found: list[tuple[float, Wish]] = []
+def lawn_wishes(
+    osm: OsmData,
+    lawns: BaseGeometry,
+    openings: BaseGeometry,
+    mapped: Sequence[BaseGeometry],
+    seed: int,
+    zone: str,
+) -> list[Wish]:
+    """Return what grows on lawns that no map has: a tree or a shrub at most in each cell of them.
+
+    Nothing grows on ways for walkers, beside rails, nor within areas that are `mapped` or bare.
+    """
     if lawns.is_empty:
-        return found
+        return []
     shapely.prepare(lawns)
-    count = max(int(2 * half // _LAWN_CELL), 1)
-    side = 2 * half / count
-    for row in range(count):
-        for column in range(count):
-            corner = np.array([column * side - half, row * side - half])
-            if not lawns.intersects(shapely.box(*corner, *(corner + side))):
-                continue
-            random = rng(seed, "lawn", row, column)
-            grows, kind, rank = random.random(3).tolist()
-            xy = corner + random.uniform(0.15, 0.85, 2) * side
-            if grows > _LAWN_GROWN or not shapely.contains_xy(lawns, *xy):
-                continue
-            key = f"lawn.{row}.{column}"
-            if kind < _LAWN_SHRUBS:
-                name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
-                wish = Wish(key, name, xy, None, float(random.uniform(0.8, 1.2)))
-            else:
-                wish = tree_wish(key, {}, xy, seed, zone)
-            wish.reach = 0.0
-            found.append((rank, wish))
-    return found
+    shapely.prepare(openings)
+    bare = [area.polygon for area in osm.areas if _is_bare(area)]
+    rails = [shapely.LineString(way.line) for way in osm.ways if way.tags.get("railway") in _RAILS]
+    taken, tracks = shapely.STRtree([*mapped, *bare]), shapely.STRtree(rails)
+    count = max(int(2 * osm.half // _LAWN_CELL), 1)
+    side = 2 * osm.half / count
+    found: list[tuple[float, Wish]] = []
+    for row, column in np.ndindex(count, count):
+        random = rng(seed, "lawn", row, column)
+        grows, kind, rank = random.random(3).tolist()
+        xy = np.array([column, row]) * side - osm.half + random.uniform(0.15, 0.85, 2) * side
+        if grows > _LAWN_GROWN or not shapely.contains_xy(lawns, *xy):
+            continue
+        point = shapely.Point(xy)
+        near = tracks.query(point, predicate="dwithin", distance=_BESIDE_RAILS)
+        if len(near) or len(taken.query(point, predicate="intersects")) or shapely.dwithin(openings, point, 0.8):
+            continue
+        key = f"lawn.{row}.{column}"
+        if kind < _LAWN_SHRUBS:
+            name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
+            wish = Wish(key, name, xy, None, float(random.uniform(0.8, 1.2)))
+        else:
+            wish = tree_wish(key, {}, xy, seed, zone)
+        wish.reach = 0.0
+        found.append((rank, wish))
+    limit = sorted(rank for rank, _ in found)[_MOST] if len(found) > _MOST else 1.0
+    return [wish for rank, wish in found if rank < limit]
 
 
 def _kept_free(
@@ -309,18 +323,18 @@ def _kept_free(
     """Return where nothing is planted: on and beside ways, houses, and areas that are bare."""
     kept = [NamedShape("footways", overlay.buffer(openings, 0.8))]
     kept.append(NamedShape("carriageways", overlay.buffer(carriageway, 1.6)))
-    for way in osm.ways:
-        if way.tags.get("railway") in _RAILS and way.tags.get("tunnel", "no") == "no":
-            with expendable(f"w{way.id}"):
-                kept.append(NamedShape(f"w{way.id}", overlay.buffer(shapely.LineString(way.line), _BESIDE_RAILS)))
     for area in osm.areas:
-        bare = any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
+        bare = _is_bare(area)
         built = ("building" in area.tags or "building:part" in area.tags) and area.polygon.intersects(window)
         if bare or built:
             with expendable(area.id):
                 within = overlay.intersection(area.polygon, window)
                 kept.append(NamedShape(area.id, overlay.buffer(within, 2.2 if built else 1.0)))
     return united(kept)
+
+
+def _is_bare(area: OsmArea) -> bool:
+    return any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
 
 
 def _planted(

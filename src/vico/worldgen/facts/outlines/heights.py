@@ -18,6 +18,9 @@ STOREY = 3.2
 
 _NEAR = 100.0  # metres within which neighbours of the same use decide
 _REACH = 220.0  # metres within which the nearest of any use do
+_HOUSE, _TOWN_HOUSE = 60.0, 300.0  # square metres: less is a shed; median of houses up to which a dense place is a town
+# Slabs of flats: storeys, metres from front to back, and the least length.
+_SLAB_LEVELS, _SLAB_DEEP, _SLAB_LONG = 5, (9.0, 19.0), 40.0
 
 # Storeys of kinds that look alike everywhere, whatever stands beside them.
 _STOREYS_OF_KINDS = {
@@ -171,7 +174,11 @@ class _Town:
         self._use_code = np.unique(np.array(uses), return_inverse=True)[1].ravel()
         reach = shapely.box(*(f(self._centres[:, k]) for f in (np.min, np.max) for k in (0, 1)))
         dense = self._areas.sum() / max(reach.area, 1.0) > 0.22
-        self._usual = (5 if lon > -30 else 4) if dense else 2
+        # Old towns are dense as well: what tells them from a city are the footprints of their houses.
+        houses = self._areas[self._areas > _HOUSE]
+        large = len(houses) > 0 and float(np.median(houses)) > _TOWN_HOUSE
+        self._usual = (5 if lon > -30 else 4) if dense and large else 3 if dense else 2
+        self._slabs = np.array([_is_slab(row[1], self._tags[k]) for k, row in enumerate(outlines)])
 
     def _kind(self, k: int) -> str:
         return self._tags[k].get("building", "yes")
@@ -196,7 +203,7 @@ class _Town:
         elif (around := self._of_area(k)) is not None:
             estimate, rule = around, "area"
         else:
-            estimate, rule = self._usual, "town"
+            estimate, rule = max(self._usual, _SLAB_LEVELS if self._slabs[k] else 1), "town"
         most = 2 if self._areas[k] < 90.0 else 3 if self._areas[k] < 140.0 else 12
         return max(min(estimate, most), 1), rule
 
@@ -222,6 +229,18 @@ class _Town:
         pairs = zip(np.atleast_1d(distances).tolist(), np.atleast_1d(nearest).tolist(), strict=True)
         near = [int(self._example[self._large[i]]) for d, i in pairs if d < _REACH]
         return round(float(np.median(near))) if len(near) >= 2 else None
+
+
+def _is_slab(outline: Polygon, tags: Mapping[str, str]) -> bool:
+    """Return whether a house has the shape of a slab of flats: long, straight, as deep as two flats."""
+    if tags.get("building", "yes") not in ("yes", "residential", "apartments"):
+        return False
+    box = shapely.minimum_rotated_rectangle(outline)
+    if box.geom_type != "Polygon" or outline.area < 0.85 * box.area:
+        return False
+    sides = np.hypot(*np.diff(np.asarray(box.exterior.coords)[:3], axis=0).T)
+    deep, long = float(sides.min()), float(sides.max())
+    return _SLAB_DEEP[0] <= deep <= _SLAB_DEEP[1] and long >= max(2.8 * deep, _SLAB_LONG)
 
 
 def weighted_median(values: NDArray[np.int64], weights: NDArray[np.float64]) -> int:
