@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 from vico.errors import MissingFileError, SchemaError
-from vico.io.arrays import mapped_array
+from vico.io.arrays import drop_pages, mapped_array
 from vico.io.npz import read_npz
 from vico.world.city_files import EDGE, HIGH, LEVELS, LOW, REACHED, ROOM, SMOOTH, SURFACES
 from vico.world.decks import Decks
@@ -40,6 +40,14 @@ def whole_ground(folder: Path, half: float) -> HeightField:
         raise SchemaError(f"{path}: not readable ({error}); build the city anew") from None
     steps = Steps(*(mapped_array(folder / name) for name in (EDGE, LOW, HIGH)))
     return HeightField(mapped_array(folder / SMOOTH), half, steps, decks, stairs)
+
+
+def give_back(ground: HeightField) -> None:
+    """Give back the memory that the heights of a city were read into: they are read again where they are looked at."""
+    drop_pages(ground.heights)
+    if ground.steps is not None:
+        for array in (ground.steps.edge, ground.steps.low, ground.steps.high):
+            drop_pages(array)
 
 
 def whole_walkable(folder: Path, half: float) -> WalkableMap:

@@ -20,7 +20,7 @@ from vico.world.city import CITY, City, CityTile
 from vico.world.city_entities import CityEntities
 from vico.world.city_files import COST, GATES, STEPS, WHOLE
 from vico.world.city_gates import Gates
-from vico.world.city_ground import whole_ground, whole_walkable
+from vico.world.city_ground import give_back, whole_ground, whole_walkable
 from vico.world.city_rooms import CityRooms, RoomsById
 from vico.world.city_routing import CityRouter
 from vico.world.city_walk_lengths import CityWalkLengths
@@ -164,7 +164,7 @@ class CityWorld(World):
         opened = self.__dict__
         arrays: list[NDArray[Any]] = []
         if "height" in opened:
-            arrays += [self.height.heights, *(vars(self.height.steps).values() if self.height.steps else ())]
+            give_back(self.height)
         if "walkable" in opened:
             arrays += [self.walkable.cls, self.walkable.clearance, self.walkable.connected]
         if "_cost" in opened:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData
 from vico.io.files import read_json, write_bytes, write_json
 from vico.world.city_files import NET, ROADS, TRANSIT, WHOLE, XODR
-from vico.world.city_ground import whole_ground
+from vico.world.city_ground import give_back, whole_ground
 from vico.world.heights import HeightField
 from vico.world.lane_reader import read_lanes
 from vico.world.lanes import LaneGraph
@@ -103,11 +103,13 @@ def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
     roads = stages.run("roads", roads_from_osm, site, ways)
     kerbs = given(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
     network = stages.run("network", road_network, site, ways, levels, kerbs)
+    give_back(levels)  # half a gigabyte in 27 km²
     write_record(whole / ROADS, roads)
     write_bytes(whole / NET, network.net_xml)
     write_bytes(whole / XODR, network.xodr or b"")
     lanes = given(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
     mapped = stages.run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=request.seed)
+    give_back(levels)
     with stages.timed("waiting"):
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write_record(whole / TRANSIT, transit)
