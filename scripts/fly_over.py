@@ -29,13 +29,25 @@ from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, film_frames
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
+from vico.world.world import World
 
-_REACHED = 4.0  # metres
+_REACHED, _ROOM, _FARTHEST = 4.0, 1.2, 300  # metres
 _DRONE = "robot_0"
 
 
 class Reached(Exception):
     """The last point is reached."""
+
+
+def begin(world: World, near: tuple[float, float]) -> tuple[float, float] | None:
+    """Return the nearest free ground to a point, on which a drone can stand, and from which one gets away."""
+    for away in range(0, _FARTHEST, 2):
+        for turn in range(0, 360, 20):
+            x = near[0] + away * math.cos(math.radians(turn))
+            y = near[1] + away * math.sin(math.radians(turn))
+            if world.walkable.is_connected((x, y)) and float(world.walkable.clearance_at((x, y))) > _ROOM:
+                return x, y
+    return None
 
 
 class Pilot:
@@ -89,18 +101,22 @@ def main() -> None:
     world = read_world(arguments.city)
     community = read_community(arguments.people, world)
     way = [(float(east), float(north)) for east, north in (point.split(",") for point in arguments.way)]
+    public = PublicMap.from_world(world)
+    ground = begin(world, way[0])
+    if ground is None:
+        parser.error(f"--way {way[0]}: no free ground within {_FARTHEST} m to begin on; give another first point")
     config = SimConfig(
         seed=community.seed,
         start=int(arguments.start * 3600),
         robots=("drone",),
-        robot_places={_DRONE: (*way[0], 0.0)},
+        robot_places={_DRONE: (*ground, 0.0)},
         observe=(),
         cars=arguments.cars,
         pedestrians=arguments.pedestrians,
     )
     sim = Simulation(world, community, config)
     pilot = Pilot([(x, y, float(world.height((x, y))) + arguments.height) for x, y in way])
-    followers = followers_of(community, PublicMap.from_world(world), seed=config.seed)
+    followers = followers_of(community, public, seed=config.seed)
     agents = Gatherer({**followers, _DRONE: pilot}, trusted=[*followers, _DRONE])
     faults = FaultLog()
     with closing(agents), Recorder(arguments.out, sim, sources={}, wanted=3600) as recorder:
