@@ -128,7 +128,8 @@ def main() -> None:
     settings = FilmSettings(
         follow=_DRONE, view="behind", width=width, height=height, rate=arguments.rate, speed=arguments.speed
     )
-    write_film(arguments.out / "flight.mp4", film_frames(repeated, settings), rate=arguments.rate)
+    frames = film_frames(repeated, settings, first=0, last=repeated.run.last)
+    write_film(arguments.out / "flight.mp4", frames, rate=arguments.rate)
 
 
 if __name__ == "__main__":
