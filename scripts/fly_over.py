@@ -119,7 +119,8 @@ def main() -> None:
     followers = followers_of(community, public, seed=config.seed)
     agents = Gatherer({**followers, _DRONE: pilot}, trusted=[*followers, _DRONE])
     faults = FaultLog()
-    with closing(agents), Recorder(arguments.out, sim, sources={}, wanted=3600) as recorder:
+    sources = {"world": str(arguments.city.resolve()), "community": str(arguments.people.resolve())}
+    with closing(agents), Recorder(arguments.out, sim, sources=sources, wanted=3600) as recorder:
         with suppress(Reached):
             Runner(sim, agents, hooks=[RecordedRun(recorder, faults), UntilThere(pilot)], faults=faults).run(3600)
         recorder.close()
