@@ -230,10 +230,12 @@ def test_wires_hang_over_tram_tracks_and_are_held_by_walls_at_both_sides() -> No
 def test_tracks_lie_on_sleepers_but_where_a_street_or_a_footway_leads_across() -> None:
     streets, window = city(street(1, (0.0, -30.0), (0.0, 30.0))), shapely.box(-50, -50, 50, 50)
     groups = road_markings(streets, window, tracks=[np.array([[-20.0, 0.0], [20.0, 0.0]])])
-    sleepers, rails = (
-        next(group.corners for group in groups if not group.low and (len(group.corners) == 2) == is_rail)
-        for is_rail in (False, True)
-    )
+    # Rails beside the street lie as high as what is beside it; those across it are let in.
+    sleepers = next(group.corners for group in groups if not group.low and group.rank == 0)
+    rails = next(group.corners for group in groups if not group.low and group.rank == 1)
+    across = next(group.corners for group in groups if group.low and group.rank == 2)
+    assert np.abs(rails.mean(axis=1)[:, 0]).min() > 4.0
+    assert np.abs(across[..., 0]).max() == pytest.approx(4.0, abs=1.0)
     assert len(sleepers) == pytest.approx((40.0 - 8.0 - 2 * 4.0) / 0.65, abs=3)
     assert np.abs(sleepers.mean(axis=1)[:, 0]).min() > 8.0
     assert (rails[..., 0].min(), rails[..., 0].max()) == (-20.0, 20.0)

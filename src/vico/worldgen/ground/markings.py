@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import shapely
@@ -95,8 +95,9 @@ def road_markings(
                 target += quads
     if habits.kerb_lines == "double_yellow":
         yellow += _kerb_lines(streets, parting, longest)
-    rails, grooves = _rails(streets.rails, longest)
-    bare, sleepers = _rails(tracks, longest)[0], _sleepers(tracks, streets)
+    beside, across = _parted(tracks, streets)
+    rails, grooves = _rails([*streets.rails, *across], longest)
+    bare, sleepers = _rails(beside, longest)[0], _sleepers(tracks, streets)
     painted = streets.steps if stepped is None else overlay.difference(streets.steps, overlay.buffer(stepped, 0.1))
     treads: list[NDArray[np.float64]] = []
     for shape in polygons_of(painted, 0.5):
@@ -132,6 +133,23 @@ def _rails(
             rails += ribbon(divided(line, longest), side * _GAUGE, _HEAD)
             grooves += ribbon(divided(line, longest), side * (_GAUGE - _HEAD - _GROOVE_WIDTH), _GROOVE_WIDTH)
     return rails, grooves
+
+
+def _parted(
+    tracks: Sequence[NDArray[np.float64]], streets: StreetPolygons
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Return what of tracks lies beside streets, as high as what is there, and what leads across them, let in."""
+    parts: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] = ([], [])
+    for line in tracks:
+        fine = divided(line, 1.0)
+        inside = shapely.contains_xy(streets.carriageway, *((fine[1:] + fine[:-1]) / 2).T)
+        if not inside.any():
+            parts[0].append(line)
+            continue
+        cuts = [0, *(np.flatnonzero(inside[1:] != inside[:-1]) + 1).tolist(), len(inside)]
+        for first, last in pairwise(cuts):
+            parts[int(inside[first])].append(fine[first : last + 1])
+    return parts
 
 
 def _sleepers(tracks: Sequence[NDArray[np.float64]], streets: StreetPolygons) -> list[NDArray[np.float64]]:
