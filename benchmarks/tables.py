@@ -6,10 +6,10 @@
 
 Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), influence (five), commute (ten), robot
 (21). A table that was cut short goes on with the same command. With `--reduced` there are four worlds, one seed and
-shorter episodes of the first part, so that all is over in ten minutes on two cores; these worlds are built into
-OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method` names them, with
-the model of the environment; without, the page says that they were not run. So are methods of the robot table whose arm
-was trained, with their `--policy METHOD=FILE`:
+shorter episodes of the first part (or of those that `--block` names), so that all is over in ten minutes on two cores;
+these worlds are built into OUT/worlds if `--worlds` is not given. Methods that need a language model are played where
+`--method` names them, with the model of the environment; without, the page says that they were not run. So are methods
+of the robot table whose arm was trained, with their `--policy METHOD=FILE`:
 
     python benchmarks/tables.py --table robot --worlds WORLDS --block "oracle grasp" --method heuristic \
         --method rl-decomposed --policy rl-decomposed=benchmarks/policies/decomposed --out OUT
@@ -36,7 +36,7 @@ from vico.challenges.robot.policy_files import LEARNED, policy_settings
 from vico.challenges.tables.files import write_results
 from vico.challenges.tables.published import published_rows
 from vico.challenges.windows import window_list
-from vico.errors import VicoError
+from vico.errors import InputError, VicoError
 from vico.io.files import write_bytes
 from vico.worldgen.many import build_many
 
@@ -55,14 +55,14 @@ class Block:
 class Table:
     """What is played for a table: its parts, its list of worlds, and how many seeds a world.
 
-    `reduced` names the parts that `--reduced` plays, with what is shorter in each.
+    `shorter` is what `--reduced` changes in the setting of every part.
     """
 
     blocks: tuple[Block, ...]
     windows: str
     seeds: int
     reference: str
-    reduced: dict[str, Setting]
+    shorter: Setting
 
 
 def _assistants(count: int, *, advanced: bool = False) -> Setting:
@@ -79,14 +79,14 @@ TABLES = {
             Block("1 assistant, without distance modelling", "assistant", {**_assistants(1), "distance": False}),
             Block("2 assistants, without distance modelling", "assistant", {**_assistants(2), "distance": False}),
         ),
-        "standard", 1, "heuristic", {"1 assistant": {"steps": 500}},
+        "standard", 1, "heuristic", {"steps": 500},
     ),
     "advanced": Table(
         (
             Block("1 assistant, advanced", "assistant", _assistants(1, advanced=True)),
             Block("2 assistants, advanced", "assistant", _assistants(2, advanced=True)),
         ),
-        "advanced", 3, "heuristic", {"1 assistant, advanced": {"steps": 500}},
+        "advanced", 3, "heuristic", {"steps": 500},
     ),
     "influence": Table(
         (
@@ -94,17 +94,17 @@ TABLES = {
             # The same dialogue on both sides, then the same target choice: what each of the two is worth.
             Block("ablation", "influence", methods=_ABLATION),
         ),
-        "influence", 1, "", {"pairings": {"hours": 0.5}},
+        "influence", 1, "", {"hours": 0.5},
     ),
     "commute": Table(
-        (Block("a day of commutes", "commute"),), "commute", 10, "rule", {"a day of commutes": {}}
+        (Block("a day of commutes", "commute"),), "commute", 10, "rule", {}
     ),
     "robot": Table(
         (
             Block("held by friction", "robot", {"steps": 1500, "oracle_grasp": False}),
             Block("oracle grasp", "robot", {"steps": 1500, "oracle_grasp": True}),
         ),
-        "robot", 1, "heuristic", {"held by friction": {"steps": 400}},
+        "robot", 1, "heuristic", {"steps": 400},
     ),
 }  # fmt: skip
 
@@ -119,7 +119,12 @@ def offline_methods(challenge: Challenge) -> list[str]:
 
 def world_folders(arguments: argparse.Namespace, table: Table) -> list[Path]:
     """Return the worlds of a table; those of the reduced list are built if none are given."""
-    windows = window_list("reduced" if arguments.reduced else table.windows).windows
+    name = "reduced" if arguments.reduced else table.windows
+    windows = window_list(name).windows
+    names = [window.name for window in windows]
+    if unknown := set(arguments.world or ()) - set(names):
+        raise InputError(f"--world: {', '.join(sorted(unknown))}; the list {name} has {', '.join(names)}")
+    windows = tuple(window for window in windows if window.name in (arguments.world or names))
     folder: Path = arguments.worlds or arguments.out / "worlds"
     if arguments.reduced and arguments.worlds is None:
         for outcome in build_many([row_of(window, None) for window in windows], folder, locate=locate):
@@ -141,7 +146,7 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
     """Play a part of a table and write it; return whether all episodes were played."""
     challenge = load_challenge(block.challenge)
     methods = arguments.method or block.methods or offline_methods(challenge)
-    setting = {**block.setting, **(table.reduced[block.name] if arguments.reduced else {})}
+    setting = {**block.setting, **(table.shorter if arguments.reduced else {})}
     if arguments.steps:
         setting["steps"] = arguments.steps
     jobs = jobs_for(
@@ -177,6 +182,7 @@ def main() -> int:
     parser.add_argument("--table", choices=sorted(TABLES), required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--worlds", type=Path, help="folder of the worlds of the table's list")
+    parser.add_argument("--world", action="append", help="worlds of the list instead of all: their names")
     parser.add_argument("--reduced", action="store_true")
     parser.add_argument("--method", action="append", help="instead of all methods without a language model")
     parser.add_argument("--policy", action="append", default=[], help="METHOD=FILE, of a method whose arm was trained")
@@ -184,7 +190,7 @@ def main() -> int:
     parser.add_argument("--block", action="append", help="parts of the table instead of all: their names")
     parser.add_argument("--seeds", type=int, default=0)
     parser.add_argument("--first-seed", type=int, default=0, help="N: episodes are seeded N, N + 1, ...")
-    parser.add_argument("--steps", type=int, default=0, help="shorter episodes of assistants, to try it out")
+    parser.add_argument("--steps", type=int, default=0, help="episodes of another length, in steps")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--record", action="store_true")
     arguments = parser.parse_args()
@@ -193,12 +199,13 @@ def main() -> int:
         parser.error(
             f"--worlds: the folder with the worlds of the list {table.windows}; benchmarks/worlds.py builds them"
         )
-    known = list(table.reduced) if arguments.reduced else [block.name for block in table.blocks]
+    known = [block.name for block in table.blocks]
+    wanted = arguments.block or (known[:1] if arguments.reduced else known)
     if unknown := set(arguments.block or ()) - set(known):
         parser.error(f"--block: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
     try:
         worlds = world_folders(arguments, table)
-        blocks = [block for block in table.blocks if block.name in (arguments.block or known)]
+        blocks = [block for block in table.blocks if block.name in wanted]
         played = [play(arguments, table, block, worlds) for block in blocks]
     except VicoError as error:
         print(error, file=sys.stderr)

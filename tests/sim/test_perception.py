@@ -21,9 +21,9 @@ from vico.world.public import PublicMap
 
 def wall() -> OpaqueGrid:
     """A wall 6 m high along x = 5, from y = -5 to y = 4."""
-    top = np.full((200, 200), -np.inf, np.float32)
-    top[90:108, 110:112] = 6.0
-    return OpaqueGrid(top, half=50.0)
+    level = np.zeros((200, 200), np.uint16)
+    level[90:108, 110:112] = 1
+    return OpaqueGrid(level, np.array([-np.inf, 6.0], np.float32), half=50.0)
 
 
 def person(x: float, y: float, z: float = 0.0) -> Bodies:
@@ -84,7 +84,7 @@ def test_the_tops_of_buildings_lie_over_their_outlines() -> None:
     building = world.buildings[0]
     x, y = np.mean(building.footprint[0], axis=0)
     column, row = (int((value + grid.half) / grid.cell) for value in (x, y))
-    assert grid.top[row, column] == pytest.approx(building.base + building.height)
+    assert grid.tops[grid.level[row, column]] == pytest.approx(building.base + building.height)
 
 
 def day(observe: tuple[str, ...] | None, steps: int) -> list[str]:

@@ -16,6 +16,7 @@ from shapely.affinity import translate
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmData
 from vico.io.files import write_json
 from vico.world.borders import Side, border_findings, profile_of
 from vico.world.check import check_whole
@@ -26,6 +27,7 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import Origin
 from vico.world.world import World
+from vico.worldgen import city_map
 from vico.worldgen.city_build import bare_ground, build_city, city_request, divide_map
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
@@ -151,8 +153,35 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> CityRequest:
     return request
 
 
+def _no_reading(*_: object, **__: object) -> OsmData:
+    raise AssertionError("the map is read")
+
+
+def test_a_map_is_read_again_where_it_or_a_part_of_it_is_not_what_it_was(
+    planned: CityRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(city_map, "read_osm", _no_reading)
+    key = divide_map(planned).key
+    changed = tmp_path / "changed.osm.pbf"
+    changed.write_bytes(EXTRACT.read_bytes() + b"\0")
+    with pytest.raises(AssertionError, match="is read"):
+        divide_map(replace(planned, sources=Sources(changed)))
+    assert not (planned.plans / "map.json").exists()  # until it is divided
+    monkeypatch.undo()
+    assert divide_map(planned).key == key
+    monkeypatch.setattr(city_map, "read_osm", _no_reading)
+    part = planned.plans / tile_name(next(iter(PAIR))) / "map.stage"
+    assert part.exists()
+    lost = part.rename(tmp_path / "map.stage")
+    with pytest.raises(AssertionError, match="is read"):
+        divide_map(planned)
+    lost.rename(part)
+    monkeypatch.undo()
+    divide_map(planned)
+
+
 def test_streets_of_a_city_end_where_its_tiles_do(planned: CityRequest) -> None:
-    data = divide_map(planned)
+    data = divide_map(planned).of_city
     assert (data.half, data.box) == (PAIR.half, (-80.0, -80.0, 240.0, 80.0))
     lines = [street.line for street in streets_from_osm(site_facts(data))]
     low, high = np.concatenate(lines).min(axis=0), np.concatenate(lines).max(axis=0)
@@ -328,7 +357,7 @@ def test_a_tile_that_is_gone_or_another_one_is_named(corner: World, corner_path:
 
 
 @pytest.mark.slow
-def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path) -> None:
+def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     request = city_request(
         Sources(EXTRACT), lat=CENTRE[0], lon=CENTRE[1], extent=480.0, tile=160.0, out=tmp_path / "city"
     )
@@ -342,9 +371,14 @@ def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path) -> N
     digests = {tile.name: tile.digest for tile in city.manifest.tiles}
     built = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}
     shutil.rmtree(request.out / "tiles" / "0_0")
-    again = build_city(request)
+    with monkeypatch.context() as patch:
+        patch.setattr(city_map, "read_osm", _no_reading)
+        again = build_city(request)
     assert {tile.name: tile.digest for tile in again.manifest.tiles} == digests
     kept = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}
     assert [name for name in digests if kept[name] != built[name]] == ["0_0"]
+    (request.out / "whole" / "roads.net.xml").unlink()
+    mended = build_city(request)
+    assert mended.manifest == again.manifest
     elsewhere = replace(request, out=tmp_path / "other")
     assert {tile.name: tile.digest for tile in build_city(elsewhere).manifest.tiles} == digests

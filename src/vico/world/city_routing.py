@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from threading import Lock
 
 import numpy as np
@@ -31,8 +31,8 @@ _NEAR, _AROUND = 800, 300
 _TRIES = 40
 # Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks to or from a gate, 8 a cell.
 _ENDS, _LEGS = 8192, 8192
-# Windows after which the memory that the map is read into is given back: some 6 MB each at 400 m a tile.
-_WINDOWS = 16
+# Tiles that are read before the memory that the map is read into is given back: some 6 MB each at 400 m a tile.
+_TILES = 24
 _FAR = np.int64(1) << 60
 _NO_WALK = np.zeros(0, np.int32), np.zeros(0, np.int32)
 
@@ -63,7 +63,7 @@ class CityRouter(Router):
         self._shut = np.zeros(cost.shape, np.bool_)
         self._nothing = np.zeros((0, 0), np.bool_)
         self._scratch = Scratch()
-        self._opened = 0
+        self._read: set[tuple[int, int]] = set()
         self._lock = Lock()
 
     def learn_landmarks(self) -> None:
@@ -127,21 +127,17 @@ class CityRouter(Router):
         tiles = self._tiles_of(closed)
         return _Ask(self._cost, self._clearance, blocked, room, self._side, tiles, self._scratch, self._open)
 
-    def _open(self) -> None:
-        """Count a window that is opened: all of a city's map would come to be in memory."""
-        self._opened += 1
-        if self._opened % _WINDOWS == 0:
+    def _open(self, tiles: set[tuple[int, int]]) -> None:
+        """Note which tiles are read: with time all of a city's map would come to be in memory."""
+        if len(self._read | tiles) > _TILES:
             drop_pages(self._cost)
             drop_pages(self._clearance)
+            self._read.clear()
+        self._read |= tiles
 
     def _tiles_of(self, closed: Sequence[tuple[float, float, float]]) -> set[tuple[int, int]]:
         """Return the rows and columns of the tiles in which squares lie."""
-        found = set()
-        for x, y, reach in closed:
-            rows, columns = self._square(x, y, reach)
-            for row in range(rows.start // self._side, (rows.stop - 1) // self._side + 1):
-                found |= {(row, k) for k in range(columns.start // self._side, (columns.stop - 1) // self._side + 1)}
-        return found
+        return set().union(*(_tiles_in(self._square(x, y, reach), self._side) for x, y, reach in closed))
 
     def _far(self, ask: _Ask, first: int, last: int, *, often: bool) -> tuple[Ints, Ints] | None:
         """Look for a walk from gate to gate; where what is closed makes one dearer than it was, anew."""
@@ -219,7 +215,7 @@ class CityRouter(Router):
             return ask.window(ask.square(a)).walk(a, b)
         kept = None if ask.room else self.graph.walk(a, b)
         if kept is not None:
-            self._open()
+            self._open({ask.tile(a)})
             cells, costs = followed(self._cost, a, *kept)
             if not len(cells) or cells[-1] != b:
                 raise SchemaError(f"{STEPS}: the walk from cell {a} to {b} is damaged; build the city anew")
@@ -248,6 +244,12 @@ class CityRouter(Router):
         return field
 
 
+def _tiles_in(part: tuple[slice, slice], side: int) -> set[tuple[int, int]]:
+    """Return the rows and columns of the tiles that have cells in a part of the map."""
+    rows, columns = (range(k.start // side, (k.stop - 1) // side + 1) for k in part)
+    return set(product(rows, columns))
+
+
 class _Ask:
     """One search for a walk: what may be walked on, window by window.
 
@@ -266,7 +268,7 @@ class _Ask:
         side: int,
         closed: set[tuple[int, int]],
         scratch: Scratch,
-        opened: Callable[[], None],
+        opened: Callable[[set[tuple[int, int]]], None],
     ) -> None:
         self._cost, self._clearance, self._blocked, self.room, self._side = cost, clearance, blocked, room, side
         self._scratch, self._opened = scratch, opened
@@ -305,6 +307,6 @@ class _Ask:
         rows, columns = part
         key = rows.start, rows.stop, columns.start, columns.stop
         if key not in self._windows:
-            self._opened()
+            self._opened(_tiles_in(part, self._side))
             self._windows[key] = Window(self.costs(part), rows.start, columns.start, self._cost.shape[1], self._scratch)
         return self._windows[key]

@@ -8,37 +8,35 @@ many processes, and whatever was there before. A build that was stopped goes on:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
 from vico.errors import InputError, StageError
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData, checked_extract, read_osm
 from vico.geo.osm_parts import OsmParts
 from vico.io.files import read_json, sha256_of, write_json
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.version import __version__
 from vico.world.city import CITY, TILES, City, CityManifest, CityTile, read_city
-from vico.world.city_files import WHOLE
+from vico.world.city_files import COST, REACHED, ROOM, SURFACES, WHOLE
 from vico.world.model import Origin
+from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_report import write_city_report
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import make_streets
 from vico.worldgen.city_tiles import GATES
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.ground_kinds import sea_of_map
 from vico.worldgen.ground.terrain import APRON, terrain_from_dem
 from vico.worldgen.seams.grid import HALO, Tile, TileGrid, grid_of, grid_over, tile_name
 from vico.worldgen.seams.join import MAP
 from vico.worldgen.seams.walking import write_gates, write_walking
 from vico.worldgen.sources import Sources
-from vico.worldgen.stages import SUFFIX, Stages, keep_product, kept_product
+from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
 
 TILE = 400.0
 _CELL = 8.0
@@ -136,7 +134,7 @@ def build_city(
         If the sources can't be used, and then a city that was there stays; or if the streets can't be made.
     """
     request.plans.mkdir(parents=True, exist_ok=True)
-    data = divide_map(request)
+    region = divide_map(request)
     bare_ground(request)
     # The sources are good: from here on what the city has as a whole may be another one's until all is written.
     (request.out / CITY).unlink(missing_ok=True)
@@ -159,14 +157,14 @@ def build_city(
         left = done("shape", done("plan", list(request.grid)))
         if left:
             _tell(progress, "streets", 0)
-            reports = make_streets(request, data)
+            reports = make_streets(request, region)
             _tell(progress, "streets", 1)
-        del data
+        del region
         left = done("fit", done("build", left))
         if left:
             tiles = dict(found)
             maps = {one: request.out / TILES / tile_name(one) / "walkable.npz" for one in left}
-            write_walking(request.out / WHOLE, request.grid, maps)
+            _walking(request, maps)
             if lost := set(left).difference(done("gates", left)):
                 name = tile_name(min(lost))
                 raise StageError(f"city build: the ways out of tile {name} can't be found: {failed[name]}")
@@ -192,31 +190,39 @@ def build_city(
     return city
 
 
+def _walking(request: CityRequest, maps: Mapping[Tile, Path]) -> None:
+    """Write the walkable map of the city, if those of its tiles are not what they were."""
+    known, files = (
+        request.plans / "walking.json",
+        [request.out / WHOLE / name for name in (SURFACES, ROOM, REACHED, COST)],
+    )
+    made_of = [code_digest(), *(f"{tile_name(tile)} {sha256_of(path)}" for tile, path in maps.items())]
+    key = {"key": sha256("\n".join(made_of).encode()).hexdigest()}
+    if not (known.exists() and read_json(known) == key and all(path.exists() for path in files)):
+        known.unlink(missing_ok=True)
+        write_walking(request.out / WHOLE, request.grid, maps)
+        write_json(known, key)
+
+
 def _tell(progress: Progress | None, step: str, done: int) -> None:
     if progress is not None:
         progress(step, done, 1)
 
 
-def divide_map(request: CityRequest) -> OsmData:
-    """Read the map once, keep for each tile what of it lies there, and return that of the city."""
-    frame, reach = LocalFrame(request.lat, request.lon), request.grid.half + HALO
-    whole = read_osm(checked_extract(request.sources.osm), frame, reach, need_buildings=False)
-    # The sea is found for all tiles at once: of one that no coastline meets nobody could say whether it is land. Where
-    # that fails each tile looks for its own, and reports what is wrong.
-    with expendable("sea"):
-        whole = replace(whole, sea=sea_of_map(whole, shapely.box(-reach, -reach, reach, reach)))
-    known, key = request.plans / "map.json", {"map": whole.sha256, "reach": reach, "frame": str(frame), "version": 2}
+def divide_map(request: CityRequest) -> RegionMap:
+    """Keep for each tile what of the region's map lies there, and return that map: read if it has changed alone."""
+    region, known = RegionMap(request), request.plans / "map.json"
     kept = [request.plans / tile_name(tile) / f"{MAP}{SUFFIX}" for tile in request.grid]
-    if not (known.exists() and read_json(known) == key and all(path.exists() for path in kept)):
+    if not (known.exists() and read_json(known) == {"key": region.key} and all(path.exists() for path in kept)):
         known.unlink(missing_ok=True)
-        parts = OsmParts(whole)
+        parts = OsmParts(region.whole)
         half = request.grid.size / 2 + HALO
         for tile in request.grid:
             east, north = request.grid.centre(tile)
-            part = parts.within(half=half, margin=whole.margin, east=east, north=north)
+            part = parts.within(half=half, margin=region.whole.margin, east=east, north=north)
             keep_product(request.plans / tile_name(tile), MAP, replace(part, sha256="", timestamp=None))
-        write_json(known, key)
-    return replace(whole, half=request.grid.half, margin=whole.margin + HALO, edges=request.grid.edges)
+        write_json(known, {"key": region.key})
+    return region
 
 
 def bare_ground(request: CityRequest) -> None:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.geo.osm import OsmData
-from vico.io.files import read_json, write_bytes, write_json
-from vico.world.city_files import NET, ROADS, TRANSIT, WHOLE, XODR
+from vico.io.files import read_json, sha256_of, write_bytes, write_json
+from vico.world.city_files import EDGE, HIGH, LOW, NET, ROADS, SMOOTH, TRANSIT, WHOLE, XODR
+from vico.world.city_files import LEVELS as LEVELS_OF_CITY
 from vico.world.city_ground import give_back, whole_ground
 from vico.world.heights import HeightField
 from vico.world.lane_reader import read_lanes
@@ -23,6 +24,7 @@ from vico.world.model import Point2, Point3, StageReport
 from vico.world.records import write_record
 from vico.world.street_model import Roads
 from vico.world.transit_model import Transit
+from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.product import read_head
@@ -41,7 +43,9 @@ from vico.worldgen.transit.waiting import waiting_places
 SHAPE, LEVELS = "shape", "levels"
 #: Folder of the products of a city's streets, among the plans.
 STREETS = "streets"
-_GROUND = "ground.json"
+_GROUND, _DONE = "ground.json", "streets.json"
+# What is written of a whole city's streets, and of its ground.
+_FILES, _HEIGHTS = (ROADS, NET, XODR, TRANSIT), (SMOOTH, EDGE, LOW, HIGH, LEVELS_OF_CITY)
 # A tile knows the streets so far around it, metres.
 _AROUND = 40.0
 _LANE = re.compile(rb'<lane id="([^"]*)"')
@@ -66,14 +70,16 @@ class TileStreets:
     transit: Transit
 
 
-def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
+def make_streets(request: CityRequest, region: RegionMap) -> list[StageReport]:
     """Make a city's streets of what its tiles are, write them, and keep each tile's part for its build.
+
+    Where its map and the shapes of its tiles are what they were, and all that was made of them is there, nothing is.
 
     Parameters
     ----------
     request
         Which city.
-    data
+    region
         Its map.
 
     Returns
@@ -81,12 +87,40 @@ def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
     list of StageReport
         What was made and left out.
     """
+    (request.out / WHOLE).mkdir(parents=True, exist_ok=True)
+    both = _digest_of_shapes(request)
+    known = request.plans / STREETS / _DONE
+    key = sha256(f"{region.key} {request.seed} {both}".encode()).hexdigest()
+    content = read_json(known) if known.exists() else {}
+    if content.get("key") == key and content["made"] == _made(request):
+        return [StageReport.model_validate(one) for one in content["reports"]]
+    known.unlink(missing_ok=True)
+    reports = _make(request, region.of_city, both)
+    told = [report.model_dump(mode="json") for report in reports]
+    write_json(known, {"key": key, "made": _made(request), "reports": told})
+    return reports
+
+
+def _made(request: CityRequest) -> dict[str, str]:
+    """Return digests of all that streets are made into, as far as it is there."""
     whole = request.out / WHOLE
-    whole.mkdir(parents=True, exist_ok=True)
-    shapes, digests = _shapes(request)
-    both = sha256("\n".join(digests).encode()).hexdigest()
+    digests = {name: sha256_of(whole / name) for name in _FILES if (whole / name).exists()}
+    # Of heights there are gigabytes.
+    digests |= {name: str((whole / name).stat().st_size) for name in _HEIGHTS if (whole / name).exists()}
+    for tile in request.grid:
+        part = request.plans / tile_name(tile) / f"{CUT}{SUFFIX}"
+        if part.exists():
+            digests[tile_name(tile)] = read_head(part)[1]
+    return digests
+
+
+def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
+    """Make the streets of a map and of its tiles' shapes, whose digest is `both`."""
+    shapes = _shapes(request)
+    whole = request.out / WHOLE
     known = request.plans / STREETS / _GROUND
-    if not (known.exists() and read_json(known) == {"key": both}):
+    is_there = known.exists() and all((whole / name).exists() for name in _HEIGHTS)
+    if not (is_there and read_json(known) == {"key": both}):
         write_ground(whole, request.grid, lambda tile: _levels(request, tile))
         write_json(known, {"key": both})
     stages = Stages(request.plans / STREETS)
@@ -124,16 +158,22 @@ def make_streets(request: CityRequest, data: OsmData) -> list[StageReport]:
     return stages.reports
 
 
-def _shapes(request: CityRequest) -> tuple[dict[Tile, TileShape], list[str]]:
-    """Return the shapes of the tiles that have one, and digests of all that was read or will be."""
-    shapes: dict[Tile, TileShape] = {}
+def _shaped(request: CityRequest) -> list[Tile]:
+    """Return the tiles that have a shape."""
+    return [tile for tile in request.grid if (request.plans / tile_name(tile) / f"{SHAPE}{SUFFIX}").exists()]
+
+
+def _digest_of_shapes(request: CityRequest) -> str:
+    """Return a digest of all that is read, or will be, of the shapes of tiles."""
     digests: list[str] = []
-    for tile in request.grid:
+    for tile in _shaped(request):
         folder = request.plans / tile_name(tile)
-        if (folder / f"{SHAPE}{SUFFIX}").exists():
-            shapes[tile], digest = kept_product(folder, SHAPE)
-            digests += [tile_name(tile), digest, read_head(folder / f"{LEVELS}{SUFFIX}")[1]]
-    return shapes, digests
+        digests += [tile_name(tile), *(read_head(folder / f"{name}{SUFFIX}")[1] for name in (SHAPE, LEVELS))]
+    return sha256("\n".join(digests).encode()).hexdigest()
+
+
+def _shapes(request: CityRequest) -> dict[Tile, TileShape]:
+    return {tile: kept_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _shaped(request)}
 
 
 def _levels(request: CityRequest, tile: Tile) -> HeightField:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
+from vico.world.walkable import fill_polygon
 from vico.world.world import World
 
 _CELL = 0.5
@@ -21,16 +21,19 @@ class OpaqueGrid:
 
     Attributes
     ----------
-    top
-        Height of the building over each cell's centre, metres, float32, shape ``(n, n)``, indexed ``[iy, ix]``;
-        -inf where there is none.
+    level
+        Which of `tops` the building over each cell's centre has, the highest where there are several, uint16 or uint32,
+        shape ``(n, n)``, indexed ``[iy, ix]``. A city has a hundred million cells: half the memory of heights.
+    tops
+        Heights, metres, float32, ascending; the first is -inf, where there is no building.
     half
         Half the side of the square, metres.
     cell
         Side of a cell, metres.
     """
 
-    top: NDArray[np.float32]
+    level: NDArray[np.unsignedinteger]
+    tops: NDArray[np.float32]
     half: float
     cell: float = _CELL
 
@@ -47,16 +50,14 @@ def opaque_grid(world: World) -> OpaqueGrid:
 
 def _rasterised(world: World) -> OpaqueGrid:
     n = math.ceil(2 * world.half / _CELL)
-    top = np.full((n, n), -np.inf, np.float32)
-    centres = (np.arange(n) + 0.5) * _CELL - world.half
-    for building in world.buildings:
-        outline = shapely.Polygon(building.footprint[0], building.footprint[1:])
-        west, south, east, north = outline.bounds
-        columns = slice(*np.searchsorted(centres, (west, east)))
-        rows = slice(*np.searchsorted(centres, (south, north)))
-        x, y = np.meshgrid(centres[columns], centres[rows])
-        shapely.prepare(outline)
-        inside = shapely.contains_xy(outline, x, y)
-        covered = top[rows, columns]
-        covered[inside] = np.maximum(covered[inside], building.base + building.height)
-    return OpaqueGrid(top, world.half)
+    highest = np.array([building.base + building.height for building in world.buildings], np.float32)
+    tops = np.concatenate([np.array([-np.inf], np.float32), np.unique(highest)])
+    level = np.zeros((n, n), np.uint16 if len(tops) <= np.iinfo(np.uint16).max else np.uint32)
+    of_building = np.searchsorted(tops, highest)
+    # The highest are written last.
+    for k in np.argsort(of_building, kind="stable").tolist():
+        rings = [np.asarray(ring, np.float64) for ring in world.buildings[k].footprint]
+        starts = np.cumsum([0, *map(len, rings)])
+        x, y = np.ascontiguousarray(np.concatenate(rings).T)
+        fill_polygon(level, x, y, starts, float(world.half), _CELL, level.dtype.type(of_building[k]))
+    return OpaqueGrid(level, tops, world.half)
