@@ -266,9 +266,11 @@ def train(arguments: argparse.Namespace) -> None:
     out, began = arguments.out, time.monotonic()
     out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(arguments.threads)
-    dataset, shape = Dataset(arguments.dataset), ChunkShape(side=arguments.side)
+    if arguments.width < 8 or arguments.width % 8:
+        raise InputError(f"--width {arguments.width}: give a multiple of 8")
+    dataset, shape = Dataset(arguments.dataset), ChunkShape(side=arguments.side, width=arguments.width)
     decides = {"dataset": sha256_of(dataset.path / "dataset.json"), "shape": asdict(shape), "device": arguments.device}
-    decides |= {name: getattr(arguments, name) for name in ("seed", "steps", "every", "batch", "rate")}
+    decides |= {name: getattr(arguments, name) for name in ("seed", "steps", "every", "batch", "rate", "half")}
     frames = read_frames(dataset, shape, out, workers=arguments.workers)
     trainer = Trainer(frames, shape, arguments)
     curve: list[dict[str, float]] = []
@@ -323,7 +325,10 @@ def differing(before: dict[str, Any], now: dict[str, Any]) -> str:
 def keep(out: Path, trainer: Trainer, about: dict[str, Any]) -> None:
     """Write the policy as it is now."""
     path = out / "policy.npz"
-    write_arrays(path, trainer.policy.arrays())
+    arrays = trainer.policy.arrays()
+    if trainer.options.half:
+        arrays |= {name: value.astype(np.float16) for name, value in arrays.items() if name.startswith("weight/")}
+    write_arrays(path, arrays)
     digest = sha256_of(path)
     write_bytes(out / "policy.npz.sha256", f"{digest}  policy.npz\n".encode())
     made = {"producer": f"vico {__version__}", "torch": str(torch.__version__)}
@@ -347,6 +352,8 @@ def main() -> None:
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--side", type=int, default=96, help="pixels of the pictures it sees")
+    parser.add_argument("--width", type=int, default=256, help="of its transformer, a multiple of 8: its size")
+    parser.add_argument("--half", action="store_true", help="keep weights of 16 bits, in half the room")
     parser.add_argument("--steps", type=int, default=50_000)
     parser.add_argument("--minutes", type=float, default=math.inf, help="after which it stops, at the next look")
     parser.add_argument("--every", type=int, default=500, help="steps between two looks at the validation loss")

@@ -14,6 +14,7 @@ from command_line import vico
 from shared_folders import Shared
 from vico.agents.robot.chunk_policy import ChunkPolicy
 from vico.io.files import sha256_of
+from vico.io.npz import read_npz
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "train_chunk_policy.py"
 NO_TORCH = importlib.util.find_spec("torch") is None
@@ -59,6 +60,17 @@ def test_it_learns_goes_on_where_it_stopped_and_leaves_a_policy(demonstrations: 
     assert ChunkPolicy.read(whole / "policy.npz").shape.side == 32
 
 
+def test_a_small_policy_can_keep_its_weights_in_half_the_room(demonstrations: Path, tmp_path: Path) -> None:
+    words = ("--steps", "2", "--every", "2", "--width", "16")
+    for name, more in (("whole", ()), ("half", ("--half",))):
+        assert train(demonstrations, tmp_path / name, *words, *more).returncode == 0
+    whole, half = (tmp_path / name / "policy.npz" for name in ("whole", "half"))
+    assert half.stat().st_size < 0.6 * whole.stat().st_size
+    assert ChunkPolicy.read(half).shape == ChunkPolicy.read(whole).shape
+    kinds = {str(value.dtype) for name, value in read_npz(half.read_bytes()).items() if name.startswith("weight/")}
+    assert kinds == {"float16"}
+
+
 def test_other_wishes_and_other_datasets_are_refused(demonstrations: Path, tmp_path: Path) -> None:
     words = ("--steps", "1", "--every", "1")
     assert train(demonstrations, tmp_path, *words).returncode == 0
@@ -66,5 +78,7 @@ def test_other_wishes_and_other_datasets_are_refused(demonstrations: Path, tmp_p
     assert (again.returncode, "was trained otherwise" in again.stderr) == (1, True)
     large = train(demonstrations, tmp_path / "large", "--side", "64")
     assert "pictures of 32 pixels; give --side 32 or less" in large.stderr
+    narrow = train(demonstrations, tmp_path / "narrow", "--width", "12")
+    assert "--width 12: give a multiple of 8" in narrow.stderr
     none = train(tmp_path, tmp_path / "none")
     assert "holds no dataset.json" in none.stderr

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from numpy.typing import NDArray
 
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
@@ -14,6 +15,7 @@ from vico.world.heights import HeightField
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.ground.yards import Yards, yards_of
 from vico.worldgen.objects.stage import Grounds, objects_from_osm
+from vico.worldgen.objects.trees import lawn_wishes
 
 _NONE = shapely.MultiPolygon()
 _HALF = 100.0
@@ -107,3 +109,17 @@ def test_nothing_grows_in_water_nor_beside_rails() -> None:
     assert not shapely.intersects(pond.polygon, points).any()
     assert shapely.distance(shapely.LineString(ways[0].line), points).min() > 3.5
     assert shapely.distance(shapely.LineString(ways[1].line), points).min() >= 4.0
+
+
+def test_tiles_of_a_city_do_not_draw_their_lawns_alike() -> None:
+    lawn, nothing = shapely.box(-90.0, -90.0, 90.0, 90.0), shapely.MultiPolygon()
+
+    def grown(east: float) -> NDArray[np.float64]:
+        frame = LocalFrame(55.8, 37.6, east=east)
+        osm = OsmData(frame, _HALF, 100.0, [], [], [], [])
+        return np.array([wish.xy for wish in lawn_wishes(osm, lawn, nothing, [], 0, "temperate")])
+
+    here, there = grown(0.0), grown(2 * _HALF)
+    assert min(len(here), len(there)) > 20
+    assert np.array_equal(here, grown(0.0))
+    assert here.shape != there.shape or not np.allclose(here, there)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +18,8 @@ from vico.world.world import World
 Array = NDArray[np.float64]
 
 _CELL = 0.5
+# Rows of cells whose ground is looked up at once.
+_ROWS = 256
 #: Metres kept above what is flown over, and beside it; between a robot that hovers and anything else.
 OVER, BESIDE, HOVER = 3.0, 2.0, 0.8
 #: Highest above ground: where most countries end the air that anybody may fly in.
@@ -71,13 +74,12 @@ def _raise_triangles(tops, half, corners):  # type: ignore[no-untyped-def]
                 tops[row, column] = max(tops[row, column], z)
 
 
-def _corners(world: World, layers: tuple[str, ...]) -> Array:
-    found = [np.zeros((0, 3, 3))]
+def _corners(world: World, layers: tuple[str, ...]) -> Iterator[Array]:
+    """Yield the corners of the triangles of each surface of some layers, shape ``(k, 3, 3)``."""
     for layer in layers:
         for surface in world.surfaces(layer):
             if len(surface.triangles):
-                found.append(surface.positions[surface.triangles].astype(np.float64))
-    return np.concatenate(found)
+                yield surface.positions[surface.triangles].astype(np.float64)
 
 
 class Airspace:
@@ -98,14 +100,13 @@ class Airspace:
 
     def __init__(self, world: World) -> None:
         self.half, self.ground, self._walkable = float(world.half), world.height, world.walkable
-        n = round(2 * self.half / _CELL)
-        axis = (np.arange(n) + 0.5) * _CELL - self.half
-        xx, yy = np.meshgrid(axis, axis)
-        self._floor = np.asarray(self.ground(np.stack([xx, yy], axis=-1)), np.float64)
+        self._floor = self._heights()
         self.solid = self._floor.copy()
-        _raise_triangles(self.solid, self.half, _corners(world, ("collision",)))
+        for corners in _corners(world, ("collision",)):
+            _raise_triangles(self.solid, self.half, corners)
         self.tops = self.solid.copy()
-        _raise_triangles(self.tops, self.half, _corners(world, ("buildings", "roofs")))
+        for corners in _corners(world, ("buildings", "roofs")):
+            _raise_triangles(self.tops, self.half, corners)
         objects = world.objects.where(world.objects.outdoors)
         for x, y, z, a, b in zip(
             objects.x.tolist(),
@@ -121,6 +122,15 @@ class Airspace:
         self._highest = float(self.tops.max())
 
     # Heights.
+
+    def _heights(self) -> Array:
+        """Return the height of the ground at the middle of each cell; of a city some rows at once."""
+        n = round(2 * self.half / _CELL)
+        axis, found = (np.arange(n) + 0.5) * _CELL - self.half, np.empty((n, n))
+        for rows in range(0, n, _ROWS):
+            x, y = np.meshgrid(axis, axis[rows : rows + _ROWS])
+            found[rows : rows + _ROWS] = self.ground(np.stack([x, y], axis=-1))
+        return found
 
     def _window(self, x: float, y: float, reach: float) -> tuple[slice, slice]:
         low = np.floor((np.array([y, x]) - reach + self.half) / _CELL).astype(int)

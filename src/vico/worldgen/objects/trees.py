@@ -295,8 +295,11 @@ def lawn_wishes(
     count = max(int(2 * osm.half // _LAWN_CELL), 1)
     side = 2 * osm.half / count
     found: list[tuple[float, Wish]] = []
+    # Counted through a city, so that its tiles do not all draw alike.
+    first_row, first_column = round(osm.frame.north / side), round(osm.frame.east / side)
     for row, column in np.ndindex(count, count):
-        random = rng(seed, "lawn", row, column)
+        cell = f"lawn.{first_row + row}.{first_column + column}"
+        random = rng(seed, "lawn", first_row + row, first_column + column)
         grows, kind, rank = random.random(3).tolist()
         xy = np.array([column, row]) * side - osm.half + random.uniform(0.15, 0.85, 2) * side
         if grows > _LAWN_GROWN or not shapely.contains_xy(lawns, *xy):
@@ -305,12 +308,11 @@ def lawn_wishes(
         near = tracks.query(point, predicate="dwithin", distance=_BESIDE_RAILS)
         if len(near) or len(taken.query(point, predicate="intersects")) or shapely.dwithin(openings, point, 0.8):
             continue
-        key = f"lawn.{row}.{column}"
         if kind < _LAWN_SHRUBS:
             name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
-            wish = Wish(key, name, xy, None, float(random.uniform(0.8, 1.2)))
+            wish = Wish(cell, name, xy, None, float(random.uniform(0.8, 1.2)))
         else:
-            wish = tree_wish(key, {}, xy, seed, zone)
+            wish = tree_wish(cell, {}, xy, seed, zone)
         wish.reach = 0.0
         found.append((rank, wish))
     limit = sorted(rank for rank, _ in found)[_MOST] if len(found) > _MOST else 1.0
