@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
@@ -68,7 +68,7 @@ def in_order(task: Callable[[T], R], items: Iterable[T], *, most: int = _MOST) -
         What `task` returned. What it raises is raised here, after the tasks under way are done.
     """
     many = min(workers(), most)
-    if many == 1:
+    if many == 1 or (isinstance(items, Sized) and len(items) == 1):
         yield from map(task, items)
         return
     with ThreadPoolExecutor(many) as pool:

@@ -161,7 +161,7 @@ def skin(
     )
     # Each thread some of the bodies, which is the same as one thread all of them.
     rows = np.arange(len(batch)) if drawn is None else np.asarray(drawn, np.int64)
-    bounds = np.linspace(0, len(rows), min(_PARTS, max(len(rows), 1)) + 1).astype(np.int64)
+    bounds = np.linspace(0, len(rows), min(_PARTS, max(len(rows) // _LEAST, 1)) + 1).astype(np.int64)
     capsules = _NO_LIMBS if limbs is None else limbs
     for_each(
         lambda k: _skin(bodies, poses, PARENTS, rows[bounds[k] : bounds[k + 1]], (vertices, normals, capsules)),
@@ -238,8 +238,8 @@ class _Poses(NamedTuple):
     yaws: NDArray[np.float64]
 
 
-# Bodies are shared out among threads in so many parts.
-_PARTS = 4
+# Bodies are shared out among threads in so many parts, of so many at least.
+_PARTS, _LEAST = 4, 4
 _NO_LIMBS = np.zeros((0, len(LIMBS), 7), np.float32)
 
 _HEAD_JOINT = J["head"]

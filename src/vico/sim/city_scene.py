@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from vico.render import Cameras, Scene, render
 from vico.render.palette import Palette
 from vico.sim.observations import Views
+from vico.sim.on_the_move import Moving
 from vico.sim.scene import RenderedSimulation, SceneRenderer
 from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
@@ -119,7 +120,7 @@ class CityRenderer:
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Begin to render one view for each pose; see `ObservationRenderer.render`."""
         parts: list[tuple[NDArray[np.int64], Views]] = []
-        place = self.neighbourhoods(poses[:, :3])
+        place, moving = self.neighbourhoods(poses[:, :3]), Moving(state, self._city.height)
         for where in dict.fromkeys(place):
             members = np.array([k for k, one in enumerate(place) if one == where], np.int64)
             scene = self._scene(where)
@@ -127,7 +128,7 @@ class CityRenderer:
                 if self._looked.get(entity, where) != where:
                     scene.forget(entity)
                 self._looked[entity] = where
-            parts.append((members, scene.render(state, poses[members], own[members])))
+            parts.append((members, scene.render(state, poses[members], own[members], moving=moving)))
         return _joined(parts, len(poses))
 
     def show(self, state: SimulationState, eye: NDArray[np.float64]) -> Scene:

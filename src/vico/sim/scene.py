@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,6 @@ from vico.render.world_scene import scene_of
 from vico.rules import STAIRS_SPEED
 from vico.sim.animation import (
     LONGEST_BLEND,
-    Hands,
-    Transition,
     ground_under_feet,
     joint_places,
     pose,
@@ -35,16 +33,15 @@ from vico.sim.drawn_doors import DrawnDoors
 from vico.sim.drawn_people import Cast, DrawnPeople
 from vico.sim.environment import Environment
 from vico.sim.eyes import SemanticClasses, lenses_by_entity
-from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_of_pedestrians
+from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_pedestrians
 from vico.sim.observations import Views
+from vico.sim.on_the_move import Motion, Moving, joined_motion
 from vico.sim.passers_by import pedestrian_motion
 from vico.sim.room_lamps import RoomLamps
 from vico.sim.rooms_in_sight import RoomsInSight
 from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import Posture, Vehicle
 from vico.sim.window_lights import WindowLights
-from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.world import World
 
@@ -57,54 +54,6 @@ _ICE_SHINES = 0.6  # as much as wet ground does
 # there who have none; and of how many too many bodies it is worth to choose anew.
 _BESIDE, _SOON, _SPARE_BODIES = 2.0, 40.0, 100
 _OVERCAST = 0.45  # share of the daylight in rooms that a sky full of clouds takes
-
-
-class _Motion(NamedTuple):
-    """How people move, one row a person.
-
-    Attributes
-    ----------
-    clip
-        Motion numbers (`clip_index`), int64.
-    phase
-        Place in the cycle, 0..1 and on, float64.
-    speed
-        That its strides are those of, metres a second, float64.
-    after
-        What they did before.
-    position
-        Feet, ENU metres, float64, shape ``(n, 3)``.
-    yaw
-        Radians, counter-clockwise from east, float64.
-    on_ground
-        Whether they stand in the street, not on a floor or a vehicle, bool.
-    room
-        Where they are, int32; -1 for outdoors and vehicles.
-    rise, rise_before
-        How far whoever sits is, or was before, above the height at which their feet would rest on the floor, metres,
-        float64; 0 for others.
-    hands
-        What they hold.
-    """
-
-    clip: NDArray[np.int64]
-    phase: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    after: Transition
-    position: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    on_ground: NDArray[np.bool_]
-    room: NDArray[np.int32]
-    rise: NDArray[np.float64]
-    rise_before: NDArray[np.float64]
-    hands: Hands
-
-    def of(self, rows: NDArray[np.int64]) -> _Motion:
-        """Return how some of them move."""
-        after = Transition._make(None if part is None else part[rows] for part in self.after)
-        hands = Hands._make(part[rows] for part in self.hands)
-        plain = {name: getattr(self, name)[rows] for name in self._fields if name not in ("after", "hands")}
-        return _Motion(after=after, hands=hands, **plain)
 
 
 class RenderedSimulation(Cast, Protocol):
@@ -185,12 +134,23 @@ class SceneRenderer:
         self._people = DrawnPeople(sim, detail=self._detail, far=far, everybody=part is None)
         self._rooms_in_sight = None if part is None else RoomsInSight(sim.state.indoor, part)
 
-    def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
-        """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
+    def render(
+        self,
+        state: SimulationState,
+        poses: NDArray[np.float64],
+        own: NDArray[np.int32],
+        *,
+        moving: Moving | None = None,
+    ) -> Views:
+        """Begin to render one view for each pose in one call; see `ObservationRenderer.render`.
+
+        `moving` is what moves in the state, where scenes share it.
+        """
         self.wait()
         self._set_light(state)
         lenses = [self._lenses.get(entity, self._usual_lens) for entity in own.tolist()]
-        self._set_moving(state, Sights(poses[:, :3], np.array([lens.intrinsics[1, 1] for lens in lenses])))
+        sights = Sights(poses[:, :3], np.array([lens.intrinsics[1, 1] for lens in lenses]))
+        self._set_moving(moving or self._moving(state), sights)
         taken = self._viewers.take(poses, own, lenses, second=state.second)
         self._pictures = taken
         extrinsics = Cameras(poses[:, :3], poses[:, 3:]).extrinsics
@@ -223,7 +183,7 @@ class SceneRenderer:
         """Put light and everything that moves where they are in a state; return the scene, for cameras of one's own."""
         self.wait()
         self._set_light(state)
-        self._set_moving(state)
+        self._set_moving(self._moving(state))
         return self._scene
 
     def render_cameras(self, state: SimulationState, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
@@ -257,15 +217,19 @@ class SceneRenderer:
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
         self._window_lights.set(self._scene, state)
 
-    def _set_moving(self, state: SimulationState, sights: Sights | None = None) -> None:
+    def _moving(self, state: SimulationState) -> Moving:
+        return Moving(state, self._sim.world.height)
+
+    def _set_moving(self, now: Moving, sights: Sights | None = None) -> None:
         """Put everything that moves where it is now; people in less detail who are far from all that look at them."""
+        state = now.state
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
             self._scene, self._lit = self._made(self._sim), ()
             self._viewers.scene = self._scene
             self._set_light(state)
         self._people.follow(state)
-        motion = self._motion(state, None if sights is None else sights.eyes)
+        motion = self._motion(now, None if sights is None else sights.eyes)
         people, bodies = len(motion.clip), self._people.batch
         here = np.ones(people, np.bool_) if self._part is None else self._part.holds(motion.position)
         far = np.zeros(people, np.bool_)
@@ -277,10 +241,7 @@ class SceneRenderer:
         vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw, drawn=drawn, limbs=limbs)
         shape = bodies.triangles, bodies.colour, bodies.entity
         self._scene.set_skinned(vertices, normals, *shape, drawn=drawn, limbs=limbs)
-        moving = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
-        if len(state.things):
-            moving.append(state.things.draw())
-        moving += draw_in_hands(state, self._holders(motion, rotations, offsets))
+        moving = [*now.shapes, *draw_in_hands(state, self._holders(motion, rotations, offsets))]
         if self._part is not None:
             moving = [self._part.drawn(shapes) for shapes in moving]
         doors = self._doors.draw(state) if len(state.leaves) else None
@@ -294,17 +255,19 @@ class SceneRenderer:
         )
         self._scene.set_openings(NO_OPENINGS if doors is None else doors.openings)
 
-    def _motion(self, state: SimulationState, eyes: NDArray[np.float64] | None = None) -> _Motion:
+    def _motion(self, now: Moving, eyes: NDArray[np.float64] | None = None) -> Motion:
         """Return how everybody on legs moves who has a body here.
 
         In parts of a city, give bodies to those who are there; where all that look are known, only to who may be seen.
         """
         if self._rooms_in_sight is not None:
-            self._choose_bodies(state, self._rooms_in_sight, eyes)
-        motion = _motion_of_agents(state, self._sim.world.height)
-        if state.traffic is not None:
-            motion = _joined_motion(motion, self._motion_of_pedestrians(state))
-        return motion if self._part is None else motion.of(self._people.rows)
+            self._choose_bodies(now.state, self._rooms_in_sight, eyes)
+        walkers = None if now.state.traffic is None else self._motion_of_pedestrians(now.state)
+        if self._part is None:
+            return now.agents if walkers is None else joined_motion(now.agents, walkers)
+        rows, agents = self._people.rows, len(now.state.people)
+        residents = now.agents.of(rows[rows < agents])
+        return residents if walkers is None else joined_motion(residents, walkers.of(rows[rows >= agents] - agents))
 
     def _choose_bodies(self, state: SimulationState, rooms: RoomsInSight, eyes: NDArray[np.float64] | None) -> None:
         """Give bodies to all within a part, and to those who may come there soon: choosing anew takes a while."""
@@ -323,7 +286,7 @@ class SceneRenderer:
             shown[had] = True
             self._people.choose(np.flatnonzero(part.holds(position, _SOON) & shown))
 
-    def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
+    def _holders(self, motion: Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
         place = motion.position, motion.yaw, motion.clip, motion.phase, motion.hands
         people, rows = self._people, self._people.rows
         joints = people.batch.joints[: len(rows)]
@@ -346,17 +309,17 @@ class SceneRenderer:
 
     def holders(self, state: SimulationState) -> Holders:
         """Return everybody as they are posed, with what their hands hold."""
-        motion = self._motion(state)
+        motion = self._motion(self._moving(state))
         return self._holders(motion, *self._poses(motion, state.second))
 
-    def motions(self, state: SimulationState) -> tuple[_Motion, NDArray[np.float64]]:
+    def motions(self, state: SimulationState) -> tuple[Motion, NDArray[np.float64]]:
         """Return how everybody moves, and where their joints are, body frame, metres, shape ``(n, 55, 3)``."""
-        motion = self._motion(state)
+        motion = self._motion(self._moving(state))
         rotations, offsets = self._poses(motion, state.second)
         return motion, joint_places(self._people.batch.joints[: len(motion.clip)], rotations, offsets)
 
     def _poses(
-        self, motion: _Motion, second: float, *, roughly: NDArray[np.bool_] | None = None
+        self, motion: Motion, second: float, *, roughly: NDArray[np.bool_] | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return everybody's joint rotations and pelvis shifts, their feet on the ground as it is under each."""
         after = motion.after
@@ -373,7 +336,7 @@ class SceneRenderer:
 
     def _ground(
         self,
-        motion: _Motion,
+        motion: Motion,
         course: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
         rise: NDArray[np.float64],
         roughly: NDArray[np.bool_] | None,
@@ -392,7 +355,7 @@ class SceneRenderer:
         ground[~motion.on_ground, :, :, 0] -= np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]
         return ground
 
-    def _motion_of_pedestrians(self, state: SimulationState) -> _Motion:
+    def _motion_of_pedestrians(self, state: SimulationState) -> Motion:
         """Return how the pedestrians of the traffic move."""
         assert state.traffic is not None
         walkers = state.traffic.walkers
@@ -404,9 +367,7 @@ class SceneRenderer:
         after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=over_ground)
         placard = state.traffic.gatherings.placards(walkers.position)
         hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain, placard, on_ground)
-        return _Motion(
-            clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands
-        )
+        return Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands)
 
 
 def _lighting(environment: Environment, second: float) -> Lighting:
@@ -433,37 +394,6 @@ def _lighting(environment: Environment, second: float) -> Lighting:
 def _widest(environment: Environment) -> tuple[float, float, float]:
     """Return the largest circle of ground on which the power is cut; a radius of 0 for none."""
     return max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
-
-
-def _motion_of_agents(state: SimulationState, height: HeightField) -> _Motion:
-    """Return how residents and assistants move; who sits in a bus sits as the seat stands, wherever they look."""
-    p = state.people
-    in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
-    yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
-    before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
-    on_stairs = (state.indoor.treads_under(p.room) > 0) | ((p.room < 0) & (height.going_at(p.position) > 0))
-    over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
-    after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
-    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)
-    rise = np.zeros(len(p))
-    sitting = np.flatnonzero(p.seat >= 0)
-    if len(sitting):
-        seat = p.seat[sitting]
-        yaw[sitting] = state.seats.yaw[seat]
-        rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
-    # Who gets up comes down from the seat to the floor.
-    rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
-    place = p.position.copy(), yaw, on_ground, p.room.copy(), rise, rise_before, hands_of_agents(state)
-    return _Motion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
-
-
-def _joined_motion(a: _Motion, b: _Motion) -> _Motion:
-    pairs = {name: (getattr(a.after, name), getattr(b.after, name)) for name in Transition._fields if name != "ground"}
-    after = Transition(**{name: np.concatenate(pair) for name, pair in pairs.items()})
-    hands = Hands(*(np.concatenate(pair) for pair in zip(a.hands, b.hands, strict=True)))
-    plain = [name for name in _Motion._fields if name not in ("after", "hands")]
-    joined = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in plain}
-    return _Motion(after=after, hands=hands, **joined)
 
 
 def _nothing() -> None:

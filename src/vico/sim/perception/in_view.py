@@ -214,8 +214,7 @@ def in_view(
         np.column_stack([looked_at, np.broadcast_to(sight, len(bodies))]),
         np.column_stack([bodies.entity, spaces]).astype(np.int64),
         np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell]),
-        opaque.level,
-        opaque.tops,
+        (opaque.level, opaque.tops),
         keys[by_key],
         by_key,
     )
@@ -226,7 +225,7 @@ def in_view(
 def is_clear(one: NDArray[np.float64], other: NDArray[np.float64], opaque: OpaqueGrid) -> bool:
     """Return whether no building stands between two points outdoors, ENU metres, shape ``(3,)`` each."""
     away = math.hypot(other[0] - one[0], other[1] - one[1])
-    return bool(_is_clear(one, other, away, _FREE_END, opaque.half, opaque.cell, opaque.level, opaque.tops))
+    return bool(_is_clear(one, other, away, _FREE_END, opaque.half, opaque.cell, (opaque.level, opaque.tops)))
 
 
 def _keys(points: NDArray[np.float64], spaces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -242,7 +241,7 @@ def _cell_key(column, row):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _pairs(eyes, mine, targets, theirs, limits, level, tops, keys, order):  # type: ignore[no-untyped-def]
+def _pairs(eyes, mine, targets, theirs, limits, heights, keys, order):  # type: ignore[no-untyped-def]
     """Return who has what in view, and how far away it is; indices of agents and bodies, metres.
 
     `eyes` holds position and gaze (a unit vector over the ground), `mine` and `theirs` entity and space; `keys` are the
@@ -261,7 +260,7 @@ def _pairs(eyes, mine, targets, theirs, limits, level, tops, keys, order):  # ty
                     j = order[at]
                     if theirs[j, 0] == mine[i, 0]:
                         continue
-                    away = _distance_in_view(eyes[i], targets[j], outdoors, limits, level, tops)
+                    away = _distance_in_view(eyes[i], targets[j], outdoors, limits, heights)
                     if away >= 0.0:
                         who.append(i)
                         what.append(j)
@@ -270,21 +269,22 @@ def _pairs(eyes, mine, targets, theirs, limits, level, tops, keys, order):  # ty
 
 
 @compiled
-def _distance_in_view(eye, target, outdoors, limits, level, tops):  # type: ignore[no-untyped-def]
+def _distance_in_view(eye, target, outdoors, limits, heights):  # type: ignore[no-untyped-def]
     """Return how far away a point in the same space is, metres; -1 if it is out of view."""
     farthest, cosine, free_end, half, cell = limits
     dx, dy = target[0] - eye[0], target[1] - eye[1]
     away = math.sqrt(dx * dx + dy * dy)
     if away > (target[3] if outdoors else farthest) or dx * eye[3] + dy * eye[4] < cosine * away:
         return -1.0
-    if outdoors and not _is_clear(eye, target, away, free_end, half, cell, level, tops):
+    if outdoors and not _is_clear(eye, target, away, free_end, half, cell, heights):
         return -1.0
     return away
 
 
 @compiled
-def _is_clear(eye, target, away, free_end, half, cell, level, tops):  # type: ignore[no-untyped-def]
+def _is_clear(eye, target, away, free_end, half, cell, heights):  # type: ignore[no-untyped-def]
     """Return whether no building stands as high as the line between two points, looked at every half cell."""
+    level, tops = heights
     n = level.shape[0]
     steps = int(away / (0.5 * cell))
     for k in range(1, steps):

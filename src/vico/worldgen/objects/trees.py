@@ -295,11 +295,12 @@ def lawn_wishes(
     count = max(int(2 * osm.half // _LAWN_CELL), 1)
     side = 2 * osm.half / count
     found: list[tuple[float, Wish]] = []
-    # Counted through a city, so that its tiles do not all draw alike.
-    first_row, first_column = round(osm.frame.north / side), round(osm.frame.east / side)
+    # Tiles of a city do not all draw alike.
+    aside, up = (round(way / (2 * osm.half)) for way in (osm.frame.east, osm.frame.north))
+    tile = f".{aside}.{up}" if aside or up else ""
     for row, column in np.ndindex(count, count):
-        cell = f"lawn.{first_row + row}.{first_column + column}"
-        random = rng(seed, "lawn", first_row + row, first_column + column)
+        cell = f"lawn{tile}.{row}.{column}"
+        random = rng(seed, f"lawn{tile}", row, column)
         grows, kind, rank = random.random(3).tolist()
         xy = np.array([column, row]) * side - osm.half + random.uniform(0.15, 0.85, 2) * side
         if grows > _LAWN_GROWN or not shapely.contains_xy(lawns, *xy):
