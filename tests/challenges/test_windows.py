@@ -101,4 +101,7 @@ def test_the_script_of_the_tables_says_what_it_lacks(tmp_path: Path) -> None:
     assert "there are 1 assistant, advanced, 2 assistants, advanced" in said(
         "--table", "advanced", "--worlds", str(tmp_path), "--block", "3 assistants"
     )
+    assert "--world: nowhere; the list advanced has" in said(
+        "--table", "advanced", "--worlds", str(tmp_path), "--world", "nowhere"
+    )
     assert "no method called 'best'" in said("--table", "assistant", "--worlds", str(tmp_path), "--method", "best")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import io
 import json
@@ -28,6 +29,7 @@ from vico.agents.robot.increments import arm_state
 from vico.challenges.pick_place.episode import play
 from vico.challenges.pick_place.task import draw_task
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
+from vico.io.files import read_json, sha256_of
 from vico.io.plain_data import decode, encode
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
@@ -36,6 +38,7 @@ needs_torch = pytest.mark.skipif(not HAS_TORCH, reason="needs pip install 'virtu
 pytestmark = pytest.mark.filterwarnings("ignore")
 SMALL = ChunkShape(side=32, chunk=4, words=8, vocabulary=16, width=32, heads=2, encoders=1, decoders=1)
 ARM = slice(0, 9)
+KEPT = Path(__file__).parents[3] / "benchmarks" / "policies" / "chunk_small"
 
 
 class Counting:
@@ -194,3 +197,22 @@ def test_weights_of_the_wrong_shape_are_refused(tmp_path: Path) -> None:
 def test_without_torch_it_is_said_what_to_type() -> None:
     with pytest.raises(MissingExtraError, match=r"pip install 'virtual-community\[imitation\]'"):
         new_network(SMALL)
+
+
+def test_the_kept_policy_is_what_its_record_says() -> None:
+    about = read_json(KEPT / "policy.json")
+    assert about["sha256"] == sha256_of(KEPT / "policy.npz")
+    assert about["dataset"] == sha256_of(KEPT / "dataset.json")
+    with (KEPT / "curve.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert int(rows[-1]["step"]) == about["steps"]
+    assert float(rows[-1]["validation_loss"]) == about["validation_loss"]
+
+
+@needs_torch
+def test_the_kept_policy_acts() -> None:
+    policy = ChunkPolicy.read(KEPT / "policy.npz")
+    state = arm_state(observation())
+    chunk = policy.chunk(np.zeros((96, 96, 3), np.uint8), state, "Pick up the red toolbox and put it on the table.")
+    assert chunk.shape == (20, 11)
+    assert np.isfinite(chunk).all()
