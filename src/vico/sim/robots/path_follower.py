@@ -25,6 +25,9 @@ from vico.sim.robots.navigation import (
 #: Seconds a robot waits for somebody who stands still before it goes round, and tries to move before it backs off.
 _PATIENCE, _STUCK = 4.0, 2.5
 _BACK_TIME, _BACK_SPEED = 1.5, 0.25
+# Who tries to move and gets less far in that time, metres and radians, is stuck: at a kerb wheels slip and the base
+# rocks, so that its speed of a moment says nothing.
+_FURTHER, _TURNED = 0.1, 0.075
 #: Metres free ahead of who waits below which it makes room for who stands there.
 _CLOSE = 0.25
 #: Detours without getting 5 m further after which it gives up.
@@ -74,6 +77,7 @@ class PathFollower:
         """Start on a path."""
         self.path = np.ascontiguousarray(path)
         self.along = self.waiting = self.stuck = self.backing = self.marked = 0.0
+        self._from = 0.0, 0.0, 0.0  # where and how turned it was when `stuck` began to count
         self.detours = 0
         self.status = RobotStatus.MOVING
         self.wants_detour = False
@@ -122,13 +126,19 @@ class PathFollower:
             self._wait(who, others, dt)
             return self._make_room(base, others)
         self.status, self.waiting = RobotStatus.MOVING, 0.0
-        held = (wanted[0] > 0.15 and speed < 0.04) or (
-            wanted[0] == 0.0 and abs(float(base.angular_velocity_body[2])) < 0.03
-        )
-        self.stuck = self.stuck + dt if held else 0.0
+        self._try((x, y, base.yaw), dt if wanted[0] > 0.15 or wanted[0] == 0.0 else 0.0)
+        return wanted
+
+    def _try(self, pose: tuple[float, float, float], dt: float) -> None:
+        """Count for how long it has tried to move and got nowhere; back off after a while. 0: it does not try."""
+        x, y, yaw = self._from
+        turned = abs(math.remainder(pose[2] - yaw, math.tau))
+        if dt == 0.0 or self.stuck == 0.0 or math.hypot(pose[0] - x, pose[1] - y) > _FURTHER or turned > _TURNED:
+            self._from, self.stuck = pose, dt
+            return
+        self.stuck += dt
         if self.stuck > _STUCK:
             self.stuck, self.backing = 0.0, _BACK_TIME
-        return wanted
 
     def _can_turn(self, x: float, y: float, others: NDArray[np.void]) -> bool:
         radius = float(np.hypot(self._model.half_length, self._model.half_width)) + 0.08
@@ -195,11 +205,13 @@ class PathFollower:
             self.marked,
             float(self.detours),
             float(self.status),
+            *self._from,
         ]
 
     def restore(self, path: NDArray[np.float64], numbers: NDArray[np.float64]) -> None:
         """Go back to what `path` and `numbers` held."""
         self.path = np.ascontiguousarray(path, np.float64)
-        self.along, self.waiting, self.stuck, self.backing, self.marked, detours, status = numbers.tolist()
+        self.along, self.waiting, self.stuck, self.backing, self.marked, detours, status, x, y, yaw = numbers.tolist()
+        self._from = x, y, yaw
         self.detours, self.status = int(detours), RobotStatus(int(status))
         self.wants_detour = False
