@@ -180,6 +180,14 @@ def test_a_map_is_read_again_where_it_or_a_part_of_it_is_not_what_it_was(
     divide_map(planned)
 
 
+def test_a_map_is_divided_anew_for_tiles_of_another_size(tmp_path: Path) -> None:
+    keys = {
+        city_map.RegionMap(CityRequest(Sources(EXTRACT), *CENTRE, grid, 0, tmp_path)).key
+        for grid in (TileGrid(480.0, (0, 0), (0, 0)), TileGrid(160.0, (-1, -1), (1, 1)))
+    }
+    assert len(keys) == 2  # of the same square
+
+
 def test_streets_of_a_city_end_where_its_tiles_do(planned: CityRequest) -> None:
     data = divide_map(planned).of_city
     assert (data.half, data.box) == (PAIR.half, (-80.0, -80.0, 240.0, 80.0))

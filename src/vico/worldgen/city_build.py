@@ -192,11 +192,13 @@ def build_city(
 
 def _walking(request: CityRequest, maps: Mapping[Tile, Path]) -> None:
     """Write the walkable map of the city, if those of its tiles are not what they were."""
-    known, files = (
-        request.plans / "walking.json",
-        [request.out / WHOLE / name for name in (SURFACES, ROOM, REACHED, COST)],
-    )
-    made_of = [code_digest(), *(f"{tile_name(tile)} {sha256_of(path)}" for tile, path in maps.items())]
+    known = request.plans / "walking.json"
+    files = [request.out / WHOLE / name for name in (SURFACES, ROOM, REACHED, COST)]
+    made_of = [
+        code_digest(),
+        str(request.grid.edges),
+        *(f"{tile_name(tile)} {sha256_of(path)}" for tile, path in maps.items()),
+    ]
     key = {"key": sha256("\n".join(made_of).encode()).hexdigest()}
     if not (known.exists() and read_json(known) == key and all(path.exists() for path in files)):
         known.unlink(missing_ok=True)

@@ -30,7 +30,8 @@ class RegionMap:
     def __init__(self, request: CityRequest) -> None:
         self._path, self._grid = checked_extract(request.sources.osm), request.grid
         self._frame, self._reach = LocalFrame(request.lat, request.lon), request.grid.half + HALO
-        made_of = [code_digest(), sha256_of(self._path), str(self._frame), str(self._reach), str(self._grid.edges)]
+        where = f"{self._frame} {self._reach} {self._grid.edges} in tiles of {self._grid.size}"
+        made_of = [code_digest(), sha256_of(self._path), where]
         self.key = sha256("\n".join(made_of).encode()).hexdigest()
 
     @cached_property
