@@ -24,8 +24,10 @@ from vico.world.world import World
 
 #: What carries: the manipulator's jaw, or the carrier's deck.
 SORTS = ("in the jaw", "on the deck")
-#: A walk over a kerb is so long; a kerb is so high at least, metres; so much ground is free on either side.
-LENGTH, KERB, FREE = 5.0, 0.07, 0.9
+#: Who carries it.
+CARRIERS = ("manipulator", "husky")
+#: A drive over a kerb is so long; a kerb is so high at least, metres; so much ground is free on either side.
+LENGTH, KERB, FREE = 5.0, 0.02, 0.9
 #: How fast one drives and turns, m/s and rad/s; what shifts by more on a deck, or sinks so far in a jaw, was lost.
 SPEED, TURN, LOST = 0.6, 0.7, 0.3
 # A thing is let go of so high above a deck, and lies there if it is no farther off its spot then, metres.
@@ -72,9 +74,10 @@ class Driven:
     kerbs: int = 0
 
 
-def kerbs(world: World, count: int, *, seed: int) -> list[Kerb]:
-    """Return straight drives over one kerb, up or down, with free ground all along."""
-    chance, found = rng(seed, "grasps", "kerbs"), []
+def kerbs(world: World, sort: int, count: int, *, seed: int) -> list[Kerb]:
+    """Return straight drives over one kerb, up or down, with free ground all along: kerbs that ways lead over."""
+    highest = robot_model(CARRIERS[sort]).kerb or math.inf
+    chance, found = rng(seed, "grasps", "kerbs", sort), []
     along = np.linspace(0.0, LENGTH, 51)
     for _ in range(_TRIES):
         if len(found) == count:
@@ -86,9 +89,10 @@ def kerbs(world: World, count: int, *, seed: int) -> list[Kerb]:
             continue
         rises = np.diff(world.height(line))
         k = int(np.argmax(np.abs(rises)))
-        rise = float(rises[max(k - 2, 0) : k + 3].sum())
+        # Beyond what the ground rises anyway.
+        rise = float((rises[max(k - 2, 0) : k + 3] - np.median(rises)).sum())
         elsewhere = np.delete(rises, slice(max(k - 2, 0), k + 3))
-        if abs(rise) > KERB and np.abs(elsewhere).max() < 0.02 and 1.8 < along[k] < 3.8:
+        if KERB < abs(rise) < highest and np.abs(elsewhere).max() < 0.02 and 1.8 < along[k] < 3.8:
             found.append(Kerb(start, yaw, rise))
     return found
 
@@ -143,7 +147,7 @@ class _Run:
             cars=0,
             pedestrians=0,
             cyclists=0,
-            robots=("manipulator" if held else "husky",),
+            robots=(CARRIERS[SORTS.index(sort)],),
             robot_places={_ROBOT: (float(kerb.start[0]), float(kerb.start[1]), kerb.yaw)},
             periods={_ROBOT: PERIOD},
             observe=(_ROBOT,) if held else (),

@@ -5,9 +5,9 @@
 
 *Picks*: a manipulator in a level field, its camera, real physics; things of all kinds that fit its jaw, and random
 boxes, in turn, on the ground or on a table 35 to 75 cm high; it is told which thing, and about where. What was picked
-is put down on the ground, on the table, or on the deck of a carrier. *Drives*, in a WORLD: over a kerb of 7 cm or more,
-turned about, and back, with a thing in the jaw or lying on the carrier's deck. Trials are kept in --out as they are
-done: the same command goes on after a kill, and counts what is there.
+is put down on the ground, on the table, or on the deck of a carrier. *Drives*, in a WORLD: over a kerb such as the
+robots' ways lead over, turned about, and back, with a thing in the jaw or lying on the carrier's deck. Trials are kept
+in --out as they are done: the same command goes on after a kill, and counts what is there.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from grasp_drives import drive, kerbs
+from grasp_drives import SORTS, drive, kerbs
 from grasp_trials import trial
 from reporting import machine, publish
 
 from vico.api import read_world
 
 #: Things that are picked, and drives of each sort, in a whole run and in a reduced one.
-WHOLE, REDUCED = (200, 50), (24, 4)
+WHOLE, REDUCED = (200, 100), (24, 4)
 Row = dict[str, Any]
 
 
@@ -58,11 +58,11 @@ def main() -> None:
     if options.world is not None:
         world = read_world(options.world)
         where = world.manifest.name
-        spots = kerbs(world, max(drives, 1), seed=seed)
+        spots = [kerbs(world, sort, max(drives, 1), seed=seed) for sort in range(len(SORTS))]
         driven = _done(
             options.out / f"drives_{seed}.jsonl",
-            0 if options.report else min(2 * drives, 2 * len(spots)),
-            lambda k: asdict(drive(world, spots[k // 2], k, seed=seed)),
+            0 if options.report else min(2 * drives, *(2 * len(found) for found in spots)),
+            lambda k: asdict(drive(world, spots[k % 2][k // 2], k, seed=seed)),
         )
     publish([*_head(here, seed), *_picks(picked), *_places(picked), *_drives(driven, where)], options.table)
 
@@ -164,8 +164,9 @@ def _drives(rows: Sequence[Row], world: str) -> list[str]:
         )
     missing = len(rows) - len(done)
     return [
-        *lines, "", f"World: {world}. A drive: 5 m over a kerb of 7 cm or more at 0.6 m/s, half a turn at "
-        f"0.7 rad/s, and back. What is slender is not put on a deck. Not begun, for nothing was in the jaw or on the "
+        *lines, "", f"World: {world}. A drive: 5 m over a kerb of 2 cm or more at 0.6 m/s, half a turn at "
+        f"0.7 rad/s, and back; kerbs that ways lead over: of 6 cm at most with the manipulator, of any height with "
+        f"the carrier. What is slender is not put on a deck. Not begun, for nothing was in the jaw or on the "
         f"deck: {missing}.", "",
     ]  # fmt: skip
 

@@ -47,5 +47,24 @@ def test_who_rocks_against_a_kerb_backs_off_as_who_stands_before_a_wall(rocks: f
     assert again.numbers() == one.numbers()
 
 
+def seconds_of_turning_until_it_backs_off(*, most: float) -> float:
+    """Turn in place at 0.4 rad/s for 20 seconds: to and fro by `most` radians; the way leads straight on."""
+    one, yaw, speed = follower(), 0.0, 0.4
+    for step in range(200):
+        yaw += speed * DT
+        speed = -speed if abs(yaw) > most else speed
+        if one.steer(base(0.0, yaw, 0.0), NOBODY, DT)[0] < 0.0:
+            return step * DT
+    return math.inf
+
+
+def test_who_turns_to_and_fro_before_a_kerb_backs_off() -> None:
+    assert 2.0 < seconds_of_turning_until_it_backs_off(most=0.3) < 6.0
+
+
+def test_who_turns_about_does_not_before_it_is_round() -> None:
+    assert math.pi / 0.4 < seconds_of_turning_until_it_backs_off(most=math.inf)
+
+
 def test_who_goes_on_slowly_does_not() -> None:
     assert seconds_until_it_backs_off(follower(), rocks=0.02, goes=0.1) == math.inf

@@ -184,6 +184,7 @@ def test_regions_are_told_apart() -> None:
         (48.86, 2.35): "french", (47.49, 11.1): "alpine", (42.51, 1.52): "pyrenean", (40.42, -3.7): "spanish",
         (38.71, -9.14): "portuguese", (41.9, 12.48): "italian", (45.46, 9.19): "italian", (48.14, 11.58): "german",
         (55.75, 37.62): "eastern", (52.23, 21.01): "eastern", (35.68, 139.75): "japanese", (50.94, 6.96): "german",
-        (53.55, 10.0): "german", (-33.87, 151.2): "northern",
+        (53.55, 10.0): "german", (-33.87, 151.2): "northern", (48.41, 15.6): "danubian", (48.21, 16.37): "danubian",
+        (47.8, 13.04): "danubian", (47.27, 11.39): "alpine", (48.14, 17.11): "danubian",
     }  # fmt: skip
     assert {at: region_of(*at) for at in places} == places

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from vico.worldgen.facts.streets import Crossing, Street, StreetPolygons
 from vico.worldgen.ground.crossing_paint import crossing_paint
 from vico.worldgen.ground.markings import Quads, road_markings
 from vico.worldgen.ground.pavings import LOOKS, look_of
+from vico.worldgen.ground.strokes import cut_to
 from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.wires import CONTACT, contact_wires
@@ -97,6 +100,42 @@ def test_double_yellow_lines_follow_both_kerbs_of_main_streets_in_britain() -> N
 def test_one_dash_alone_is_not_painted() -> None:
     quads = road_markings(city(street(1, (-3.5, 0.0), (3.5, 0.0))), WINDOW, habits=Markings())
     assert quads == []
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, 0.8, 1.5])
+def test_marks_across_a_border_are_drawn_by_both_tiles_up_to_it(turned: float) -> None:
+    c, s = math.cos(turned), math.sin(turned)
+    bars = [
+        np.array([(-3, y), (3, y), (3, y + 0.5), (-3, y + 0.5)]) @ np.array([[c, s], [-s, c]]) for y in range(-4, 4)
+    ]
+    west, east = cut_to(bars, shapely.box(-50, -50, 0, 50)), cut_to(bars, shapely.box(0, -50, 50, 50))
+    assert west[..., 0].max() == pytest.approx(0.0, abs=1e-9)
+    assert east[..., 0].min() == pytest.approx(0.0, abs=1e-9)
+    shapes = [shapely.Polygon(quad) for quad in (*west, *east)]
+    assert all(shape.exterior.is_ccw for shape in shapes)
+    assert sum(shape.area for shape in shapes) == pytest.approx(8 * 6 * 0.5, rel=1e-3)
+    assert shapely.union_all(shapes).area == pytest.approx(8 * 6 * 0.5, rel=1e-3)
+
+
+def test_no_lanes_are_painted_on_natural_stones() -> None:
+    paved = replace(street(1, (-80.0, 0.0), (80.0, 0.0)), setts=True)
+    assert road_markings(city(paved), WINDOW, habits=Markings()) == []
+
+
+def test_marks_of_crossings_that_lie_over_each_other_are_painted_once() -> None:
+    first = Crossing((0.0, -4.0), (0.0, 4.0), 4.0, painted=True, id="w1")
+    askew = Crossing((-1.5, -4.0), (2.5, 4.0), 4.0, painted=True, id="w2")
+    beside = Crossing((10.0, -4.0), (10.0, 4.0), 4.0, painted=True, id="w3")
+    streets = [street(1, (-80.0, 0.0), (80.0, 0.0), kind="residential", width=8.0)]
+    count = {}
+    for name, crossings in {"one": [first], "over": [first, askew], "beside": [first, beside]}.items():
+        quads = road_markings(city(*streets, crossings=crossings), WINDOW, habits=replace(Markings(), dash=1e3))
+        shapes = [shapely.Polygon(quad) for group in quads for quad in group.corners]
+        count[name] = len(shapes)
+        shared = sum(a.intersection(b).area for k, a in enumerate(shapes) for b in shapes[:k])
+        assert shared < 0.1 * sum(shape.area for shape in shapes)
+    assert count["beside"] == 2 * count["one"]
+    assert count["one"] <= count["over"] < count["beside"]
 
 
 def test_lines_end_where_carriageways_meet_at_a_sharp_angle() -> None:

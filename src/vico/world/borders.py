@@ -27,6 +27,9 @@ ALIKE = 0.4
 NEAR = 0.08
 """The same of any stuff: less than a kerb."""
 
+ABOVE = ("wire", "paint")
+"""Materials of what is not the ground but lies or hangs over it: broken lines begin where each tile's street does."""
+
 _AT_ALL = 0.3  # and where there is nothing nearer
 _MOST_STEP = 1e-3  # metres between heights of both sides
 _LEAST = 0.03  # metres along the border: narrower pieces of ground are slivers between two kinds
@@ -116,10 +119,12 @@ class Profile:
 
 
 def profile_of(surfaces: Sequence[Surface], side: Side) -> Profile:
-    """Return what surfaces draw along a side; upright faces on it are left out."""
+    """Return what surfaces of the ground draw along a side; upright faces on it are left out."""
     found: list[Floats] = []
     stuff: list[str] = []
     for surface in surfaces:
+        if surface.material.name in ABOVE:
+            continue
         edges = edges_on(surface, side)
         if len(edges):
             ends = surface.positions[edges[:, :2]].astype(np.float64)
@@ -166,9 +171,7 @@ def border_findings(city: City, first: tuple[int, int], second: tuple[int, int],
         if step.max() > 0.0:
             found.append(f"{name}: {what} heights differ by {step.max():.4f} m at {along[step.argmax()]:.2f} m")
     sides = Side(axis, half), Side(axis, -half)
-    # Wires hang over the ground, and are no wider than what counts as a sliver.
-    ground = [[one for one in world.surfaces("ground") if one.material.name != "wire"] for world in worlds]
-    drawn = [profile_of(surfaces, side) for surfaces, side in zip(ground, sides, strict=True)]
+    drawn = [profile_of(world.surfaces("ground"), side) for world, side in zip(worlds, sides, strict=True)]
     houses = _houses(city, first, axis)
     for a, b in (drawn, drawn[::-1]):
         found += [f"{name}: {sentence}" for sentence in _unmatched(a, b, houses)]

@@ -25,8 +25,9 @@ from vico.sim.robots.navigation import (
 #: Seconds a robot waits for somebody who stands still before it goes round, and tries to move before it backs off.
 _PATIENCE, _STUCK = 4.0, 2.5
 _BACK_TIME, _BACK_SPEED = 1.5, 0.25
-# Who tries to move and gets less far in that time, metres and radians, is stuck: at a kerb wheels slip and the base
-# rocks, so that its speed of a moment says nothing.
+# Who tries to move and gets less far in that time, metres, or turns less beyond where it has been turned to there,
+# radians, is stuck: at a kerb wheels slip and the base rocks, or turns to and fro, so that its speed of a moment says
+# nothing.
 _FURTHER, _TURNED = 0.1, 0.075
 #: Metres free ahead of who waits below which it makes room for who stands there.
 _CLOSE = 0.25
@@ -77,7 +78,8 @@ class PathFollower:
         """Start on a path."""
         self.path = np.ascontiguousarray(path)
         self.along = self.waiting = self.stuck = self.backing = self.marked = 0.0
-        self._from = 0.0, 0.0, 0.0  # where and how turned it was when `stuck` began to count
+        # Where it was when `stuck` began to count, and how far it has been turned there: to the right, to the left.
+        self._from = 0.0, 0.0, 0.0, 0.0
         self.detours = 0
         self.status = RobotStatus.MOVING
         self.wants_detour = False
@@ -130,11 +132,15 @@ class PathFollower:
         return wanted
 
     def _try(self, pose: tuple[float, float, float], dt: float) -> None:
-        """Count for how long it has tried to move and got nowhere; back off after a while. 0: it does not try."""
-        x, y, yaw = self._from
-        turned = abs(math.remainder(pose[2] - yaw, math.tau))
-        if dt == 0.0 or self.stuck == 0.0 or math.hypot(pose[0] - x, pose[1] - y) > _FURTHER or turned > _TURNED:
-            self._from, self.stuck = pose, dt
+        """Count for how long it has tried to move and got nowhere; back off after a while. 0: it hardly tries."""
+        x, y, right, left = self._from
+        if self.stuck == 0.0 or math.hypot(pose[0] - x, pose[1] - y) > _FURTHER:
+            self._from, self.stuck = (pose[0], pose[1], pose[2], pose[2]), dt
+            return
+        middle = 0.5 * (right + left)
+        yaw = middle + math.remainder(pose[2] - middle, math.tau)
+        if yaw < right - _TURNED or yaw > left + _TURNED:
+            self._from, self.stuck = (x, y, min(right, yaw), max(left, yaw)), dt
             return
         self.stuck += dt
         if self.stuck > _STUCK:
@@ -211,7 +217,8 @@ class PathFollower:
     def restore(self, path: NDArray[np.float64], numbers: NDArray[np.float64]) -> None:
         """Go back to what `path` and `numbers` held."""
         self.path = np.ascontiguousarray(path, np.float64)
-        self.along, self.waiting, self.stuck, self.backing, self.marked, detours, status, x, y, yaw = numbers.tolist()
-        self._from = x, y, yaw
+        self.along, self.waiting, self.stuck, self.backing, self.marked, detours, status, *place = numbers.tolist()
+        x, y, right, left = place
+        self._from = x, y, right, left
         self.detours, self.status = int(detours), RobotStatus(int(status))
         self.wants_detour = False

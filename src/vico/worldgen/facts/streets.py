@@ -92,6 +92,8 @@ class Street:
         Widths of the parking lanes at the kerbs, metres; `slanted` if cars stand across the street in them.
     tracks
         Whether trams run in it.
+    setts
+        Whether it is paved with natural stones, on which no lanes are painted.
     """
 
     way: int
@@ -107,6 +109,7 @@ class Street:
     parking_right: float = 0.0
     slanted: bool = False
     tracks: bool = False
+    setts: bool = False
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from vico.worldgen.facts.expendable import NamedShape, expendable, widened
 from vico.worldgen.facts.street_habits import Markings
 from vico.worldgen.facts.streets import LANE_WIDTH, Crossing, Street, StreetPolygons
 from vico.worldgen.ground.crossing_paint import crossing_paint
-from vico.worldgen.ground.strokes import broken, divided, ribbon
+from vico.worldgen.ground.strokes import broken, cut_to, divided, ribbon
 
 _LEAST_SOLID = 6.0  # metres of a solid line between two junctions that are worth painting
 _GAUGE = 1.435
@@ -31,6 +31,7 @@ _STEEL, _GROOVE, _SLEEPERS = (134, 131, 127), (46, 45, 44), (84, 77, 70)
 # Metres: breadth of a rail's head and of the groove beside it; between sleepers; a sleeper along and across the track.
 _HEAD, _GROOVE_WIDTH, _SLEEPER_GAP, _SLEEPER = 0.075, 0.05, 0.65, (0.26, 2.5)
 _LINED = {"motorway", "trunk", "primary", "secondary", "tertiary"}
+_OVERPAINTED = 0.2  # share of a mark that lies on another crossing, above which it is left out
 _AT_KERB = 0.8  # metres from a kerb within which lines follow it
 _USUAL = Markings()
 
@@ -65,7 +66,7 @@ def road_markings(
     streets
         The streets.
     window
-        What to keep within.
+        The square to keep within: marks end at its sides.
     habits
         How lines are painted where the place lies.
     tracks
@@ -77,11 +78,7 @@ def road_markings(
     stepped
         Stairs built of real steps, which need no painted ones.
     """
-    zebra: list[NDArray[np.float64]] = []
-    for crossing in streets.crossings:
-        if crossing.painted:
-            with expendable(crossing.id):
-                zebra += crossing_paint(crossing)
+    zebra = _crossing_marks(streets.crossings)
     zebra += _stop_lines(streets, left_driving, habits.stop)
     shapely.prepare(streets.carriageway)
     breaks = junction_zones(streets)
@@ -109,17 +106,37 @@ def road_markings(
         with expendable(_placed("car park", shape)):
             bays += _car_park(shape)
     groups = [
-        Quads(_within(lanes if habits.cycle_lane else [], window), habits.cycle_lane or _PAINT, rank=0),
-        Quads(_within(zebra + dashes + edges, window), _PAINT),
-        Quads(_within(yellow, window), _YELLOW),
-        Quads(_within(sleepers, window), _SLEEPERS, low=False, rank=0),
-        Quads(_within(bare, window), _STEEL, low=False),
-        Quads(_within(grooves, window), _GROOVE),
-        Quads(_within(rails, window), _STEEL, rank=2),
-        Quads(_within(treads, window), (112, 108, 104), low=False),
-        Quads(_within(bays, window), _FADED, low=False),
+        Quads(cut_to(lanes if habits.cycle_lane else [], window), habits.cycle_lane or _PAINT, rank=0),
+        Quads(cut_to(zebra + dashes + edges, window), _PAINT),
+        Quads(cut_to(yellow, window), _YELLOW),
+        Quads(cut_to(sleepers, window), _SLEEPERS, low=False, rank=0),
+        Quads(cut_to(bare, window), _STEEL, low=False),
+        Quads(cut_to(grooves, window), _GROOVE),
+        Quads(cut_to(rails, window), _STEEL, rank=2),
+        Quads(cut_to(treads, window), (112, 108, 104), low=False),
+        Quads(cut_to(bays, window), _FADED, low=False),
     ]
     return [group for group in groups if len(group.corners)]
+
+
+def _crossing_marks(crossings: Sequence[Crossing]) -> list[NDArray[np.float64]]:
+    """Paint crossings; where the strips of two lie over each other, the one that comes later has no mark."""
+    marks: list[NDArray[np.float64]] = []
+    strips: list[BaseGeometry] = []
+    for crossing in crossings:
+        if not crossing.painted:
+            continue
+        with expendable(crossing.id):
+            own, strip = crossing_paint(crossing), crossing.polygon
+            under = [other for other in strips if other.intersects(strip)]
+            if under and own:
+                taken = overlay.union_all(under)
+                shapes = shapely.polygons(own)
+                covered = overlay.common_area(shapes, taken) > _OVERPAINTED * shapely.area(shapes)
+                own = [quad for quad, hidden in zip(own, covered.tolist(), strict=True) if not hidden]
+            marks += own
+            strips.append(strip)
+    return marks
 
 
 def _rails(
@@ -241,15 +258,6 @@ def _kerb_lines(streets: StreetPolygons, breaks: BaseGeometry, longest: float | 
     return found
 
 
-def _within(quads: list[NDArray[np.float64]], window: Polygon) -> NDArray[np.float64]:
-    if not quads:
-        return np.zeros((0, 4, 2))
-    corners = np.stack(quads)
-    west, south, east, north = window.bounds
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    return corners[(low[:, 0] > west) & (high[:, 0] < east) & (low[:, 1] > south) & (high[:, 1] < north)]
-
-
 def _stop_lines(streets: StreetPolygons, left_driving: bool, thick: float) -> list[NDArray[np.float64]]:
     """Lines across the lanes that come to a crossing with signals, or to a painted one of a main street."""
     if not streets.streets:
@@ -341,7 +349,7 @@ def _lane_lines(street: Street) -> list[tuple[float, bool]]:
     """Offsets of a street's lines from its centre line (left positive), and whether opposite traffic passes there."""
     if street.kind not in _LINED and not (street.lanes >= 2 and street.oneway) and street.width < 6.4:
         return []
-    if street.kind in ("service", "living_street") or street.lanes < 2:
+    if street.kind in ("service", "living_street") or street.lanes < 2 or street.setts:
         return []
     # Parking and cycle lanes at the kerbs are not the traffic's.
     left = street.parking_left + (1.7 if street.cycle_left else 0.0)

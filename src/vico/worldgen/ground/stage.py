@@ -38,6 +38,7 @@ from vico.worldgen.ground.markings import Quads, road_markings
 from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
 from vico.worldgen.ground.pitches import pitch_lines
 from vico.worldgen.ground.stairs import Flights
+from vico.worldgen.ground.strokes import cut_to
 from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.thinning import thinned
 from vico.worldgen.ground.tree_pits import tree_pits
@@ -319,7 +320,8 @@ def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
             with expendable(area.id):
                 sport = area.tags.get("sport", "")
                 lines += [quad for shape in polygons_of(area.polygon) for quad in pitch_lines(shape, sport)]
-    return [Quads(np.stack(lines), (236, 236, 230), low=False)] if lines else []
+    corners = cut_to(lines, window)
+    return [Quads(corners, (236, 236, 230), low=False)] if len(corners) else []
 
 
 def _without(shapes: Sequence[Polygon], area: BaseGeometry, window: Polygon) -> list[Polygon]:

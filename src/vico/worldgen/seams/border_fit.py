@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.world.borders import ALIKE, NEAR, SAME, Profile, Side, edges_on, profile_of
+from vico.world.borders import ABOVE, ALIKE, NEAR, SAME, Profile, Side, edges_on, profile_of
 from vico.world.mesh import Surface
 
 Floats = NDArray[np.float64]
@@ -32,7 +32,7 @@ def conformed(surfaces: Sequence[Surface], side: Side, first: Profile) -> list[S
     first
         What is drawn there by the tile that comes first.
     """
-    return [_conformed(surface, side, first) for surface in surfaces]
+    return [surface if surface.material.name in ABOVE else _conformed(surface, side, first) for surface in surfaces]
 
 
 def _conformed(surface: Surface, side: Side, first: Profile) -> Surface:

@@ -188,9 +188,14 @@ def _is_square(tags: Mapping[str, str]) -> bool:
 
 def _note_paving(paved: dict[str, list[NamedShape]], tags: Mapping[str, str], shape: NamedShape) -> None:
     """Remember where the map says what the ground is paved with."""
-    name = PAVINGS.get(tags.get("surface", "").split(";")[0])
+    name = _paving(tags)
     if name is not None:
         paved.setdefault(name, []).append(shape)
+
+
+def _paving(tags: Mapping[str, str]) -> str | None:
+    """Return what the map says that the ground is paved with."""
+    return PAVINGS.get(tags.get("surface", "").split(";")[0])
 
 
 def _said_sidewalk(tags: Mapping[str, str]) -> bool:
@@ -236,6 +241,7 @@ def _street(way: OsmWay, width: float, tracks: bool) -> Street:
         parking_right=parking[right],
         slanted=slanted,
         tracks=tracks,
+        setts=_paving(tags) == "setts",
     )
 
 
