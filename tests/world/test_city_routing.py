@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from vico.errors import SchemaError
 from vico.io.arrays import mapped_array
+from vico.world import city_routing
 from vico.world.city_files import COST, GATES, REACHED, ROOM, STEPS, SURFACES
 from vico.world.city_gates import Gates, Window, border_gates, tile_gates
 from vico.world.city_ground import whole_walkable
@@ -131,6 +132,28 @@ def test_what_is_closed_is_gone_round_on_long_walks_too(town: WalkableMap, route
     again = router.path(a, b)
     assert again is not None
     assert np.array_equal(again, usual)
+
+
+def test_walks_are_the_same_however_much_of_the_map_is_in_memory(
+    town: WalkableMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walks = []
+    for tiles in (0, 1000):
+        monkeypatch.setattr(city_routing, "_TILES", tiles)
+        router = _opened(tmp_path / str(tiles), town)
+        ends = [town.random_point(np.random.default_rng(k), clearance=1.0) for k in range(12)]
+        found = []
+        for start, goal in pairwise(ends):
+            middle = np.mean([start, goal], axis=0)
+            for closed in (
+                (),
+                ((float(middle[0]), float(middle[1]), 8.0), (float(start[0]) + 9.0, float(start[1]), 5.0)),
+            ):
+                found.append(router.path(start, goal, closed=closed))
+        walks.append(found)
+    assert all(walk is not None for found in walks for walk in found[::2])
+    for one, other in zip(*walks, strict=True):
+        np.testing.assert_equal(one, other)
 
 
 def test_walks_from_gate_to_gate_are_kept_cell_by_cell(router: CityRouter) -> None:

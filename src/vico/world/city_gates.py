@@ -251,7 +251,7 @@ class Window:
         return float(np.hypot(*np.diff(kept, axis=0).T).sum()) * cell, max(0, len(kept) - 2)
 
 
-def border_gates(mine: NDArray[np.int32], theirs: NDArray[np.int32]) -> list[int]:
+def border_gates(mine: NDArray[Any], theirs: NDArray[Any]) -> list[int]:
     """Return where gates are along a border, given the costs of the cells on both sides of it.
 
     Returns
@@ -277,7 +277,7 @@ def _runs(on: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def tile_gates(
-    cost: NDArray[np.int32], clearance: NDArray[np.float32], square: tuple[slice, slice], *, cell: float
+    cost: NDArray[np.int16], clearance: NDArray[np.float32], square: tuple[slice, slice], *, cell: float
 ) -> Gates:
     """Find a tile's gates, the walks between them, and the steps over its eastern and northern border.
 
@@ -315,7 +315,7 @@ def tile_gates(
                 walks.append((own[-1], other, STRAIGHT * (int(mine[k]) + int(theirs[k])) // 2, cell, 0))
                 steps.append(steps_of(np.array([own[-1], other], np.int64), width))
     cells = np.unique(np.array(own, np.int64))
-    window = Window(np.ascontiguousarray(cost[square]), bottom, left, width)
+    window = Window(np.ascontiguousarray(cost[square], np.int32), bottom, left, width)
     room = np.ascontiguousarray(clearance[square], np.float32)
     for k, first in enumerate(cells.tolist()):
         rest = cells[k + 1 :]

@@ -8,9 +8,11 @@ tile.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise, product
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,8 +33,9 @@ _NEAR, _AROUND = 800, 300
 _TRIES = 40
 # Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks to or from a gate, 8 a cell.
 _ENDS, _LEGS = 8192, 8192
-# Tiles that are read before the memory that the map is read into is given back: some 6 MB each at 400 m a tile.
-_TILES = 24
+# Tiles that are read before the memory that the map is read into is given back: some 4 MB each at 400 m a tile. What is
+# given back has to be mapped again, page by page: where hundreds plan long ways that took a third of the time with 24.
+_TILES = 96
 _FAR = np.int64(1) << 60
 _NO_WALK = np.zeros(0, np.int32), np.zeros(0, np.int32)
 
@@ -45,14 +48,14 @@ class CityRouter(Router):
     walkable
         The city's map.
     cost
-        Of its cells, int32, shape ``(n, n)``; only what is looked at is read.
+        Of its cells, int16, shape ``(n, n)``; only what is looked at is read.
     gates
         Of its tiles.
     side
         Cells along a tile's side.
     """
 
-    def __init__(self, walkable: WalkableMap, cost: NDArray[np.int32], gates: Gates, side: int) -> None:
+    def __init__(self, walkable: WalkableMap, cost: NDArray[Any], gates: Gates, side: int) -> None:
         self.walkable = walkable
         self._cost, self._clearance, self._free = cost, walkable.clearance, walkable.connected
         self.graph = GateGraph(gates, walkable.n, side)
@@ -64,6 +67,7 @@ class CityRouter(Router):
         self._nothing = np.zeros((0, 0), np.bool_)
         self._scratch = Scratch()
         self._read: set[tuple[int, int]] = set()
+        self._is_closing = False  # whether some cells are closed for the walk that is being looked for
         self._lock = Lock()
 
     def learn_landmarks(self) -> None:
@@ -94,6 +98,15 @@ class CityRouter(Router):
                 return None
             shut = self._shut if blocked is None else blocked | self._shut
             return self._pulled(a, b, first, last, walk, shut if closed or blocked is not None else None)
+
+    @contextmanager
+    def _closed(self, squares: Sequence[tuple[float, float, float]]) -> Iterator[None]:
+        self._is_closing = len(squares) > 0
+        try:
+            with super()._closed(squares):
+                yield
+        finally:
+            self._is_closing = False
 
     def _end_near(self, ask: _Ask, point: NDArray[np.float64]) -> int:
         """Return the nearest cell within reach that this walk may begin or end in; -1 if there is none."""
@@ -128,8 +141,11 @@ class CityRouter(Router):
         return _Ask(self._cost, self._clearance, blocked, room, self._side, tiles, self._scratch, self._open)
 
     def _open(self, tiles: set[tuple[int, int]]) -> None:
-        """Note which tiles are read: with time all of a city's map would come to be in memory."""
-        if len(self._read | tiles) > _TILES:
+        """Note which tiles are read: with time all of a city's map would come to be in memory.
+
+        Not while cells are closed: that is written into the pages, and would be lost with them.
+        """
+        if len(self._read | tiles) > _TILES and not self._is_closing:
             drop_pages(self._cost)
             drop_pages(self._clearance)
             self._read.clear()
@@ -261,7 +277,7 @@ class _Ask:
 
     def __init__(
         self,
-        cost: NDArray[np.int32],
+        cost: NDArray[Any],
         clearance: NDArray[np.float32],
         blocked: NDArray[np.bool_] | None,
         room: float,
@@ -295,7 +311,7 @@ class _Ask:
 
     def costs(self, part: tuple[slice, slice]) -> NDArray[np.int32]:
         """Return the costs of the cells of a part of the map for this walk; 0 where it may not lead."""
-        cost = np.ascontiguousarray(self._cost[part])
+        cost = np.ascontiguousarray(self._cost[part], np.int32)
         if self._blocked is not None:
             cost = np.where(self._blocked[part], np.int32(0), cost)
         if self.room:

@@ -151,7 +151,7 @@ class CityWorld(World):
         return CityRouter(self.walkable, self._cost, gates, self._side)
 
     @cached_property
-    def _cost(self) -> NDArray[np.int32]:
+    def _cost(self) -> NDArray[np.int16]:
         """What cells of the walkable map cost a walker, read where it is looked at."""
         return mapped_array(self.file(COST))
 

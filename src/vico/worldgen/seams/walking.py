@@ -47,7 +47,7 @@ def write_walking(folder: Path, grid: TileGrid, tiles: Mapping[Tile, Path]) -> N
         for tile in tiles:
             room[square_of(tile, grid, side)] = _room(surfaces, square_of(tile, grid, side), cell)
         _write_reached(surfaces, [square_of(tile, grid, side) for tile in tiles], reached)
-        cost = files.enter_context(new_array(folder / COST, shape, np.int32))
+        cost = files.enter_context(new_array(folder / COST, shape, np.int16))
         for tile in tiles:
             square = square_of(tile, grid, side)
             wide, own = around(square, 1)
