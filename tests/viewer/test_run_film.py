@@ -16,7 +16,7 @@ from vico.assets.shapes import box, pose_matrix
 from vico.errors import InputError, SchemaError
 from vico.io.files import write_json
 from vico.render import Scene
-from vico.render.between import between, moment_of, show_between
+from vico.render.between import SceneMoment, between, moment_of, show_between
 from vico.render.film import read_film
 from vico.render.limbs import LIMBS
 from vico.render.quality import PLAIN
@@ -163,6 +163,42 @@ def test_things_and_bodies_go_half_way_and_what_leaps_waits() -> None:
     assert scene.arrays.avatars.low[0].tolist() == pytest.approx([0.0, -0.25, 0.0], abs=1e-6)
     assert np.unique(scene.arrays.avatars.limbs).tolist() == [0.25]
     assert scene.moment == 0.25
+
+
+def test_avatars_that_are_not_drawn_at_a_moment_are_nowhere_in_its_frames() -> None:
+    scene = Scene([box((40, 40, 1), (0, 0, -0.5)).of_entity(2)])
+    bodies = joined([box((0.4, 0.4, 1.0 + 0.2 * k), (0, 3.0 * k, 0.5)).of_entity(10 + k) for k in range(3)])[0]
+    shape = bodies.normals, bodies.triangles, bodies.colour, bodies.entity
+
+    def shown(x: float, drawn: list[int]) -> SceneMoment:
+        positions = bodies.positions + np.array([x, 0, 0], np.float32)
+        positions[~np.isin(bodies.entity, [10 + k for k in drawn])] = np.nan  # nobody makes those
+        scene.set_skinned(positions, *shape, drawn=np.array(drawn, np.int64))
+        return moment_of(scene, x)
+
+    moments = [shown(x, drawn) for x, drawn in ((0.0, [1, 2]), (1.0, [1, 2]), (2.0, [0, 2]), (3.0, []))]
+
+    def places() -> dict[int, float]:
+        avatars = scene.arrays.avatars
+        entity = scene.arrays.mesh.entity[avatars.span["first_triangle"]].tolist()
+        return {one: round(float(x), 3) for one, x in zip(entity, (avatars.low + avatars.high)[:, 0] / 2, strict=True)}
+
+    show_between(moments[0], moments[1], 0.25)
+    assert places() == {11: 0.25, 12: 0.25}
+    show_between(moments[1], moments[2], 1.0)
+    assert places() == {10: 2.0, 12: 2.0}
+    show_between(moments[2], moments[3], 0.5)
+    assert places() == {}
+    show_between(moments[0], moments[1], 1.0)
+    assert places() == {11: 1.0, 12: 1.0}
+
+
+def test_avatars_want_all_their_vertices() -> None:
+    scene = Scene([box((40, 40, 1), (0, 0, -0.5)).of_entity(2)])
+    body = box((0.4, 0.4, 1.0), (0, 0, 0.5)).of_entity(10)
+    scene.set_skinned(body.positions, body.normals, body.triangles, body.colour, body.entity)
+    with pytest.raises(InputError, match="for avatars of"):
+        scene.repose(body.positions[1:], body.normals[1:])
 
 
 @pytest.mark.parametrize("view", ["behind", "front", "side", "above", "orbit"])

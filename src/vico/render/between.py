@@ -27,8 +27,8 @@ class SceneMoment(NamedTuple):
         Where everything is.
     normals
         Of the avatars' vertices, float32, shape ``(V, 3)``.
-    limbs
-        Of the avatars, as `PosedAvatars` has them.
+    limbs, span
+        Of the avatars that are there, as `PosedAvatars` has them.
     openings
         Doors that are not closed, as `SceneArrays` has them.
     shadowless
@@ -40,6 +40,7 @@ class SceneMoment(NamedTuple):
     placement: PlacedInstances
     normals: NDArray[np.float32]
     limbs: NDArray[np.float32]
+    span: NDArray[np.void]
     openings: NDArray[np.void]
     shadowless: int
 
@@ -51,7 +52,8 @@ def moment_of(scene: Scene, second: float) -> SceneMoment:
     vertices = slice(first, int(spans["end_vertex"].max(initial=0)))
     normals = scene.arrays.mesh.vertex["normal"][vertices].copy()
     openings, shadowless = scene.arrays.openings, scene.shadowless
-    return SceneMoment(scene, second, placement_of(scene), normals, scene.arrays.avatars.limbs, openings, shadowless)
+    limbs, span = scene.arrays.avatars.limbs, scene.arrays.avatars.span.copy()
+    return SceneMoment(scene, second, placement_of(scene), normals, limbs, span, openings, shadowless)
 
 
 def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene:
@@ -74,7 +76,9 @@ def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene
         moves = known & ~leaps
         matrix[moves] = between(start[moves], b.matrix[moves], share)
     _set_rigid(after, matrix)
-    if len(b.x):
+    if not len(b.x):
+        _set_avatars(after)
+    else:
         was, new = vertices_before(a, b), np.stack([b.x, b.y, b.z], axis=1)
         old = as_before(np.stack([a.x, a.y, a.z], axis=1), new, was)
         starts = b.owner[:, 1] - b.owner[0, 1]
@@ -85,7 +89,7 @@ def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene
         limbs = after.limbs
         if len(before.limbs) == len(limbs) == len(leap) and np.array_equal(a.owner[:, 0], b.owner[:, 0]):
             limbs = before.limbs + np.where(leap, 0.0, share)[:, None, None] * (limbs - before.limbs)
-        scene.repose(old + part * (new - old), normals + part * (after.normals - normals), limbs)
+        scene.repose(old + part * (new - old), normals + part * (after.normals - normals), limbs, span=after.span)
     return scene
 
 
@@ -111,10 +115,14 @@ def between(a: NDArray[np.float32], b: NDArray[np.float32], share: float) -> NDA
 
 
 def _show(moment: SceneMoment) -> None:
+    _set_rigid(moment, moment.placement.matrix)
+    _set_avatars(moment)
+
+
+def _set_avatars(moment: SceneMoment) -> None:
     now = moment.placement
-    _set_rigid(moment, now.matrix)
-    if len(now.x):
-        moment.scene.repose(np.stack([now.x, now.y, now.z], axis=1), moment.normals, moment.limbs)
+    vertices = np.stack([now.x, now.y, now.z], axis=1)
+    moment.scene.repose(vertices, moment.normals, moment.limbs, span=moment.span)
 
 
 def _set_rigid(moment: SceneMoment, matrix: NDArray[np.float32]) -> None:

@@ -311,17 +311,42 @@ class Scene:
             self._bodies = self._clothe(mesh, triangles, colour, entity)
             self._clothed = (mesh, triangles, colour, entity)
         span = self._bodies if drawn is None else self._bodies[drawn]
-        self._pose(vertices, normals, span, limbs if drawn is None or limbs is None else limbs[drawn])
+        shown = limbs if drawn is None or limbs is None else limbs[drawn]
+        self._pose(vertices, normals, span, shown, first=first_vertex)
         self.arrays.counts["avatars"] = len(span)
 
     def repose(
-        self, vertices: NDArray[np.float32], normals: NDArray[np.float32], limbs: NDArray[np.float32] | None = None
+        self,
+        vertices: NDArray[np.float32],
+        normals: NDArray[np.float32],
+        limbs: NDArray[np.float32] | None = None,
+        *,
+        span: NDArray[np.void] | None = None,
     ) -> None:
-        """Move the avatars that are there to other places: as many vertices as `set_skinned` was given.
+        """Move avatars to other places.
 
-        `limbs` are those of the avatars that are there, as `PosedAvatars` has them.
+        Parameters
+        ----------
+        vertices, normals
+            From the first vertex of the first avatar to the last one of the last, float32, shape ``(V, 3)``; those of
+            avatars between that are not there are not read.
+        limbs
+            Those of the avatars that are there, as `PosedAvatars` has them.
+        span
+            Which are there, as `PosedAvatars` has them; None: those that are now.
+
+        Raises
+        ------
+        InputError
+            If there are not as many vertices, or one is not finite.
         """
-        self._pose(vertices, normals, self.arrays.avatars.span, limbs)
+        span = self.arrays.avatars.span if span is None else span
+        first = int(span["first_vertex"].min()) if len(span) else 0
+        wanted = int(span["end_vertex"].max(initial=first)) - first
+        if len(vertices) != wanted or len(normals) != wanted:
+            raise InputError(f"scene: {len(vertices)} vertices and {len(normals)} normals for avatars of {wanted}")
+        self._pose(vertices, normals, span, limbs, first=first)
+        self.arrays.counts["avatars"] = len(span)
 
     def _pose(
         self,
@@ -329,10 +354,12 @@ class Scene:
         normals: NDArray[np.float32],
         span: NDArray[np.void],
         limbs: NDArray[np.float32] | None,
+        *,
+        first: int,
     ) -> None:
         low, high = np.zeros((len(span), 3), np.float32), np.zeros((len(span), 3), np.float32)
         posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
-        if not pose_avatars(self.arrays.mesh, *posed, self._static_size[1], span, low, high):
+        if not pose_avatars(self.arrays.mesh, *posed, first, span, low, high):
             raise InputError("scene: a vertex of an avatar is not finite")
         if limbs is None or len(limbs) != len(span):
             limbs = np.zeros((0, len(LIMBS), 7), np.float32)

@@ -34,7 +34,7 @@ _TRIES = 40
 # Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks to or from a gate, 8 a cell.
 _ENDS, _LEGS = 8192, 8192
 # Tiles that are read before the memory that the map is read into is given back: some 4 MB each at 400 m a tile. What is
-# given back has to be mapped again, page by page: where hundreds plan long ways that took a third of the time with 24.
+# given back has to be mapped again: five minutes of 27 km2 took 16 million page faults with 24, 2.4 million with this.
 _TILES = 96
 _FAR = np.int64(1) << 60
 _NO_WALK = np.zeros(0, np.int32), np.zeros(0, np.int32)
