@@ -150,6 +150,8 @@ def test_walks_are_the_same_however_much_of_the_map_is_in_memory(
                 ((float(middle[0]), float(middle[1]), 8.0), (float(start[0]) + 9.0, float(start[1]), 5.0)),
             ):
                 found.append(router.path(start, goal, closed=closed))
+                if not tiles:
+                    router.drop_pages()
         walks.append(found)
     assert all(walk is not None for found in walks for walk in found[::2])
     for one, other in zip(*walks, strict=True):

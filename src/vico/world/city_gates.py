@@ -277,7 +277,7 @@ def _runs(on: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def tile_gates(
-    cost: NDArray[np.int16], clearance: NDArray[np.float32], square: tuple[slice, slice], *, cell: float
+    cost: NDArray[Any], clearance: NDArray[np.float32], square: tuple[slice, slice], *, cell: float
 ) -> Gates:
     """Find a tile's gates, the walks between them, and the steps over its eastern and northern border.
 

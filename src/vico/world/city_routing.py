@@ -76,6 +76,13 @@ class CityRouter(Router):
     def learn_costs(self, point: ArrayLike) -> None:
         """Do nothing: costs to everywhere would be those of a whole city."""
 
+    def drop_pages(self) -> None:
+        """Give back the memory that the map and its walks are read into, once no walk is being looked for."""
+        with self._lock:
+            for array in (self._cost, self._clearance, self._free, self.graph.steps):
+                drop_pages(array)
+            self._read.clear()
+
     def path(
         self,
         start: ArrayLike,

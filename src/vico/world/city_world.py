@@ -148,12 +148,7 @@ class CityWorld(World):
     def router(self) -> CityRouter:
         """Finds ways on the walkable map: from gate to gate of the tiles."""
         gates = Gates.read(self.file(GATES), mapped_array(self.file(STEPS)))
-        return CityRouter(self.walkable, self._cost, gates, self._side)
-
-    @cached_property
-    def _cost(self) -> NDArray[np.int16]:
-        """What cells of the walkable map cost a walker, read where it is looked at."""
-        return mapped_array(self.file(COST))
+        return CityRouter(self.walkable, mapped_array(self.file(COST)), gates, self._side)
 
     def forget(self) -> None:
         """Forget the things of all tiles, much of whose size is names: they are read anew where somebody asks."""
@@ -166,11 +161,12 @@ class CityWorld(World):
         if "height" in opened:
             give_back(self.height)
         if "walkable" in opened:
-            arrays += [self.walkable.cls, self.walkable.clearance, self.walkable.connected]
-        if "_cost" in opened:
-            arrays.append(self._cost)
+            arrays.append(self.walkable.cls)
         if "router" in opened:
-            arrays.append(self.router.graph.steps)
+            # Ground that is closed for a walk is written into these: it is for the router to say when.
+            self.router.drop_pages()
+        elif "walkable" in opened:
+            arrays += [self.walkable.clearance, self.walkable.connected]
         for array in arrays:
             drop_pages(array)
         if "rooms" in opened:
