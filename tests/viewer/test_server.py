@@ -6,9 +6,12 @@ import asyncio
 import contextlib
 import json
 import socket
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -49,6 +52,21 @@ def shown(run: Path) -> ViewerServer:
     tables = source.tables.run
     assert tables is not None
     return ViewerServer(ViewerState(source, RecordedViews(tables).view), keep=run)
+
+
+class _SlowHands:
+    """Hands whose replies the test gives."""
+
+    def __init__(self) -> None:
+        self.asked = Future[dict[str, Any]]()
+        self.came = threading.Event()
+
+    def told(self) -> dict[str, Any]:
+        return {"status": "running", "step": 0, "factor": None}
+
+    def command(self, name: str, arguments: Mapping[str, Any]) -> Future[dict[str, Any]]:
+        self.came.set()
+        return self.asked
 
 
 def closed(client: Stream) -> bool:
@@ -303,3 +321,19 @@ def test_when_the_run_is_over_the_page_still_shows_it(tmp_path: Path) -> None:
         assert get_json(toy.url, "/api/run")["control"]["status"] == "ended"
         with stream(toy.url) as client:
             assert client.command("pause")["error"] == "the run has ended"
+
+
+def test_a_reply_on_its_way_arrives_before_the_server_ends(run: Path) -> None:
+    hands, server = _SlowHands(), shown(run)
+    server.state.hands = hands
+    with contextlib.ExitStack() as still, server:
+        client = still.enter_context(stream(server.url))
+        client.send(type="command", id=7, command="stop", arguments={})
+        assert hands.came.wait(20.0)
+        threading.Timer(0.4, hands.asked.set_result, [{"step": 3}]).start()
+        server.__exit__(None, None, None)
+        assert client.reply(7) == {"type": "reply", "id": 7, "ok": True, "step": 3}
+        with pytest.raises(ConnectionClosed) as told:
+            client.until(lambda s: False, 10.0)
+        assert told.value.rcvd is not None
+        assert told.value.rcvd.code == 1001

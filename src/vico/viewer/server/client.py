@@ -19,8 +19,8 @@ from vico.viewer.sources.frames import OF_RANGE
 
 #: JSON messages that may wait for a client; ranges that it may ask for at a time; frames of one.
 MOST_WAITING, MOST_RANGES, MOST_FRAMES = 256, 8, 600
-#: Close codes: it broke the rules; it reads too slowly.
-BROKE_RULES, TOO_SLOW = 1008, 1013
+#: Close codes: it broke the rules; it reads too slowly; the server ends.
+BROKE_RULES, TOO_SLOW, ENDS = 1008, 1013, 1001
 
 # Frames of a range that are encoded at once.
 _BATCH = 30
@@ -114,6 +114,9 @@ class Client:
                 self._look()
                 if self._waiting:
                     continue
+                if self._hub.over:
+                    await self._socket.close(ENDS, "the server ends")
+                    return
                 busy = await self._send_newest()
                 busy |= await self._send_range()
                 if not busy and not self._waiting:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import Any
 
 from vico.viewer.server.state import ViewerState
@@ -16,6 +17,8 @@ _LOOKS_EVERY, _COUNTS_EVERY = 1.0, 1.0
 _MOST_STEPS = 100_000
 # News of some steps are kept for the clients that are told the same.
 _MOST_NEWS = 16
+# Seconds that the end waits for replies, and then for clients that read slowly; between looks at them.
+_REPLIES_WITHIN, _READ_WITHIN, _LOOKS_AT_THEM = 1.0, 1.0, 0.01
 
 
 class Hub:
@@ -32,6 +35,10 @@ class Hub:
     def __init__(self, state: ViewerState) -> None:
         self.state = state
         self.listeners: set[asyncio.Event] = set()
+        #: Replies that are waited for.
+        self.replies: set[asyncio.Task[None]] = set()
+        #: Whether clients get what they are still owed, and are then let go.
+        self.over = False
         self._loop: asyncio.AbstractEventLoop | None = None
         self._pending = False
         #: Which run is shown: another number, another run.
@@ -54,6 +61,22 @@ class Hub:
         if self.listeners and not self._pending and self._loop is not None:
             self._pending = True
             self._loop.call_soon_threadsafe(self._wake)
+
+    def end(self) -> None:
+        """Send clients what they are still owed, replies among it, and let them go; from another thread."""
+        if self._loop is not None and not self._loop.is_closed():
+            with suppress(TimeoutError):
+                asyncio.run_coroutine_threadsafe(self._end(), self._loop).result(_REPLIES_WITHIN + 2 * _READ_WITHIN)
+
+    async def _end(self) -> None:
+        if self.replies:
+            await asyncio.wait(self.replies, timeout=_REPLIES_WITHIN)
+        self.over = True
+        self._wake()
+        for _ in range(round(_READ_WITHIN / _LOOKS_AT_THEM)):
+            if not self.listeners:
+                return
+            await asyncio.sleep(_LOOKS_AT_THEM)
 
     def newest(self) -> tuple[int, bytes]:
         """Return the newest step and its frame, encoded once for all."""

@@ -119,6 +119,7 @@ class ViewerServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.hub.end()
         self._server.should_exit = True
         self._thread.join(_ENDS_WITHIN)
         self._socket.close()

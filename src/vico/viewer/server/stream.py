@@ -34,7 +34,6 @@ class Stream:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._tasks: set[asyncio.Task[None]] = set()
         self._answers: dict[str, Callable[[Client, Mapping[str, Any]], None]] = {
             "range": self._range,
             "cancel": self._cancel,
@@ -140,8 +139,8 @@ class Stream:
 
     def _reply(self, client: Client, number: int, done: Future[dict[str, Any]]) -> None:
         task = asyncio.create_task(_replied(client, number, done))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._hub.replies.add(task)
+        task.add_done_callback(self._hub.replies.discard)
 
 
 async def _replied(client: Client, number: int, done: Future[dict[str, Any]]) -> None:
