@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,14 @@ from numpy.typing import NDArray
 
 from vico.community.author import build_community
 from vico.community.model import Community
-from vico.errors import InputError
+from vico.errors import InputError, MissingFileError
 from vico.render import Cameras
 from vico.sim import city_scene
 from vico.sim.city_scene import CityRenderer, Neighbourhood
 from vico.sim.config import SimConfig
 from vico.sim.drawn_people import DrawnPeople
+from vico.sim.physics import mujoco_scene
+from vico.sim.physics.city_chunks import CityChunks, surroundings_of
 from vico.sim.rooms_in_sight import RoomsInSight
 from vico.sim.simulation import Simulation
 from vico.world.city_silhouettes import CitySilhouettes
@@ -226,3 +229,54 @@ def test_beyond_the_edge_the_city_is_seen_mirrored(city: CityWorld) -> None:
     far = inside[np.abs(inside[:, 0] - edge + 20.0) < 20.0] * np.float32([-1, 1, 1]) + np.float32([2 * edge, 0, 0])
     assert len(near & {tuple(p) for p in np.round(far, 1).tolist()}) > 0.9 * len(near) > 50
     assert city.entities[ENTITY_BACKDROP]["kind"] == "backdrop"
+
+
+# What robots meet.
+
+
+def test_chunks_have_the_solids_of_a_city_whichever_tile_has_them(city: CityWorld) -> None:
+    chunks = surroundings_of(city)
+    assert isinstance(chunks, CityChunks)
+    whole, along = chunks.whole(), round(2 * city.half / chunks.side)
+    every = [(column, row) for column in range(along) for row in range(along)]
+    joined = chunks.scene(every)
+    assert [points.tobytes() for points in joined.hulls] == [points.tobytes() for points in whole.hulls]
+    assert np.array_equal(joined.boxes, whole.boxes)
+    assert np.array_equal(joined.pillars, whole.pillars)
+    assert len(whole.hulls) > 50
+    for column, row in every[along // 2 :: along]:
+        west, south = np.array([column, row]) * chunks.side - city.half
+        some = {points.tobytes() for points in chunks.scene([(column, row)]).hulls}
+        inside = {
+            points.tobytes()
+            for points in whole.hulls
+            if points[:, 0].min() <= west + chunks.side
+            and points[:, 0].max() >= west
+            and points[:, 1].min() <= south + chunks.side
+            and points[:, 1].max() >= south
+        }
+        assert some == inside
+
+
+def test_what_robots_do_is_the_same_whatever_of_a_city_is_loaded(
+    city: CityWorld, people: Community, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states = []
+    for needed, ahead in ((40.0, 160.0), (6.0, 6.0), (40.0, 2000.0)):
+        monkeypatch.setattr(mujoco_scene, "_NEEDED", needed)
+        monkeypatch.setattr(mujoco_scene, "_AHEAD", ahead)
+        states.append(_run(city, people, 40, robots=("husky", "go2"), observe=())[1])
+    assert states[0] == states[1] == states[2]
+
+
+def test_a_tile_that_is_gone_when_a_robot_comes_near_is_named(city: CityWorld, tmp_path: Path) -> None:
+    shutil.copytree(city.path, tmp_path / "row")
+    copied = read_world(tmp_path / "row")
+    assert isinstance(copied, CityWorld)
+    chunks = CityChunks(copied)
+    row, last = round(city.half / chunks.side), round(2 * city.half / chunks.side) - 1
+    assert chunks.scene([(row, row)]).hulls
+    shutil.rmtree(tmp_path / "row" / "tiles" / copied.city.manifest.tiles[0].name)
+    with pytest.raises(MissingFileError, match=r"tile -2_0: .* is gone or not whole; the vico city build"):
+        chunks.scene([(0, row)])
+    assert chunks.scene([(last, row)]).squares is not None

@@ -70,7 +70,7 @@ def test_cells_near_a_solid_of_any_kind_are_marked_and_far_ones_are_not() -> Non
         first = np.array([[0, 0], [3, 3]])
         for k, (x, y) in enumerate(xy.tolist()):
             state = (np.array([x, y, z] * 2), np.zeros(6), first)
-            find_near((grid.away, grid.tops), grid.half, grid.reaches, 0.01, state, near)
+            find_near(grid.cells, grid.reaches, 0.01, state, near)
             found[k] = near
         return found
 

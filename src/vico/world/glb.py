@@ -260,6 +260,36 @@ def read_glb(path: Path, *, only: str | None = None) -> dict[str, list[Surface]]
         raise SchemaError(f"{path}: not a readable GLB ({error}); build the world anew") from None
 
 
+def glb_bounds(path: Path) -> NDArray[np.float64] | None:
+    """Read the lowest and the highest corner of the box around a GLB that `write_glb` wrote, shape ``(2, 3)``.
+
+    None where it is empty. Reads the file's head alone.
+
+    Raises
+    ------
+    SchemaError
+        If the file is damaged.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(20)
+            magic, _, _, length, _ = struct.unpack("<IIIII", head)
+            if magic != 0x46546C67:
+                raise ValueError("wrong header")
+            document = json.loads(file.read(length))
+        places = [
+            document["accessors"][primitive["attributes"]["POSITION"]]
+            for mesh in document.get("meshes", ())
+            for primitive in mesh["primitives"]
+        ]
+        if not places:
+            return None
+        corners = np.array([[place["min"], place["max"]] for place in places], np.float64) @ _TO_GLTF.astype(np.float64)
+    except (ValueError, KeyError, IndexError, TypeError, struct.error, OSError) as error:
+        raise SchemaError(f"{path}: not a readable GLB ({error}); build the world anew") from None
+    return np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+
+
 # Pictures that somebody has, by the digest of their file: files of many tiles hold the same facades.
 _DECODED: WeakValueDictionary[bytes, NDArray[np.uint8]] = WeakValueDictionary()
 

@@ -15,7 +15,7 @@ from vico.errors import MissingFileError
 from vico.geo.frame import LocalFrame
 from vico.io.files import sha256_of
 from vico.world import model
-from vico.world.glb import read_glb
+from vico.world.glb import glb_bounds, read_glb
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building, Entrance, Manifest, Place, Room
@@ -181,6 +181,10 @@ class World:
             nodes = read_glb(self._mesh(layer))
             self._layers[layer] = [surface for surfaces in nodes.values() for surface in surfaces]
         return self._layers[layer]
+
+    def bounds(self, layer: str) -> NDArray[np.float64] | None:
+        """Lowest and highest corner of a box around a layer, ENU metres, shape ``(2, 3)``; None where it is empty."""
+        return glb_bounds(self._mesh(layer))
 
     def textures(self) -> list[NDArray[np.uint8]]:
         """Return the textures of the layers that were read so far."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vico.assets.robots import RobotModel
 from vico.errors import InputError
 from vico.sim.physics.engine import PhysicsEngine, PhysicsScene
-from vico.sim.physics.records import Capacity, StaticScene
+from vico.sim.physics.records import Capacity, StaticChunks, StaticScene
 
 #: By name: the package an engine needs, how to install it, and the class of its scenes. Engines are imported when they
 #: are first asked for.
@@ -39,7 +39,7 @@ def engine_names() -> tuple[str, ...]:
 
 
 def make_scene(
-    name: str, static: StaticScene, models: Sequence[RobotModel], capacity: Capacity | None = None
+    name: str, static: StaticScene | StaticChunks, models: Sequence[RobotModel], capacity: Capacity | None = None
 ) -> PhysicsScene:
     """Build a scene: what engines of one world and its robots share.
 
@@ -48,7 +48,7 @@ def make_scene(
     name
         Of the engine, such as ``mujoco``.
     static
-        What never moves.
+        What never moves; of chunks, those around robots are in physics.
     models
         The robots.
     capacity
@@ -70,7 +70,7 @@ def make_scene(
 
 def make_engine(
     name: str,
-    static: StaticScene,
+    static: StaticScene | StaticChunks,
     models: Sequence[RobotModel],
     places: NDArray[np.float64],
     capacity: Capacity | None = None,

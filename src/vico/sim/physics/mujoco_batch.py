@@ -87,6 +87,10 @@ class MujocoBatch:
     def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
         """Move all copies on by some frames."""
         heard()  # what was said of other models' steps says nothing of these
+        for engine in self.engines:
+            engine.stay_in_scene()
+        used = {engine.compiled.bare for engine in self.engines}
+        self._models = [{scene: one for scene, one in own.items() if scene.bare in used} for own in self._models]
         parts = [self.engines[k :: len(self._models)] for k in range(len(self._models))]
 
         def run(models: dict[CompiledScene, SharedModel], engines: list[MujocoEngine]) -> None:

@@ -84,10 +84,11 @@ class MujocoEngine:
 
     def _use(self, scene: CompiledScene) -> None:
         """Go to the beginning of a scene, the one without objects or the one with."""
-        self.compiled = scene
-        self._model = scene.model
         if scene not in self._kept:
+            # Those of other chunks of a city are not gone back to.
+            self._kept = {other: data for other, data in self._kept.items() if other.bare is scene.bare}
             self._kept[scene] = mujoco.MjData(scene.model)
+        self.compiled, self._model = scene, scene.model
         self._data = self._kept[scene]
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._mocap_pos, self._mocap_quat = self._data.mocap_pos, self._data.mocap_quat
@@ -100,10 +101,16 @@ class MujocoEngine:
         scene.reset(self._data)
 
     def _move_to(self, scene: CompiledScene) -> None:
-        """Go on in the scene with objects, or without them: robots, people and vehicles as they are."""
+        """Go on in another scene, one with objects, without them, or of other chunks: everybody as they are."""
         if scene is self.compiled:
             return
         contacts, data, parameters = self._last_contacts(), self._data, self._parameters
+        if scene.slots == self.compiled.slots:
+            state, forces = self._state(), np.array(data.actuator_force)
+            self._use(scene)
+            self._parameters.restore(parameters.numbers)
+            self._set_state(state, forces, contacts, anew=False)
+            return
         self._use(scene)
         count = min(len(self._qpos), len(data.qpos)), min(len(self._qvel), len(data.qvel))
         self._qpos[: count[0]], self._qvel[: count[1]] = data.qpos[: count[0]], data.qvel[: count[1]]
@@ -113,6 +120,17 @@ class MujocoEngine:
         self._parameters.copy_from(parameters)
         self._contacts = contacts
         self._kinematics_of = -1.0
+
+    def stay_in_scene(self, points: NDArray[np.float64] | None = None) -> None:
+        """Have the scene hold what is around everybody whom physics moves, and around some points besides."""
+        if self.compiled.chunked is None:
+            return
+        places = [self._qpos[self.compiled.base_position][~self._parked]]
+        if self.compiled.slots:
+            places.append(self._qpos[self.compiled.object_pose].reshape(-1, 7)[self._present, :2])
+        if points is not None:
+            places.append(points[:, :2])
+        self._move_to(self.compiled.chunked.around(self.compiled, np.concatenate(places)))
 
     @property
     def coordinates(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -343,6 +361,7 @@ class MujocoEngine:
 
     def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Metres from each point straight down to what is there; inf for nothing, -inf inside of something."""
+        self.stay_in_scene(points)
         found, hit, normal = np.full(len(points), np.inf), np.zeros(1, np.int32), np.zeros(3)
         with self.compiled.shared.lock:
             self._parameters.hold(self.compiled.shared)
@@ -364,6 +383,7 @@ class MujocoEngine:
         actuate: Actuate | None = None,
     ) -> None:
         """Move on by some frames; people and vehicles move first, at every one."""
+        self.stay_in_scene()
         heard()  # what was said of other models' steps says nothing of this one
         self.step_in(self.compiled.shared, frames, frame, holding=holding, actuate=actuate)
         self.judge()
@@ -383,7 +403,7 @@ class MujocoEngine:
         somebody = movers.entity != 0
         told = (
             (self._qpos, self._qvel, s.first, self._velocity_before),
-            (s.solids.away, s.solids.tops, s.solids.half, s.solids.reaches, self._near_solids),
+            (s.solids.cells, s.solids.reaches, self._near_solids),
             (*s.link_parts, *self._link_motion, self._links_meet),
             (movers.entity, movers.start, movers.end, movers.time),
             (s.mover_mocap, self._mocap_pos, self._mocap_quat),
@@ -419,9 +439,14 @@ class MujocoEngine:
             report(said, self._data.time, finite=finite)
 
     def _last_contacts(self) -> NDArray[np.float64]:
-        """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them."""
+        """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them.
+
+        Shapes are counted from the first that moves; -1 is any that never does, of which scenes have more or fewer.
+        """
         if self._contacts is None:
             self._contacts = solved_contacts(self._data)
+            shapes = self._contacts[:, :2]
+            shapes[:] = np.maximum(shapes - self.compiled.first_moving, -1.0)
         return self._contacts
 
     def contacts(self) -> Contacts:

@@ -25,6 +25,8 @@ PARKED_ROBOTS = 3000.0
 _CELL = 2.0
 #: ... and where it has kerbs, which are ramps half a metre wide then.
 _KERB_CELL = 0.5
+#: Ground that rises by less is level, metres.
+_LEVEL = 1e-4
 #: What ground and objects say of what they touch; solids meet whatever has their bit, outlines of robots too.
 _SOLID = {"contype": TOUCH, "conaffinity": TOUCH | LIMB}
 SOLID = 8
@@ -146,22 +148,9 @@ def thruster(site: str, axis: int) -> str:
 
 def _add_scene(spec: Any, scene: StaticScene) -> None:
     """Ground as one body, solids as the world's own."""
-    ground, world = spec.worldbody.add_body(name="ground"), spec.worldbody
+    world = spec.worldbody
     bits = {"contype": 0, "conaffinity": SOLID}
-    heights, half = ground_grid(scene)
-    low, high = float(heights.min()), float(heights.max())
-    if high - low < 1e-4:
-        ground.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 1.0], pos=[0, 0, low], **_SOLID)
-    else:
-        rows, columns = heights.shape
-        spec.add_hfield(
-            name="ground",
-            size=[half, half, high - low, 5.0],
-            nrow=rows,
-            ncol=columns,
-            userdata=((heights - low) / (high - low)).astype(np.float32).ravel().tolist(),
-        )
-        ground.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[0, 0, low], **_SOLID)
+    _add_ground(spec, scene)
     for index, points in enumerate(scene.hulls):
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         spec.add_mesh(
@@ -175,6 +164,43 @@ def _add_scene(spec: Any, scene: StaticScene) -> None:
         world.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[a, b, c], pos=[x, y, z], quat=turn, **bits)
     for x, y, z, radius, length in scene.pillars.tolist():
         world.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, length, 0], pos=[x, y, z], **bits)
+
+
+def _add_ground(spec: Any, scene: StaticScene) -> None:
+    ground = spec.worldbody.add_body(name="ground")
+    if scene.squares is None:
+        heights, half = ground_grid(scene)
+        low, high = float(heights.min()), float(heights.max())
+        if high - low < _LEVEL:
+            ground.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 1.0], pos=[0, 0, low], **_SOLID)
+        else:
+            _add_field(spec, ground, (0.0, 0.0), heights, half)
+        return
+    for west, south in scene.squares.tolist():
+        half = scene.side / 2
+        _add_field(spec, ground, (west + half, south + half), square_grid(scene, west, south), half)
+
+
+def _add_field(spec: Any, body: Any, middle: tuple[float, float], heights: NDArray[np.float64], half: float) -> None:
+    """Add a square of ground, metres; a plane would be one without an end."""
+    low, high = float(heights.min()), float(heights.max())
+    name, rise = f"ground{len(spec.hfields)}", max(high - low, _LEVEL)
+    spec.add_hfield(
+        name=name,
+        size=[half, half, rise, 5.0],
+        nrow=heights.shape[0],
+        ncol=heights.shape[1],
+        userdata=((heights - low) / rise).astype(np.float32).ravel().tolist(),
+    )
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*middle, low], **_SOLID)
+
+
+def square_grid(scene: StaticScene, west: float, south: float) -> NDArray[np.float64]:
+    """Heights of the ground in one of a scene's squares, metres, shape ``(n, n)``; neighbours have the same edge."""
+    count = max(round(scene.side / _KERB_CELL), 1) + 1
+    x, y = (np.linspace(first, first + scene.side, count) for first in (west, south))
+    xx, yy = np.meshgrid(x, y)
+    return scene.height(np.stack([xx, yy], axis=-1))
 
 
 def ground_grid(scene: StaticScene, *, kerbs: bool = True) -> tuple[NDArray[np.float64], float]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.sim.physics.mujoco_model import SLEEP, SOLID, compiled_model, thruster
-from vico.sim.physics.records import PARTS, Capacity, Party, StaticScene
+from vico.sim.physics.records import PARTS, Capacity, Chunk, Party, StaticChunks, StaticScene
 from vico.sim.physics.solids import SolidCells
 from vico.world.heights import HeightField
 
@@ -74,6 +74,11 @@ class RobotIndex:
         }
 
 
+#: Metres around robots and loose things within which a scene holds all of a city, and within which it does at first:
+#: between the two they go without another. Nobody reaches as far as the first within a step.
+_NEEDED, _AHEAD = 40.0, 160.0
+# Scenes of parts of a city that are kept.
+_SCENES = 3
 # Sets of robots that were asked about together and are kept.
 _KINDS = 64
 _POSES = ("xpos", "xquat", "xmat", "xipos", "ximat", "geom_xpos", "geom_xmat", "site_xpos", "site_xmat")
@@ -165,6 +170,10 @@ class CompiledScene:
         Itself, or the scene without objects.
     slots
         How many objects there is room for: none, or all.
+    chunked
+        Makes scenes of other parts of the same city, `chunks` being those in this one; None: this is all there is.
+    first_moving
+        Number of the first shape that is not of what never moves.
     link_parts
         Of the links of all robots: index of the robot, body, metres from that within which its shapes are, and body of
         the robot's base; shape ``(links,)`` each.
@@ -207,11 +216,16 @@ class CompiledScene:
         self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())
         # What grips more or less by weather: the ground, and tyres and feet, whose friction goes before the ground's.
         on_robot = np.isin(m.geom_bodyid, np.concatenate([np.zeros(0, int), *(r.link_bodies for r in self.robots)]))
-        is_ground = m.geom_bodyid == m.body("ground").id
+        ground = m.body("ground").id
+        is_ground = m.geom_bodyid == ground
+        # Shapes are in the order of their bodies: the world's solids, the ground, everybody else.
+        self.first_moving = int((m.geom_bodyid <= ground).sum())
         self.gripping = np.flatnonzero(is_ground | (on_robot & (m.geom_priority > 0)))
         self.dry_friction = np.array(m.geom_friction[self.gripping, 0])
         self._kinds: dict[bytes, KindIndex] = {}
         self._full: CompiledScene | None = None
+        self.chunked: ChunkedScenes | None = None if bare is None else bare.chunked
+        self.chunks: frozenset[Chunk] = frozenset() if bare is None else bare.chunks
         self._index_contacts()
         reaches = np.array([robot.reach for robot in self.robots])
         self.solids: SolidCells = SolidCells(static, reaches) if bare is None else bare.solids
@@ -250,7 +264,8 @@ class CompiledScene:
             link[robot.link_bodies] = np.arange(len(robot.link_bodies))
         party[self.mover_body], owner[self.mover_body] = Party.BODY, np.arange(len(self.mover_body))
         party[self.object_body], owner[self.object_body] = Party.OBJECT, np.arange(len(self.object_body))
-        body = m.geom_bodyid
+        # Whatever never moves is the last row.
+        body = np.append(m.geom_bodyid[self.first_moving :], 0)
         self.geom_party, self.geom_owner, self.geom_link = party[body], owner[body], link[body]
 
     def reset(self, data: Any) -> None:
@@ -301,6 +316,68 @@ class CompiledScene:
     def site_names(self, robot: int) -> tuple[str, ...]:
         """Names of the sites a robot can be pushed at."""
         return tuple(self.robots[robot].thrusters)
+
+
+class ChunkedScenes:
+    """Scenes of the same robots in parts of a city, compiled when robots come near what the last one does not hold.
+
+    A robot moves alike in all that hold what is around it, bit for bit.
+
+    Parameters
+    ----------
+    static
+        The city.
+    models
+        The robots.
+    capacity
+        How many people, vehicles and objects there can be near robots.
+    """
+
+    def __init__(self, static: StaticChunks, models: tuple[RobotModel, ...], capacity: Capacity) -> None:
+        self._static, self._models, self._capacity = static, models, capacity
+        self._along = round(2 * static.height.half / static.side)
+        self._known: dict[frozenset[Chunk], CompiledScene] = {}
+        self._lock = threading.Lock()
+
+    def around(self, scene: CompiledScene, places: NDArray[np.float64]) -> CompiledScene:
+        """Return a scene that holds what is around some places, with room for as many objects as another.
+
+        Parameters
+        ----------
+        scene
+            Is returned itself if it does.
+        places
+            ENU metres, shape ``(n, 2)``.
+        """
+        needed = self._near(places, _NEEDED)
+        if needed <= scene.chunks:
+            return scene
+        with self._lock:
+            known = next((one for one in reversed(self._known.values()) if needed <= one.chunks), None)
+            if known is None:
+                known = self._compiled(self._near(places, _AHEAD))
+        return known.full if scene.slots else known
+
+    def _compiled(self, chunks: frozenset[Chunk]) -> CompiledScene:
+        while len(self._known) >= _SCENES:
+            self._known.pop(next(iter(self._known)))
+        # From the south-west: the order of solids decides the order of contacts.
+        scene = CompiledScene(self._static.scene(sorted(chunks)), self._models, self._capacity)
+        scene.chunked, scene.chunks = self, chunks
+        self._known[chunks] = scene
+        return scene
+
+    def _near(self, places: NDArray[np.float64], within: float) -> frozenset[Chunk]:
+        """Return the chunks within some metres of places, along either axis; beside the ground there are none."""
+        half, side, last = self._static.height.half, self._static.side, self._along - 1
+        first = np.floor((places - within + half) / side).astype(np.int64)
+        until = np.floor((places + within + half) / side).astype(np.int64)
+        return frozenset(
+            (column, row)
+            for (west, south), (east, north) in zip(first.tolist(), until.tolist(), strict=True)
+            for column in range(max(west, 0), min(east, last) + 1)
+            for row in range(max(south, 0), min(north, last) + 1)
+        )
 
 
 def _reach(model: Any, bodies: NDArray[np.int64]) -> float:

@@ -90,8 +90,8 @@ def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ign
     state
         Positions and speeds, where in them each robot's base begins, and where to put the velocities of bases.
     solids
-        Distances and tops of cells, half the side of their grid, reaches of the robots, and `near`, which is written:
-        of which robots links might meet solids, bool, shape ``(robots,)``.
+        As `SolidCells.cells`, reaches of the robots, and `near`, which is written: of which robots links might meet
+        solids, bool, shape ``(robots,)``.
     links
         As `CompiledScene.link_parts`; positions of bodies, their velocities about the centres of their robots'
         masses and those centres, as MuJoCo has them; and what is written: which links might meet solids, bool.
@@ -101,8 +101,8 @@ def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ign
         Which kinematic body each is, and where positions and quaternions of those are.
     """
     positions, speeds, first, before = state
-    away, tops, half, reach, near = solids
-    find_near((away, tops), half, reach, frame, (positions, speeds, first), near)
+    cells, reach, near = solids
+    find_near(cells, reach, frame, (positions, speeds, first), near)
     for k in range(len(first)):
         for i in range(3):
             before[k, i] = speeds[first[k, 1] + i]
@@ -118,7 +118,7 @@ def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ign
         vx, vy, vz = vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax
         speed = math.sqrt(vx * vx + vy * vy + vz * vz) + math.sqrt(wx * wx + wy * wy + wz * wz) * radius[k]
         if 2.0 * speed * (frame + known) < SLACK:
-            meets[k] = not is_clear(away, tops, half, (x, y, z), radius[k] + SLACK)
+            meets[k] = not is_clear(cells, (x, y, z), radius[k] + SLACK)
     entity, start, end, time = movers
     if time[0] < time[1] - 1e-9 and entity.any():
         time[0] += frame

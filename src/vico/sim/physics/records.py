@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +33,43 @@ class StaticScene:
         Upright boxes: x, y, z of the centre, yaw, half extents; float64, shape ``(n, 7)``.
     pillars
         Upright cylinders: x, y, z of the centre, radius, half height; float64, shape ``(n, 5)``.
+    squares
+        Where there is ground: x and y of the south-western corner of each square, shape ``(n, 2)``; None: everywhere.
+    side
+        Of those squares, metres.
     """
 
     height: HeightField
     hulls: tuple[NDArray[np.float64], ...] = ()
     boxes: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 7)))
     pillars: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 5)))
+    squares: NDArray[np.float64] | None = None
+    side: float = 0.0
+
+
+#: Column and row of a chunk, from the south-west.
+Chunk = tuple[int, int]
+
+
+class StaticChunks(Protocol):
+    """Everything that never moves where there is too much of it to be held at once: square by square.
+
+    What a robot meets is the same whichever chunks a scene has, as long as those around the robot are among them.
+    """
+
+    @property
+    def height(self) -> HeightField:
+        """The ground of all of it."""
+
+    @property
+    def side(self) -> float:
+        """Side of a chunk, metres; a whole number of them is as long as the ground."""
+
+    def scene(self, chunks: Collection[Chunk]) -> StaticScene:
+        """Return the ground of some chunks, and all solids of which some part is in one of them."""
+
+    def whole(self) -> StaticScene:
+        """Return all of it."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from vico.assets.robots.ground import narrow_ground
 from vico.sim.bodies import ROBOT
 from vico.sim.indoor import Indoor
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
+from vico.sim.physics.city_chunks import surroundings_of
 from vico.sim.physics.records import Capacity, StaticScene
-from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.airspace import Airspace
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
@@ -144,7 +144,7 @@ class RobotScene:
     def physics(self) -> PhysicsScene:
         """Ground, solids and robots as physics has them, compiled when they are first needed."""
         flying = any(model.rotors is not None for model in self.models)
-        return make_scene(self._engine, static_scene_of(self.world, flying=flying), self.models)
+        return make_scene(self._engine, surroundings_of(self.world, flying=flying), self.models)
 
     @cached_property
     def rooms(self) -> RobotRooms:
