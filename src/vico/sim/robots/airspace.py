@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from vico.io.compiled import compiled
+from vico.world.city_world import CityWorld
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap
 from vico.world.world import World
@@ -74,6 +75,14 @@ def _raise_triangles(tops, half, corners):  # type: ignore[no-untyped-def]
                 tops[row, column] = max(tops[row, column], z)
 
 
+def _parts(world: World) -> Iterator[World]:
+    """Yield a world, or the tiles of a city one by one: nobody keeps what is read of them."""
+    if isinstance(world, CityWorld):
+        yield from (world.part([(tile.column, tile.row)]) for tile in world.city.manifest.tiles)
+    else:
+        yield world
+
+
 def _corners(world: World, layers: tuple[str, ...]) -> Iterator[Array]:
     """Yield the corners of the triangles of each surface of some layers, shape ``(k, 3, 3)``."""
     for layer in layers:
@@ -102,9 +111,16 @@ class Airspace:
         self.half, self.ground, self._walkable = float(world.half), world.height, world.walkable
         self._floor = self._heights()
         self.solid = self._floor.copy()
-        for corners in _corners(world, ("collision",)):
-            _raise_triangles(self.solid, self.half, corners)
+        for part in _parts(world):
+            for corners in _corners(part, ("collision",)):
+                _raise_triangles(self.solid, self.half, corners)
         self.tops = self.solid.copy()
+        for part in _parts(world):
+            self._raise(part)
+        self._highest = float(self.tops.max())
+
+    def _raise(self, world: World) -> None:
+        """Raise the tops of cells to what is seen in a world, or in a part of it."""
         for corners in _corners(world, ("buildings", "roofs")):
             _raise_triangles(self.tops, self.half, corners)
         objects = world.objects.where(world.objects.outdoors)
@@ -118,8 +134,6 @@ class Airspace:
         ):
             part = self._window(x, y, math.hypot(a, b) if abs(a - b) > 0.05 * a else a)
             self.tops[part] = np.maximum(self.tops[part], z)
-
-        self._highest = float(self.tops.max())
 
     # Heights.
 
@@ -165,13 +179,18 @@ class Airspace:
     @cached_property
     def flat(self) -> NDArray[np.bool_]:
         """Where one can land: it is even, and what is seen there is solid; shape ``(n, n)``."""
-        size = 2 * round(_SPOT / _CELL) + 1
-        rough = ndimage.maximum_filter(self.tops, size) - ndimage.minimum_filter(self.tops, size)
-        flat = (rough < _UNEVEN) & (np.abs(self.tops - self.solid) < 0.05)
+        reach, n = round(_SPOT / _CELL), len(self.tops)
+        flat = np.empty(self.tops.shape, np.bool_)
+        for first in range(0, n, _ROWS):
+            rows = slice(first, min(first + _ROWS, n))
+            around = self.tops[max(first - reach, 0) : rows.stop + reach]
+            size, before = 2 * reach + 1, min(first, reach)
+            rough = ndimage.maximum_filter(around, size) - ndimage.minimum_filter(around, size)
+            uneven = rough[before : before + rows.stop - first] >= _UNEVEN
+            flat[rows] = ~uneven & (np.abs(self.tops[rows] - self.solid[rows]) < 0.05)
         margin = math.ceil(BESIDE / _CELL)
-        inner = np.zeros_like(flat)
-        inner[margin:-margin, margin:-margin] = flat[margin:-margin, margin:-margin]
-        return inner
+        flat[:margin] = flat[-margin:] = flat[:, :margin] = flat[:, -margin:] = False
+        return flat
 
     def is_flat(self, xy: ArrayLike) -> bool:
         """Return whether one can land at a point."""
@@ -183,9 +202,8 @@ class Airspace:
     @cached_property
     def off_streets(self) -> NDArray[np.bool_]:
         """Where one can land and stay in nobody's way: not on roadways and crossings; shape ``(n, n)``."""
-        row = (np.arange(len(self.flat)) + 0.5) * _CELL - self.half
-        column, line = np.moveaxis(self._walkable.cell_of(np.stack(np.meshgrid(row, row), axis=-1)), -1, 0)
-        street = np.isin(self._walkable.cls, (ROADWAY, CROSSING))[line, column]
+        cells = self._walkable.cell_of(np.repeat((np.arange(len(self.flat)) + 0.5) * _CELL - self.half, 2).reshape(-1, 2))
+        street = np.isin(self._walkable.cls, (ROADWAY, CROSSING))[np.ix_(cells[:, 1], cells[:, 0])]
         return self.flat & ~ndimage.binary_dilation(street, iterations=math.ceil(_KERBSIDE / _CELL))
 
     def flat_near(self, xy: ArrayLike) -> Array | None:
