@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -187,7 +188,7 @@ def walkways_of(
         for i, (name, crossing, line, z, width, junction) in enumerate(ways)
     ]
     for place, outline, touching in corners:
-        area = overlay.mended(shapely.Polygon(outline)) if len(outline) > 2 else shapely.Polygon()
+        area = _Corner(overlay.mended(shapely.Polygon(outline)) if len(outline) > 2 else shapely.Polygon())
         for k, (a, side_a) in enumerate(touching):
             for b, side_b in touching[k + 1 :]:
                 i, j = number[a], number[b]
@@ -198,7 +199,7 @@ def walkways_of(
                     end = end + np.array([0.05, 0.0])
                 width = min(ways[i][4], ways[j][4])
                 ends = (2 * i + side_a, 2 * j + side_b)
-                path = _path_within(area, start, end)
+                path = area.path(start, end)
                 z = np.interp(_along(path), [0.0, _along(path)[-1]], [ways[i][3][-side_a], ways[j][3][-side_b]])
                 rows.append(_Row("", CORNER, path, z, width, *sides(path, width), place, ends))
     return _packed(rows)
@@ -256,27 +257,46 @@ def _packed(rows: list[_Row]) -> Walkways:
     )
 
 
-def _path_within(area: shapely.Geometry, start: Floats, end: Floats) -> Floats:
-    """Return the shortest way between two points that stays in an area; straight where the area is degenerate."""
-    straight = np.array([start, end])
-    grown = overlay.buffer(area, 0.15)
-    if area.is_empty or grown.covers(shapely.LineString(straight)):
-        return straight
-    inner = overlay.buffer(area, -BODY)
-    rings = [np.asarray(p.exterior.coords)[:-1] for p in shapely.get_parts(inner) if isinstance(p, shapely.Polygon)]
-    if not rings or not any(len(ring) for ring in rings):
-        return straight
-    points = np.concatenate([straight, *rings])
-    a, b = np.triu_indices(len(points), 1)
-    shapely.prepare(grown)
-    lines = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
-    seen = shapely.covers(grown, lines)
-    size = np.linalg.norm(points[a] - points[b], axis=1) + 1e-9
-    graph = csr_matrix((size[seen], (a[seen], b[seen])), shape=(len(points), len(points)))
-    _, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
-    if before[1] < 0:
-        return straight
-    chain = [1]
-    while chain[-1] != 0:
-        chain.append(int(before[chain[-1]]))
-    return points[chain[::-1]]
+class _Corner:
+    """An area between the ends of walkways, and ways in it."""
+
+    def __init__(self, area: shapely.Geometry) -> None:
+        self._area = area
+        self._grown = overlay.buffer(area, 0.15)
+        shapely.prepare(self._grown)
+
+    def path(self, start: Floats, end: Floats) -> Floats:
+        """Return the shortest way between two points that stays in the area; straight where that is degenerate."""
+        straight = np.array([start, end])
+        if self._area.is_empty or self._grown.covers(shapely.LineString(straight)):
+            return straight
+        ring, ring_seen = self._ring
+        if not len(ring):
+            return straight
+        points = np.concatenate([straight, ring])
+        # The two ends come first, so what they see comes before what the ring's points see of each other.
+        a, b = np.triu_indices(len(points), 1)
+        first = len(a) - len(ring_seen)
+        seen = np.concatenate([self._sees(points[a[:first]], points[b[:first]]), ring_seen])
+        size = np.linalg.norm(points[a] - points[b], axis=1) + 1e-9
+        graph = csr_matrix((size[seen], (a[seen], b[seen])), shape=(len(points), len(points)))
+        _, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+        if before[1] < 0:
+            return straight
+        chain = [1]
+        while chain[-1] != 0:
+            chain.append(int(before[chain[-1]]))
+        return points[chain[::-1]]
+
+    @cached_property
+    def _ring(self) -> tuple[Floats, NDArray[np.bool_]]:
+        """Points a body's width inside of the outline, and which pairs of them see each other."""
+        inner = overlay.buffer(self._area, -BODY)
+        rings = [np.asarray(p.exterior.coords)[:-1] for p in shapely.get_parts(inner) if isinstance(p, shapely.Polygon)]
+        points = np.concatenate([np.zeros((0, 2)), *rings])
+        a, b = np.triu_indices(len(points), 1)
+        return points, self._sees(points[a], points[b])
+
+    def _sees(self, one: Floats, other: Floats) -> NDArray[np.bool_]:
+        """Return whether straight lines between points stay in the area, shape ``(n,)``."""
+        return np.asarray(shapely.covers(self._grown, shapely.linestrings(np.stack([one, other], axis=1))))

@@ -202,7 +202,8 @@ class Airspace:
     @cached_property
     def off_streets(self) -> NDArray[np.bool_]:
         """Where one can land and stay in nobody's way: not on roadways and crossings; shape ``(n, n)``."""
-        cells = self._walkable.cell_of(np.repeat((np.arange(len(self.flat)) + 0.5) * _CELL - self.half, 2).reshape(-1, 2))
+        axis = (np.arange(len(self.flat)) + 0.5) * _CELL - self.half
+        cells = self._walkable.cell_of(np.stack([axis, axis], axis=1))
         street = np.isin(self._walkable.cls, (ROADWAY, CROSSING))[np.ix_(cells[:, 1], cells[:, 0])]
         return self.flat & ~ndimage.binary_dilation(street, iterations=math.ceil(_KERBSIDE / _CELL))
 

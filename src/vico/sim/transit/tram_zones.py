@@ -18,6 +18,8 @@ _SAME = 0.6
 _ALIGNED = 0.5  # radians
 #: Between two zones of a track there has to be room for a tram and this much more, metres, or they are one.
 _ROOM = 6.0
+# Points of a track that are looked at together: most of two tracks are far from each other.
+_BLOCK = 64
 
 
 @dataclass(frozen=True)
@@ -53,16 +55,23 @@ def zones_of(tracks: Sequence[Track]) -> tuple[list[list[TramZone]], int]:
 def _contested(tracks: Sequence[Track]) -> list[NDArray[np.bool_]]:
     """Mark the points of each track where a tram on another one could be in the way, other than ahead of it."""
     marks = [np.zeros(len(track.xy), np.bool_) for track in tracks]
+    headings, boxes = [_heading(track) for track in tracks], [_boxes(track.xy, track.half_width) for track in tracks]
     for i, one in enumerate(tracks):
-        heading = _heading(one)
         for j, other in enumerate(tracks):
             if i == j:
                 continue
-            nearest, away, meets = _look_across(one.xy, one.half_width, other.xy, other.half_width)
-            turn = np.abs((heading - _heading(other)[nearest] + np.pi) % (2 * np.pi) - np.pi)
-            same = (away < _SAME) & (turn < _ALIGNED)
-            marks[i] |= meets & ~same
+            nearest, away, meets = _look_across(one.xy, one.half_width, other.xy, other.half_width, boxes[j])
+            k = np.flatnonzero(meets)
+            turn = np.abs((headings[i][k] - headings[j][nearest[k]] + np.pi) % (2 * np.pi) - np.pi)
+            marks[i][k] |= ~((away[k] < _SAME) & (turn < _ALIGNED))
     return marks
+
+
+def _boxes(xy: NDArray[np.float64], half_width: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Boxes around each so many points: west, south, east, north, and the largest half width there and a little."""
+    first = np.arange(0, len(xy), _BLOCK)
+    low, high = np.minimum.reduceat(xy, first), np.maximum.reduceat(xy, first)
+    return np.column_stack([low, high, np.maximum.reduceat(half_width, first) + 1e-6])
 
 
 def _heading(track: Track) -> NDArray[np.float64]:
@@ -71,19 +80,27 @@ def _heading(track: Track) -> NDArray[np.float64]:
 
 
 @compiled
-def _look_across(one, one_half, other, other_half):  # type: ignore[no-untyped-def]
-    """Return the nearest point of another track to each one of a track, its distance, and whether trams could touch."""
+def _look_across(one, one_half, other, other_half, boxes):  # type: ignore[no-untyped-def]
+    """Return the nearest point of another track to each one of a track, its distance, and whether trams could touch.
+
+    `boxes` are those of the other track. Of where trams could not touch the first two say nothing.
+    """
     n = len(one)
     nearest, away, meets = np.zeros(n, np.int64), np.full(n, np.inf), np.zeros(n, np.bool_)
     for i in range(n):
         best = np.inf
-        for j in range(len(other)):
-            dx, dy = one[i, 0] - other[j, 0], one[i, 1] - other[j, 1]
-            square = dx * dx + dy * dy
-            if square < best:
-                best, nearest[i] = square, j
-            reach = one_half[i] + other_half[j]
-            meets[i] |= square < reach * reach
+        x, y = one[i, 0], one[i, 1]
+        for b in range(len(boxes)):
+            reach = one_half[i] + boxes[b, 4]
+            if x < boxes[b, 0] - reach or x > boxes[b, 2] + reach or y < boxes[b, 1] - reach or y > boxes[b, 3] + reach:
+                continue
+            for j in range(b * _BLOCK, min((b + 1) * _BLOCK, len(other))):
+                dx, dy = x - other[j, 0], y - other[j, 1]
+                square = dx * dx + dy * dy
+                if square < best:
+                    best, nearest[i] = square, j
+                reach = one_half[i] + other_half[j]
+                meets[i] |= square < reach * reach
         away[i] = np.sqrt(best)
     return nearest, away, meets
 
@@ -109,7 +126,9 @@ def _joined(tracks: Sequence[Track], runs: Sequence[tuple[int, int, int]]) -> li
             j, c, d = runs[q]
             one, other = slice(a, b + 1), slice(c, d + 1)
             here, there = tracks[i], tracks[j]
-            _, _, meets = _look_across(here.xy[one], here.half_width[one], there.xy[other], there.half_width[other])
+            xy, half_width = there.xy[other], there.half_width[other]
+            boxes = _boxes(xy, half_width)
+            _, _, meets = _look_across(here.xy[one], here.half_width[one], xy, half_width, boxes)
             if bool(meets.any()) and name[p] != name[q]:
                 old, new = max(name[p], name[q]), min(name[p], name[q])
                 name = [new if n == old else n for n in name]
