@@ -53,7 +53,7 @@ def drawn(surfaces: list[Surface], count: int = 3000) -> np.ndarray:
     random = np.random.default_rng(0)
     found = []
     for surface in surfaces:
-        if surface.material.name in ("paint", "ground_tactile"):
+        if surface.material.name == "paint":
             continue
         corner = surface.positions[surface.triangles].astype(np.float64)
         across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -221,3 +221,23 @@ def test_water_flows_on_below_a_bridge_without_a_hole(shared_data: Path) -> None
     # The river's line leads below the Pont Prat de la Creu, which the map parts the water at.
     river = shapely.LineString([(20.0, 36.0), (7.0, 12.0), (-4.0, -9.0), (-20.0, -38.0)])
     assert shapely.difference(river, flow).length < 1.0
+
+
+def test_ribbed_slabs_lie_in_the_pavement_not_under_it(
+    osm: OsmData, streets: StreetPolygons, level: HeightField
+) -> None:
+    ground = ground_of(osm, level, streets)
+    slabs = [_plan(s) for s in ground if s.material.name == "ground_tactile"]
+    # What lies half a metre below shows nowhere.
+    others = [_plan(s, above=-0.4) for s in ground if s.material.name not in ("paint", "ground_tactile")]
+    laid, around = shapely.union_all(np.concatenate(slabs)), np.concatenate(others)
+    near = around[shapely.STRtree(around).query(laid, predicate="intersects")]
+    assert laid.area > 20.0
+    assert shapely.intersection(laid, shapely.union_all(near)).area < 0.01 * laid.area
+
+
+def _plan(surface: Surface, above: float = -1.0) -> np.ndarray:
+    """Return a surface's triangles in plan, those that hang from kerbs and those below some height left out."""
+    corners = surface.positions[surface.triangles].astype(np.float64)
+    shapes: np.ndarray = shapely.polygons(corners[corners[:, :, 2].min(axis=1) > above][:, :, :2])
+    return shapes[shapely.area(shapes) > 1e-4]

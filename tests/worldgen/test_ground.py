@@ -114,15 +114,44 @@ def test_the_partition_covers_the_window_once(osm: OsmData, streets: StreetPolyg
 
 
 def test_the_mesh_faces_up_and_covers_the_ground_and_its_underlay(osm: OsmData, ground: list[Surface]) -> None:
-    on_top = ("paint", "ground_tactile")
     for surface in ground:
         assert (surface.normals[:, 2] > -1e-6).all()
     # Under houses nothing is drawn but the underlay; the mouths of tunnels stand on the ground.
     window = shapely.box(-HALF - 40, -HALF - 40, HALF + 40, HALF + 40)
     houses = [a.polygon for a in osm.areas if a.tags.get("building", "no") != "no"]
     inside = shapely.intersection(shapely.union_all(shapely.buffer(houses, -1.5, join_style="mitre")), window).area
-    total = sum(plan_area(s) for s in ground if s.material.name not in on_top)
+    total = sum(plan_area(s) for s in ground if s.material.name != "paint")
     assert 2 * window.area - 1.02 * inside < total < 2 * window.area + 1500.0
+
+
+def _streets_alone(osm: OsmData, *lines: list[tuple[float, float]], tags: dict[str, str]) -> StreetPolygons:
+    """Return what streets some ways alone make."""
+    nodes = {point: k for k, point in enumerate(dict.fromkeys(point for line in lines for point in line), 1)}
+    ways = [
+        OsmWay(k, [nodes[point] for point in line], np.array(line), line[0] == line[-1], tags)
+        for k, line in enumerate(lines, 1)
+    ]
+    return road_polygons(site_facts(replace(osm, nodes=[], ways=ways, areas=[], relations=[])))
+
+
+def test_what_is_narrow_between_pavings_is_paved_and_lawns_keep_their_corners(osm: OsmData) -> None:
+    lawn = [(0.0, 60.0), (40.0, 60.0), (40.0, 90.0), (0.0, 90.0), (0.0, 60.0)]
+    fork = [(40.0, 4.0), (0.0, 0.0)], [(0.0, 0.0), (40.0, -4.0)]
+    walk = _streets_alone(osm, *fork, lawn, tags={"highway": "footway", "width": "2"}).sidewalk
+    # Between two ways that part a knife's point would be left; it is a metre wide where it begins.
+    gap = shapely.difference(shapely.Polygon([(0.0, 0.0), (38.0, 3.8), (38.0, -3.8)]), walk)
+    beginning = gap.bounds[0]
+    assert 13.0 < beginning < 16.0
+    assert shapely.intersection(gap, shapely.box(beginning, -9, beginning + 0.1, 9)).bounds[3] > 0.35
+    inside = shapely.difference(shapely.Polygon(lawn), walk)
+    assert inside.area == pytest.approx(38.0 * 28.0, abs=0.1)
+
+
+def test_corners_of_junctions_are_paved_as_the_streets_around_them(osm: OsmData) -> None:
+    lines = [(-40.0, 0.0), (0.0, 0.0), (40.0, 0.0)], [(0.0, -40.0), (0.0, 0.0), (0.0, 40.0)]
+    plan = _streets_alone(osm, *lines, tags={"highway": "tertiary", "surface": "sett"})
+    assert shapely.difference(plan.carriageway, plan.paved["setts"]).area < 0.2
+    assert _streets_alone(osm, *lines, tags={"highway": "tertiary"}).paved == {}
 
 
 def test_entities_tell_roads_greens_and_the_rest_apart(ground: list[Surface]) -> None:

@@ -266,6 +266,16 @@ def test_wires_hang_over_tram_tracks_and_are_held_by_walls_at_both_sides() -> No
     )
 
 
+def test_rails_of_trams_beside_the_street_lie_as_high_as_the_ground_there() -> None:
+    line = np.array([(-60.0, 0.0), (0.0, 0.0), (0.0, 60.0)])
+    plan = replace(city(street(1, (-80.0, 0.0), (80.0, 0.0))), rails=[line])
+    quads = [group for group in road_markings(plan, WINDOW) if group.colour == (134, 131, 127)]
+    inside = {group.low: np.abs(group.corners[..., 1]).max(axis=1) <= 4.6 for group in quads}
+    assert set(inside) == {True, False}
+    assert inside[True].all()
+    assert not inside[False].any()
+
+
 def test_tracks_lie_on_sleepers_but_where_a_street_or_a_footway_leads_across() -> None:
     streets, window = city(street(1, (0.0, -30.0), (0.0, 30.0))), shapely.box(-50, -50, 50, 50)
     groups = road_markings(streets, window, tracks=[np.array([[-20.0, 0.0], [20.0, 0.0]])])

@@ -93,7 +93,10 @@ def road_markings(
     if habits.kerb_lines == "double_yellow":
         yellow += _kerb_lines(streets, parting, longest)
     beside, across = _parted(tracks, streets)
-    rails, grooves = _rails([*streets.rails, *across], longest)
+    # Trams have beds of their own, too: lawns and pavements higher than the street, where they lie as high.
+    off_street, in_street = _parted(streets.rails, streets)
+    rails, grooves = _rails([*in_street, *across], longest)
+    flush, flush_grooves = _rails(off_street, longest)
     bare, sleepers = _rails(beside, longest)[0], _sleepers(tracks, streets)
     painted = streets.steps if stepped is None else overlay.difference(streets.steps, overlay.buffer(stepped, 0.1))
     treads: list[NDArray[np.float64]] = []
@@ -112,7 +115,9 @@ def road_markings(
         Quads(cut_to(sleepers, window), _SLEEPERS, low=False, rank=0),
         Quads(cut_to(bare, window), _STEEL, low=False),
         Quads(cut_to(grooves, window), _GROOVE),
+        Quads(cut_to(flush_grooves, window), _GROOVE, low=False),
         Quads(cut_to(rails, window), _STEEL, rank=2),
+        Quads(cut_to(flush, window), _STEEL, low=False, rank=2),
         Quads(cut_to(treads, window), (112, 108, 104), low=False),
         Quads(cut_to(bays, window), _FADED, low=False),
     ]

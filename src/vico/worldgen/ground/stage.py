@@ -55,13 +55,13 @@ _SLOPING = 0.17  # ... and from which a yard is not paved
 _SLOPE_CELL = 2.0
 _SLOPE_MARGIN = 16.0
 _NARROW = 0.8  # metres, half the width of the narrowest lawn on a hillside
-_TACTILE = 0.012  # of ribbed slabs
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _AT_EDGE = 0.06  # metres within which two outlines are the same edge
 _OVERHANG = 6.0  # metres beside the ways of bridges where water that is hidden goes on
 _NO_TREES = np.zeros((0, 2))
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
-_PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
+_BEFORE_CROSSINGS = ("sidewalk", "pedestrian")
+_PAVED = ("kerb", "tactile", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 
 
 def ground_from_osm(
@@ -115,6 +115,8 @@ def ground_from_osm(
     if bridges.cuts:
         pieces = {name: _without(shapes, holes, window) for name, shapes in pieces.items()}
     level = is_level(terrain)
+    if terrain.steps is not None:
+        pieces = _with_tactile(pieces, tactile_fields(streets, window), window)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
     hidden = _hidden(osm, standing)
     laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, yards=yards)
@@ -143,7 +145,6 @@ def ground_from_osm(
     if terrain.steps is not None:
         surfaces += _kerbs(plan, laid, streets, terrain, reach, look("kerb"))
         surfaces += _banks(under, waters, plan, laid, terrain, window)
-        surfaces += _tactile(streets, terrain, window, look("tactile"))
     surfaces += flights.surfaces()
     surfaces += bridges.surfaces(site, terrain, streets, window)
     quads = road_markings(
@@ -444,13 +445,16 @@ def _banks(
     return found
 
 
-def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon, look: GroundStyle) -> list[Surface]:
-    """Ribbed slabs on the pavement before painted crossings."""
-    shapes = tactile_fields(streets, window)
-    flat, faces = triangulated(shapes)
-    if not len(faces):
-        return []
-    return [_surface(flat, terrain.upper(flat) + _TACTILE, terrain_normals(terrain, flat), faces, look)]
+def _with_tactile(
+    pieces: dict[str, list[Polygon]], fields: Sequence[Polygon], window: Polygon
+) -> dict[str, list[Polygon]]:
+    """Lay ribbed slabs into the paving before painted crossings."""
+    slabs = shapely.MultiPolygon(list(fields))
+    laid = {name: shapes for name, shapes in pieces.items() if name.partition(":")[0] in _BEFORE_CROSSINGS}
+    found = [slab for shapes in laid.values() for slab in _within(shapes, slabs, window)]
+    if not found:
+        return pieces
+    return {**pieces, **{name: _without(shapes, slabs, window) for name, shapes in laid.items()}, "tactile": found}
 
 
 def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np.float64]:

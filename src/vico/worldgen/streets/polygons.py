@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -18,9 +19,16 @@ from vico.worldgen.facts.expendable import NamedShape, changed, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.streets.crossings import crossings_of
-from vico.worldgen.streets.strips import strips_of
+from vico.worldgen.streets.strips import Strips, strips_of
 
 _KERB_RADIUS = 2.0
+#: Ground between paved surfaces that is narrower than this is paved, metres: lines that were drawn one by one leave it,
+#: and it would end in knives' points.
+_NARROW = 1.0
+_LEAST_GAP, _LEAST_CORNER = 0.02, 0.05  # square metres
+_BESIDE = 0.05  # metres from a strip within which an outline is its edge
+#: How its outline is offset: right angles stay, what is more pointed is cut off.
+_BLUNT = {"join_style": "mitre", "mitre_limit": 1.5}
 _GRID = 0.001  # metres: overlays on a grid are robust where free ones fail on nearly coincident outlines
 
 
@@ -44,7 +52,8 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
     window = shapely.box(-reach, -reach, reach, reach)
     solid = united(changed(obstacles, overlay.mended), grid=_GRID) if len(obstacles) else MultiPolygon()
     strips = strips_of(site)
-    carriageway = _carriageway(strips.drive, strips.through, solid, window)
+    driven = united(strips.drive, grid=_GRID)
+    carriageway = _carriageway(driven, strips.through, solid, window)
     crossings = crossings_of(site.osm, carriageway, strips.streets, strips.crossings)
     left = _Unclaimed(overlay.union(carriageway, solid, grid=_GRID), window)
     steps = left.claim(strips.stairs)
@@ -54,6 +63,7 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
     sidewalk = left.claim(strips.walk)
     path = left.claim(strips.loose)
     parking = left.claim(strips.car_park)
+    sidewalk = left.claim_gaps(sidewalk)
     return StreetPolygons(
         carriageway=_multi(carriageway),
         sidewalk=sidewalk,
@@ -69,23 +79,41 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
         sunken=_sunken(strips.kerbed, carriageway),
         paved={
             name: _multi(overlay.intersection(_multi(united(shapes, grid=_GRID)), window))
-            for name, shapes in sorted(strips.paved.items())
+            for name, shapes in sorted(_with_corners(strips, driven, carriageway).items())
         },
     )
 
 
-def _carriageway(
-    drive: list[NamedShape], through: list[NamedShape], solid: BaseGeometry, window: Polygon
-) -> MultiPolygon:
+def _carriageway(driven: BaseGeometry, through: list[NamedShape], solid: BaseGeometry, window: Polygon) -> MultiPolygon:
     """Carriageways in one, without what lies under buildings except where a way leads `through`."""
     # Closing the outline rounds the inner corners of junctions the way kerbs do.
-    carriageway = united(drive, grid=_GRID)
-    carriageway = overlay.buffer(overlay.buffer(carriageway, _KERB_RADIUS, quad_segs=4), -_KERB_RADIUS, quad_segs=4)
+    carriageway = overlay.buffer(overlay.buffer(driven, _KERB_RADIUS, quad_segs=4), -_KERB_RADIUS, quad_segs=4)
     carriageway = overlay.on_grid(overlay.simplify(carriageway, 0.08), grid=_GRID)
     if not solid.is_empty:
         under = overlay.difference(solid, united(through, grid=_GRID), grid=_GRID)
         carriageway = overlay.difference(carriageway, under, grid=_GRID)
     return _multi(overlay.intersection(_multi(carriageway), window, grid=_GRID))
+
+
+def _with_corners(strips: Strips, driven: BaseGeometry, carriageway: BaseGeometry) -> dict[str, list[NamedShape]]:
+    """Return strips by paving; what of carriageways is of no street is paved as most of the streets around it are."""
+    corners = polygons_of(overlay.difference(carriageway, driven, grid=_GRID), _LEAST_CORNER)
+    if not strips.paved or not corners:
+        return strips.paved
+    said = {id(strip): name for name, shapes in strips.paved.items() for strip in shapes}
+    pavings = ["", *sorted(strips.paved)]
+    paving = np.array([pavings.index(said.get(id(strip), "")) for strip in strips.drive])
+    # A point each half metre of outlines counts for each strip that it lies beside.
+    points, owner = shapely.get_coordinates(shapely.segmentize(shapely.boundary(corners), 0.5), return_index=True)
+    tree = shapely.STRtree([strip.shape for strip in strips.drive])
+    at, beside = tree.query(shapely.points(points), predicate="dwithin", distance=_BESIDE)
+    counts = np.zeros((len(corners), len(pavings)), np.int64)
+    np.add.at(counts, (owner[at], paving[beside]), 1)
+    found = {name: list(shapes) for name, shapes in strips.paved.items()}
+    for corner, most in zip(corners, counts.argmax(axis=1).tolist(), strict=True):
+        if most:
+            found[pavings[most]].append(NamedShape("carriageway", corner))
+    return found
 
 
 class _Unclaimed:
@@ -101,6 +129,18 @@ class _Unclaimed:
         left = _multi(overlay.difference(_multi(shape), self._taken, grid=_GRID), 0.3)
         self._taken = overlay.union(self._taken, left, grid=_GRID)
         return left
+
+    def claim_gaps(self, walk: MultiPolygon) -> MultiPolygon:
+        """Claim what is narrow between all that was claimed and lies beside a walk; return the walk with it."""
+        closed = overlay.buffer(overlay.buffer(self._taken, _NARROW / 2, **_BLUNT), -_NARROW / 2, **_BLUNT)
+        inside = overlay.intersection(_multi(closed), self._window, grid=_GRID)
+        gaps = np.array(polygons_of(overlay.difference(inside, self._taken, grid=_GRID), _LEAST_GAP), object)
+        shapely.prepare(walk)
+        beside = gaps[shapely.dwithin(walk, gaps, 2 * _GRID)] if len(gaps) else gaps
+        if not len(beside):
+            return walk
+        self._taken = overlay.union_all([self._taken, *beside], grid=_GRID)
+        return _multi(overlay.union_all([walk, *beside], grid=_GRID))
 
 
 def _sunken(kerbed: list[NamedShape], carriageway: BaseGeometry) -> MultiPolygon:
