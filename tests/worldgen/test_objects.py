@@ -12,6 +12,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
+from vico.world.transit_model import TramLine, Transit
 from vico.world.world import World
 from vico.worldgen.objects.stage import Grounds, objects_from_osm
 
@@ -101,6 +102,19 @@ def test_lamps_stand_at_both_kerbs_of_a_street_in_town_but_where_some_are_mapped
     assert len({y > 0 for _, y in everywhere}) == 2
     assert lamps(lit="no") == []
     assert len(lamps([node(k, -40.0 + 20.0 * k, 4.5, highway="street_lamp") for k in range(5)])) == 5
+
+
+def test_nothing_stands_on_tracks_beside_the_street() -> None:
+    line = TramLine(
+        id="t", name="1", kind="tram", colour="#000000", track=[(-50.0, 10.0), (50.0, 10.0)],
+        stops=[], offsets=[], departures=[], travel=[],
+    )  # fmt: skip
+    trams = Transit(stops=[], lines=[], bike_stations=[], origin={}, tram_lines=[line])
+    mapped = [node(1, 0.0, 10.2, highway="street_lamp"), node(2, 20.0, 13.0, amenity="bench")]
+    objects, _ = placed(mapped, transit=trams)
+    assert len(objects) == 2
+    assert (np.abs(objects.y - 10.0) > 1.3).all()
+    assert np.abs(placed(mapped)[0].y - 10.0).min() < 0.3
 
 
 def test_posts_across_a_path_leave_it_open() -> None:

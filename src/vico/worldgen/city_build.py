@@ -21,6 +21,7 @@ from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm_parts import OsmParts
 from vico.io.files import read_json, sha256_of, write_json
+from vico.io.memory import give_back_memory
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.version import __version__
 from vico.world.city import CITY, TILES, City, CityManifest, CityTile, read_city
@@ -160,11 +161,13 @@ def build_city(
             reports = make_streets(request, region)
             _tell(progress, "streets", 1)
         del region
+        give_back_memory()
         left = done("fit", done("build", left))
         if left:
             tiles = dict(found)
             maps = {one: request.out / TILES / tile_name(one) / "walkable.npz" for one in left}
             _walking(request, maps)
+            give_back_memory()
             if lost := set(left).difference(done("gates", left)):
                 name = tile_name(min(lost))
                 raise StageError(f"city build: the ways out of tile {name} can't be found: {failed[name]}")

@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.assets.models.model import Model
 from vico.assets.models.street import street_models
 from vico.geo.osm import OsmData
+from vico.rules import TRAM_WIDTH
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
@@ -40,6 +41,7 @@ from vico.worldgen.objects.wishes import Wish
 _LAMPS = ("street_lamp", "lamp")  # kinds
 _TWIN_GAP = 0.3  # metres between two that are one, mapped twice
 _KERB_REACH = 9.0  # signals and signs are mapped on the street's middle
+_TRAM = TRAM_WIDTH / 2 + 0.15  # metres beside the middle of a track that nothing stands in
 _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a little less than `vico check` allows
 
 
@@ -100,7 +102,8 @@ def objects_from_osm(
     """
     half, carriageway, openings = osm.half, grounds.carriageway, grounds.openings
     models = street_models()
-    site = Site(solids=grounds.solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
+    swept = [*_swept(lanes), *_tram_beds(transit)]
+    site = Site(solids=grounds.solids, carriageway=carriageway, lanes=swept, openings=openings, half=half)
     zone, where = planting(osm, height), region(osm)
     mapped = mapped_wishes(osm, height, seed)
     lamps = np.array([wish.xy for wish in mapped if models[wish.prototype].kind in _LAMPS]).reshape(-1, 2)
@@ -144,6 +147,13 @@ def _swept(lanes: LaneGraph | None) -> list[BaseGeometry]:
     lines = [NamedShape(lanes.ids[int(k)], shapely.LineString(lanes.line(int(k))[:, :2])) for k in driven]
     widths = np.maximum(lanes.width[driven] / 2 - _SWEPT, 0.1)
     return [strip.shape for strip in widened(lines, widths, cap_style="flat")]
+
+
+def _tram_beds(transit: Transit | None) -> list[BaseGeometry]:
+    """Return what trams sweep, in the street and beside it."""
+    lines = [] if transit is None else transit.tram_lines
+    named = [NamedShape(line.id, shapely.LineString(line.track)) for line in lines]
+    return [strip.shape for strip in widened(named, np.full(len(named), _TRAM), cap_style="flat")]
 
 
 def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str, Any]]) -> str | None:
