@@ -67,9 +67,9 @@ def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) 
     soft = mapped_areas(site, window)
     square = _square(streets, soft)
     paved = overlay.union_all([streets.sidewalk, square, streets.cycleway], grid=_GRID)
-    kerb = overlay.buffer(streets.carriageway, _CURB, quad_segs=2, join_style="mitre")
-    kerb = overlay.difference(overlay.on_grid(kerb, grid=_GRID), streets.carriageway, grid=_GRID)
-    kerb = overlay.intersection(overlay.areas_of(kerb), overlay.areas_of(paved), grid=_GRID)
+    # Lawns have a stone where the street lies lower, pavements everywhere.
+    kerb = overlay.intersection(_stones(streets.carriageway, streets), overlay.areas_of(paved), grid=_GRID)
+    kerb = overlay.union(kerb, _stones(streets.sunken, streets), grid=_GRID)
     ranked: dict[str, BaseGeometry] = {
         "carriageway": streets.carriageway,
         "kerb": kerb,
@@ -99,6 +99,13 @@ def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) 
     result["yard"] = pieces_in(overlay.intersection(left, near, grid=_GRID), window)
     result["field"] = pieces_in(overlay.difference(left, near, grid=_GRID), window)
     return {name: shapes for name, shapes in result.items() if shapes}
+
+
+def _stones(road: BaseGeometry, streets: StreetPolygons) -> BaseGeometry:
+    """Return the strip of kerb stones around a part of the carriageways."""
+    strip = overlay.buffer(road, _CURB, quad_segs=2, join_style="mitre")
+    strip = overlay.difference(overlay.on_grid(strip, grid=_GRID), streets.carriageway, grid=_GRID)
+    return overlay.areas_of(strip)
 
 
 def _square(streets: StreetPolygons, soft: dict[str, list[NamedShape]]) -> BaseGeometry:
