@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.models.model import Model
+from vico.assets.models.model import Model, Seat
 from vico.rules import REACH
 from vico.sim.indoor import Indoor
 from vico.world.heights import HeightField
@@ -114,7 +114,9 @@ class Seats:
     @classmethod
     def of(cls, objects: Objects, models: Mapping[str, Model], indoor: Indoor, ground: HeightField) -> Seats:
         """Find the seats among a world's things; those of models nobody knows are none."""
-        lots = [_places_of(objects, name, models[name]) for name in np.unique(objects.prototype) if name in models]
+        # A city has millions of things: only those that may be seats are looked for.
+        seats = {name: model.seat for name, model in models.items() if model.seat is not None}
+        lots = [_places_of(objects, name, seats[name]) for name in np.unique(objects.prototype) if name in seats]
         rows = np.concatenate([np.zeros((0, 6)), *lots])
         # The number of a row's object: seats of one room stay in the objects' order.
         owner = rows[:, 0].astype(np.int64)
@@ -218,13 +220,10 @@ class Seats:
         return np.array([x + away * math.cos(yaw), y + away * math.sin(yaw), self.floor[seat]])
 
 
-def _places_of(objects: Objects, name: str, model: Model) -> NDArray[np.float64]:
+def _places_of(objects: Objects, name: str, seat: Seat) -> NDArray[np.float64]:
     """Return the places on all things of a model: object, x, y, z, yaw, whether one lies, float64, shape ``(k, 6)``."""
-    seat = model.seat
     which = np.flatnonzero(objects.prototype == name)
-    if seat is None or not len(which):
-        return np.zeros((0, 6))
-    parts = []
+    parts = [np.zeros((0, 6))]
     c, s, scale = np.cos(objects.yaw[which]), np.sin(objects.yaw[which]), objects.scale[which]
     for u, v in seat.places:
         x = objects.x[which] + scale * (c * u - s * v)
