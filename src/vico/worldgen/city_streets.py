@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vico.geo.osm import OsmData
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
+from vico.io.memory import give_back_memory
 from vico.world.city_files import EDGE, HIGH, LOW, NET, ROADS, SMOOTH, TRANSIT, WHOLE, XODR
 from vico.world.city_files import LEVELS as LEVELS_OF_CITY
 from vico.world.city_ground import give_back, whole_ground
@@ -132,10 +133,13 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     height = given(replace(levels, decks=None, stairs=None), f"ground {both}")
     solids = given(solids_of(shapes, request.grid), f"solids {both}")
     streets = stages.run("polygons", streets_of, given(shapes, both), request.grid)
-    usable = frozenset(way for shape in shapes.values() for way in shape.open_ways)
+    usable, tiles = frozenset(way for shape in shapes.values() for way in shape.open_ways), list(shapes)
+    del shapes  # hundreds of megabytes in 27 km², and of no use any more
+    give_back_memory()
     ways = stages.run(STREETS, streets_from_osm, site, solids, usable)
     roads = stages.run("roads", roads_from_osm, site, ways)
     kerbs = given(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
+    give_back(levels)
     network = stages.run("network", road_network, site, ways, levels, kerbs)
     give_back(levels)  # half a gigabyte in 27 km²
     write_record(whole / ROADS, roads)
@@ -149,7 +153,7 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     write_record(whole / TRANSIT, transit)
     _report(stages, roads, lanes, transit)
     cutter, boxes = NetworkCutter(network.net_xml), _boxes(roads)
-    for tile in shapes:
+    for tile in tiles:
         shift = _Shift(request.grid, tile)
         net = cutter.within(half=request.grid.size / 2 + _AROUND, east=shift.by[0], north=shift.by[1])
         served = {name.decode() for name in _LANE.findall(net)}
@@ -172,8 +176,12 @@ def _digest_of_shapes(request: CityRequest) -> str:
     return sha256("\n".join(digests).encode()).hexdigest()
 
 
-def _shapes(request: CityRequest) -> dict[Tile, TileShape]:
-    return {tile: kept_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _shaped(request)}
+class _Shapes(dict[Tile, TileShape]):
+    """The shapes of tiles; unlike a plain dictionary's, stages don't keep their inputs alive that are of this class."""
+
+
+def _shapes(request: CityRequest) -> _Shapes:
+    return _Shapes({tile: kept_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _shaped(request)})
 
 
 def _levels(request: CityRequest, tile: Tile) -> HeightField:
