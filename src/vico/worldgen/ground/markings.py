@@ -23,6 +23,7 @@ from vico.worldgen.ground.strokes import broken, cut_to, divided, ribbon
 
 _LEAST_SOLID = 6.0  # metres of a solid line between two junctions that are worth painting
 _GAUGE = 1.435
+_STRAIGHT = 0.001  # metres that points of a straight line may lie off it
 _PAINT = (232, 232, 228)
 _YELLOW = (226, 184, 70)
 _FADED = (206, 205, 200)
@@ -170,7 +171,9 @@ def _parted(
             continue
         cuts = [0, *(np.flatnonzero(inside[1:] != inside[:-1]) + 1).tolist(), len(inside)]
         for first, last in pairwise(cuts):
-            parts[int(inside[first])].append(fine[first : last + 1])
+            # What was divided to be looked at goes on in whole pieces.
+            part = overlay.simplify(LineString(fine[first : last + 1]), _STRAIGHT)
+            parts[int(inside[first])].append(np.asarray(part.coords))
     return parts
 
 
