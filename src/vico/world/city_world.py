@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from hashlib import blake2b
@@ -91,6 +91,10 @@ class CityWorld(World):
     def part(self, tiles: Collection[tuple[int, int]]) -> CityPart:
         """Return what is in some of the tiles, as a world of its own in the city's frame."""
         return CityPart(self, tiles)
+
+    def parts(self) -> Iterator[World]:
+        """Yield the tiles one by one."""
+        yield from (self.part([(tile.column, tile.row)]) for tile in self._own)
 
     @cached_property
     def height(self) -> HeightField:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -172,6 +172,13 @@ class World:
         from vico.world.lane_reader import read_lanes
 
         return read_lanes(self.file("roads.net.xml"))
+
+    def parts(self) -> Iterator[World]:
+        """Yield worlds that have all things of this one together, in its frame: itself, or tile by tile of a city.
+
+        Nobody keeps what is read of a part.
+        """
+        yield self
 
     def surfaces(self, layer: str) -> list[Surface]:
         """Meshes of a layer (one of `LAYERS`), ENU metres."""

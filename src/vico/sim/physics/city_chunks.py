@@ -17,7 +17,7 @@ from vico.world.world import World
 
 #: About the side of a chunk, metres: a whole number of them is as long as a tile.
 _SIDE = 128.0
-#: Metres beyond its tile that something which is no building may reach.
+#: Metres beyond its tile that a thing may reach which is no building: it stands in its tile, and is smaller than that.
 _OVERHANG = 64.0
 # Tiles whose solids are kept.
 _TILES = 16

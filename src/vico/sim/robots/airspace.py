@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from vico.io.compiled import compiled
-from vico.world.city_world import CityWorld
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap
 from vico.world.world import World
@@ -75,14 +74,6 @@ def _raise_triangles(tops, half, corners):  # type: ignore[no-untyped-def]
                 tops[row, column] = max(tops[row, column], z)
 
 
-def _parts(world: World) -> Iterator[World]:
-    """Yield a world, or the tiles of a city one by one: nobody keeps what is read of them."""
-    if isinstance(world, CityWorld):
-        yield from (world.part([(tile.column, tile.row)]) for tile in world.city.manifest.tiles)
-    else:
-        yield world
-
-
 def _corners(world: World, layers: tuple[str, ...]) -> Iterator[Array]:
     """Yield the corners of the triangles of each surface of some layers, shape ``(k, 3, 3)``."""
     for layer in layers:
@@ -111,11 +102,11 @@ class Airspace:
         self.half, self.ground, self._walkable = float(world.half), world.height, world.walkable
         self._floor = self._heights()
         self.solid = self._floor.copy()
-        for part in _parts(world):
+        for part in world.parts():
             for corners in _corners(part, ("collision",)):
                 _raise_triangles(self.solid, self.half, corners)
         self.tops = self.solid.copy()
-        for part in _parts(world):
+        for part in world.parts():
             self._raise(part)
         self._highest = float(self.tops.max())
 

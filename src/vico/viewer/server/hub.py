@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import Any
 
@@ -65,7 +66,8 @@ class Hub:
     def end(self) -> None:
         """Send clients what they are still owed, replies among it, and let them go; from another thread."""
         if self._loop is not None and not self._loop.is_closed():
-            with suppress(TimeoutError):
+            # Cancelled where the loop ends by itself meanwhile: then nobody is there to be told.
+            with suppress(TimeoutError, CancelledError):
                 asyncio.run_coroutine_threadsafe(self._end(), self._loop).result(_REPLIES_WITHIN + 2 * _READ_WITHIN)
 
     async def _end(self) -> None:
