@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vico.errors import InputError
-from vico.threads import WORKERS, for_each, in_order, workers
+from vico.threads import WORKERS, for_each, in_order, meanwhile, workers
 
 
 @settings(max_examples=25, deadline=None)
@@ -57,3 +57,25 @@ def test_the_number_of_threads_is_the_environments_or_the_machines(monkeypatch: 
         monkeypatch.setenv(WORKERS, wrong)
         with pytest.raises(InputError, match=WORKERS):
             workers()
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_task_meanwhile_is_waited_for_and_fails_where_it_is_waited_for(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(WORKERS, str(number))
+    ran: list[str] = []
+
+    def fails() -> None:
+        raise KeyError("late")
+
+    def counts() -> int:
+        ran.append(threading.current_thread().name)
+        return len(ran)
+
+    result = meanwhile(counts)
+    assert result() == 1
+    assert (ran == [threading.current_thread().name]) == (number == 1)
+    wait = meanwhile(fails)
+    with pytest.raises(KeyError, match="late"):
+        wait()

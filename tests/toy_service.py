@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,19 @@ def doubler(options: Mapping[str, Any], tell: Callable[[Mapping[str, Any]], None
         return {"twice": 2 * task["n"], "process": made}
 
     return double
+
+
+def waiter(options: Mapping[str, Any], tell: Callable[[Mapping[str, Any]], None]) -> Callable[..., dict[str, Any]]:
+    """Return what waits for a file, and says, also where nobody should take it for an answer, that it has begun."""
+
+    def wait(task: Mapping[str, Any]) -> dict[str, Any]:
+        print("begun")
+        Path(task["begun"]).write_text(str(os.getpid()))
+        while not Path(task["until"]).exists():
+            time.sleep(0.01)
+        return {}
+
+    return wait
 
 
 class Known:

@@ -89,3 +89,19 @@ def for_each(task: Callable[[T], object], items: Iterable[T], *, most: int = _MO
     """Do a task for each item in threads; all are done afterwards."""
     for _ in in_order(task, items, most=most):
         pass
+
+
+def meanwhile(task: Callable[[], R]) -> Callable[[], R]:
+    """Begin a task in a thread.
+
+    Returns
+    -------
+    callable
+        Waits for the task, and returns what it returned or raises what it raised; with one worker, does it then.
+    """
+    if workers() == 1:
+        return task
+    pool = ThreadPoolExecutor(1)
+    future = pool.submit(task)
+    pool.shutdown(wait=False)
+    return future.result

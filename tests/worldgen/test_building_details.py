@@ -16,6 +16,7 @@ from vico.worldgen.buildings.projections import projections, water_tank
 from vico.worldgen.buildings.roofs.dormers import dormers
 from vico.worldgen.buildings.roofs.eaves import eaves, edges_of, slopes_of
 from vico.worldgen.buildings.solids import Footing, Mesh, part_mesh
+from vico.worldgen.buildings.stage import clad
 from vico.worldgen.buildings.storeys import storeys_of
 from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facades.cuts import cut_at_heights, without_needless
@@ -255,10 +256,11 @@ def test_a_building_s_own_draws_do_not_hang_on_who_else_is_there() -> None:
                  for k in range(count)]  # fmt: skip
         osm = OsmData(LocalFrame(49.4, 8.7), 150.0, 120.0, [], [], areas, [])
         result = buildings_of(osm, flat_terrain(half=150.0), seed=1)
+        cladding = clad(result.bare, osm, seed=1)
         found = {}
         for record in result.records:
             rows = []
-            for surface in (*result.walls, *result.roofs):
+            for surface in (*cladding.walls, *cladding.roofs):
                 mine = surface.triangles[surface.entity[surface.triangles[:, 0]] == record.entity]
                 # In no order: a cut puts a building's triangles in another place where there are others.
                 packed = [surface.uv[row].tobytes() + surface.colour[row].tobytes() for row in mine]

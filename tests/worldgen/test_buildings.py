@@ -20,7 +20,7 @@ from vico.geo.osm import OsmData, read_osm
 from vico.seeds import rng
 from vico.world.model import FIRST_BUILDING
 from vico.worldgen.buildings.solids import convex_pieces
-from vico.worldgen.buildings.stage import BuildingsResult
+from vico.worldgen.buildings.stage import BuildingsResult, Cladding, clad
 from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
 
@@ -38,10 +38,15 @@ def built(osm: OsmData) -> BuildingsResult:
     return buildings_of(osm, flat_terrain(half=HALF), seed=0)
 
 
-def welded(built: BuildingsResult, entity: int) -> trimesh.Trimesh:
+@pytest.fixture(scope="module")
+def cladding(built: BuildingsResult, osm: OsmData) -> Cladding:
+    return clad(built.bare, osm, seed=0)
+
+
+def welded(cladding: Cladding, entity: int) -> trimesh.Trimesh:
     """What one sees of a building, walls and roofs, with equal points made one."""
     points, faces, count = [], [], 0
-    for surface in (*built.walls, *built.roofs):
+    for surface in (*cladding.walls, *cladding.roofs):
         mine = surface.triangles[surface.entity[surface.triangles[:, 0]] == entity]
         points.append(surface.positions[mine].reshape(-1, 3))
         faces.append(np.arange(3 * len(mine)).reshape(-1, 3) + count)
@@ -54,10 +59,10 @@ def test_every_building_is_reported_watertight(built: BuildingsResult) -> None:
     assert built.watertight == len(built.records)
 
 
-def test_walls_and_roofs_as_drawn_close_up(built: BuildingsResult) -> None:
+def test_walls_and_roofs_as_drawn_close_up(built: BuildingsResult, cladding: Cladding) -> None:
     # Parts that share a corner share a welded edge with each other, so edges are counted, not trimesh's flag.
     for record in built.records:
-        mesh = welded(built, record.entity)
+        mesh = welded(cladding, record.entity)
         edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
         edges = edges[edges[:, 0] != edges[:, 1]]
         forward, n_forward = np.unique(edges, axis=0, return_counts=True)
@@ -66,8 +71,8 @@ def test_walls_and_roofs_as_drawn_close_up(built: BuildingsResult) -> None:
         assert np.array_equal(n_forward, n_backward), record.id
 
 
-def test_normals_face_outwards(built: BuildingsResult) -> None:
-    inside_out = [record.id for record in built.records if welded(built, record.entity).volume <= 0]
+def test_normals_face_outwards(built: BuildingsResult, cladding: Cladding) -> None:
+    inside_out = [record.id for record in built.records if welded(cladding, record.entity).volume <= 0]
     assert inside_out == []
 
 
@@ -157,10 +162,12 @@ def test_walls_reach_below_the_lowest_ground_on_a_slope(shared_data: Path) -> No
     place = shared_data / "places" / "monaco"
     frame = LocalFrame(43.73384, 7.41813)
     terrain = terrain_from_dem(read_elevation(place / "dem_srtm.tif", frame, 120.0), half=120.0)
-    result = buildings_of(read_osm(place / "monaco.osm.pbf", frame, 120.0), terrain, seed=0)
+    town = read_osm(place / "monaco.osm.pbf", frame, 120.0)
+    result = buildings_of(town, terrain, seed=0)
+    walls = clad(result.bare, town, seed=0).walls
     assert result.watertight == len(result.records)
     lowest = {
-        entity: min(float(s.positions[s.entity == entity, 2].min()) for s in result.walls if (s.entity == entity).any())
+        entity: min(float(s.positions[s.entity == entity, 2].min()) for s in walls if (s.entity == entity).any())
         for entity in (record.entity for record in result.records)
     }
     for record in result.records:
@@ -175,11 +182,13 @@ from pathlib import Path
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import read_osm
 from stages_alone import buildings_of
+from vico.worldgen.buildings.stage import clad
 from vico.worldgen.ground.terrain import flat_terrain
 osm = read_osm(Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf")), LocalFrame(60.1690, 24.9435), 120.0)
 built = buildings_of(osm, flat_terrain(half=120.0), seed=SEED)
 digest = hashlib.sha256(repr(built.records).encode())
-for s in (*built.walls, *built.roofs, *built.collision):
+cladding = clad(built.bare, osm, seed=SEED)
+for s in (*cladding.walls, *cladding.roofs, *built.collision):
     for array in (s.positions, s.normals, s.uv, s.colour, s.entity, s.triangles):
         digest.update(array.tobytes())
     if s.material.texture is not None:

@@ -18,7 +18,7 @@ from vico.geo.overlay import OverlayError
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated
 from vico.world.world import World
 from vico.worldgen.buildings import details, drafts, proving, stage
-from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
+from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans, clad
 from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof
 from vico.worldgen.ground.terrain import flat_terrain
@@ -34,7 +34,8 @@ def house(name: str, polygon: Polygon = HOUSE, **more: Any) -> BuildingPlan:
 
 
 def findings(built: BuildingsResult) -> list[str]:
-    layers = {"buildings": built.walls, "roofs": built.roofs, "collision": built.collision}
+    cladding = clad(built.bare, NOWHERE, seed=0)
+    layers = {"buildings": cladding.walls, "roofs": cladding.roofs, "collision": built.collision}
     world = SimpleNamespace(path=None, surfaces=layers.__getitem__, buildings=built.records, height=TERRAIN)
     rules = (check_buildings_closed, check_buildings_apart, check_buildings_seated)
     return [finding.id for rule in rules for finding in rule(cast(World, world))]

@@ -24,7 +24,7 @@ from vico.world.check.world import check_dropped
 from vico.world.folder import read_world
 from vico.world.model import FAILED, TRIED, Dropped, StageReport
 from vico.world.world import World
-from vico.worldgen import recipe
+from vico.worldgen import laying, recipe
 from vico.worldgen.facades import fronts
 from vico.worldgen.indoor import stage as indoor
 from vico.worldgen.pipeline import build_world
@@ -308,7 +308,7 @@ def test_a_stage_that_fails_as_a_whole_says_which_one_and_where(
         raise GEOSException("TopologyException: side location conflict\nat 1 2")
 
     out = tmp_path / "world"
-    with mock.patch.object(recipe, "ground_from_osm", refuse):
+    with mock.patch.object(laying, "ground_from_osm", refuse):
         code = vico("world", "build", "--osm", place.path, "--center", "48,11", "--radius", 60, "--out", out)
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert code == 2

@@ -10,6 +10,7 @@ from vico.seeds import rng
 from vico.world.check.solids import coplanar_overlaps
 from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
 from vico.worldgen.buildings.solids import Footing, part_mesh
+from vico.worldgen.buildings.stage import clad
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof
 from vico.worldgen.ground.terrain import flat_terrain
@@ -71,5 +72,6 @@ def test_a_street_of_stacked_and_touching_houses_has_no_flickering_faces() -> No
     osm = OsmData(LocalFrame(50.0, 8.0), 100.0, 60.0, [], [], areas, [])
     built = buildings_of(osm, flat_terrain(half=100.0), seed=0)
     assert built.watertight == 6
-    corners = np.concatenate([s.positions[s.triangles] for s in (*built.walls, *built.roofs)])
+    cladding = clad(built.bare, osm, seed=0)
+    corners = np.concatenate([s.positions[s.triangles] for s in (*cladding.walls, *cladding.roofs)])
     assert coplanar_overlaps(corners).flickering == 0

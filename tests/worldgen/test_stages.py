@@ -14,7 +14,7 @@ from command_line import vico
 from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
 from vico.world.world import World
-from vico.worldgen import recipe, shaping
+from vico.worldgen import laying, recipe, shaping
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.many import read_place_table
 from vico.worldgen.pipeline import build_world, rebuild_world
@@ -103,7 +103,7 @@ def test_one_stage_runs_alone_and_changes_nothing_else(
     shutil.copytree(corner_path, tmp_path / "w", symlinks=True)
     ran: list[str] = []
     for name in ("buildings_from_plans", "objects_from_osm", "ground_from_osm", "furnish"):
-        room = shaping if hasattr(shaping, name) else recipe
+        room = next(room for room in (shaping, laying, recipe) if hasattr(room, name))
         real = getattr(room, name)
 
         def counted(*inputs: object, name: str = name, real: object = real, **options: object) -> object:

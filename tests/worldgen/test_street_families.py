@@ -20,6 +20,7 @@ from vico.worldgen.buildings.gables import stepped_gables
 from vico.worldgen.buildings.projections import projections
 from vico.worldgen.buildings.roofs.customs import is_flat_town, with_customary_roofs
 from vico.worldgen.buildings.solids import Footing, part_mesh
+from vico.worldgen.buildings.stage import clad
 from vico.worldgen.facades.catalogue import region_of, styles
 from vico.worldgen.facades.families import family_of
 from vico.worldgen.facades.looks import look_of
@@ -89,15 +90,20 @@ def street(lat: float, lon: float, count: int = 10, **tags: str) -> OsmData:
 
 @pytest.mark.parametrize("city", ["Amsterdam", "London", "Berlin", "Helsinki", "Paris", "New York"])
 def test_a_street_of_each_is_closed_and_has_no_flickering_faces(city: str) -> None:
-    built = buildings_of(street(*CITIES[city]), flat_terrain(half=150.0), seed=0)
+    town = street(*CITIES[city])
+    built = buildings_of(town, flat_terrain(half=150.0), seed=0)
     assert built.watertight == 10
-    corners = np.concatenate([s.positions[s.triangles] for s in (*built.walls, *built.roofs)])
+    cladding = clad(built.bare, town, seed=0)
+    corners = np.concatenate([s.positions[s.triangles] for s in (*cladding.walls, *cladding.roofs)])
     assert coplanar_overlaps(corners).flickering == 0
 
 
 def test_the_lowest_row_of_a_picture_by_storey_is_the_first_floor() -> None:
-    built = buildings_of(street(*CITIES["London"]), flat_terrain(half=150.0), seed=0)
-    (georgian,) = (surface for surface in built.walls if surface.material.name == "wall_georgian")
+    town = street(*CITIES["London"])
+    built = buildings_of(town, flat_terrain(half=150.0), seed=0)
+    (georgian,) = (
+        surface for surface in clad(built.bare, town, seed=0).walls if surface.material.name == "wall_georgian"
+    )
     upright = georgian.positions[:, 2] < 4.6  # a floor of 3.5 or 4 m below
     phase = georgian.uv[upright, 1] * STOREYS % STOREYS
     assert upright.any()
@@ -195,9 +201,10 @@ def test_oriels_are_canted_hang_above_heads_and_wear_the_colour_of_their_wall() 
         assert oriel.polygon.intersection(plan.outline).area < 1e-6
         assert oriel.polygon.area < 0.9 * oriel.polygon.minimum_rotated_rectangle.area
     assert styles().finishes["oriel"].as_wall
-    built = buildings_of(street(*CITIES["Berlin"]), flat_terrain(half=150.0), seed=0)
-    walls = {tuple(c) for s in built.walls if s.material.name == "wall_tenement_palace" for c in _colours(s)}
-    shown = {tuple(c) for s in built.walls if s.material.name == "oriel" for c in _colours(s)}
+    town = street(*CITIES["Berlin"])
+    drawn = clad(buildings_of(town, flat_terrain(half=150.0), seed=0).bare, town, seed=0).walls
+    walls = {tuple(c) for s in drawn if s.material.name == "wall_tenement_palace" for c in _colours(s)}
+    shown = {tuple(c) for s in drawn if s.material.name == "oriel" for c in _colours(s)}
     assert shown
     assert shown <= walls
 

@@ -8,5 +8,6 @@ or a machine dies.
 
 from vico.jobs.contract import Answer, Done, Executor, Service, Task, Told
 from vico.jobs.executors import open_executor
+from vico.jobs.helper import Helper
 
-__all__ = ["Answer", "Done", "Executor", "Service", "Task", "Told", "open_executor"]
+__all__ = ["Answer", "Done", "Executor", "Helper", "Service", "Task", "Told", "open_executor"]

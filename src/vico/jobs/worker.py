@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from vico.errors import InputError
-from vico.jobs.contract import Service, Work, made, message_of
+from vico.jobs.contract import Json, Service, Work, made, message_of
 from vico.threads import WORKERS
 
 
@@ -45,6 +45,63 @@ def serve(connection: Connection, maker: str, options: str, environment: dict[st
         except EOFError:
             return
         send(message_of(work, content))
+
+
+def attend() -> None:
+    """Do tasks for a `Helper`: lines of JSON come in, and go out; ends with whoever asks."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started this process; it ends it then
+    asked = json.loads(sys.stdin.readline())
+    tasks = _Tasks()
+    threading.Thread(target=tasks.take_in, daemon=True).start()
+    try:
+        work = made(Service(asked["maker"], asked["options"]), lambda _: None)
+    except InputError as error:
+        work = _refusing(str(error))
+    while True:
+        number, content = tasks.next()
+        tasks.say({"number": number, **message_of(work, content)})
+
+
+class _Tasks:
+    """What a helper has still to do, while it is at something."""
+
+    def __init__(self) -> None:
+        self._answers = os.fdopen(os.dup(1), "w")
+        os.dup2(2, 1)  # whatever prints must not get in between
+        self._waiting: dict[int, Json] = {}
+        self._changed = threading.Condition()
+
+    def take_in(self) -> None:
+        """Take in what is asked for and taken back, to the end."""
+        for line in sys.stdin:
+            message = json.loads(line)
+            with self._changed:
+                if "withdraw" in message:
+                    number = message["withdraw"]
+                    self.say({"number": number, "withdrawn": self._waiting.pop(number, None) is not None})
+                else:
+                    self._waiting[message["number"]] = message["content"]
+                    self._changed.notify()
+        os._exit(0)
+
+    def next(self) -> tuple[int, Json]:
+        """Wait for the next task: its number, and what it is."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting)
+            number = next(iter(self._waiting))
+            return number, self._waiting.pop(number)
+
+    def say(self, message: dict[str, Any]) -> None:
+        """Send a message."""
+        with self._changed:  # whole lines, whoever says them
+            print(json.dumps(message), file=self._answers, flush=True)
+
+
+def _refusing(reason: str) -> Work:
+    def work(_: Json) -> Json:
+        raise InputError(reason)
+
+    return work
 
 
 def answer_in_cluster(maker: str, options: str, place: str, content: str) -> str:

@@ -22,6 +22,7 @@ from vico.io.folders import FolderLock, check_replaceable, folder_errors, new_fo
 from vico.world.folder import read_world
 from vico.world.model import Manifest
 from vico.world.stored import seal
+from vico.worldgen.ahead import Ahead
 from vico.worldgen.evidence import gather
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.previews.stage import write_previews
@@ -179,7 +180,8 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions) -> Manifest:
             # What did not change need not be made.
             shutil.copytree(out / STAGES, folder / STAGES, copy_function=os.link)
         write_json(folder / STAGES / _REQUEST, request.to_json())
-        world = make_world(evidence, request, folder, stages)
+        with Ahead(request, folder / STAGES) as ahead:
+            world = make_world(evidence, request, folder, stages, ahead)
         del evidence  # the mesh of a photographed city is large, and so are its pictures
         if part is None:
             with stages.timed("previews"):

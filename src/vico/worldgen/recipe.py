@@ -14,25 +14,23 @@ from vico.io.files import sha256_of
 from vico.world.detected import FILE
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface
 from vico.world.model import Building, Dropped, Entrance, Place
 from vico.world.objects import Objects
 from vico.world.records import write_records
 from vico.world.street_model import Roads
 from vico.world.transit_model import Transit
 from vico.world.world import World
-from vico.worldgen.buildings.stage import BuildingsResult
+from vico.worldgen.ahead import Ahead
+from vico.worldgen.buildings.stage import Cladding
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.facades.fronts import street_fronts
 from vico.worldgen.facades.street_names import Streets
 from vico.worldgen.facts.street_habits import street_habits
-from vico.worldgen.ground.backdrop import backdrop_of
-from vico.worldgen.ground.stage import APRON, ground_from_osm
 from vico.worldgen.ground.walkable import walkable_from_site
-from vico.worldgen.ground.wires import contact_wires
-from vico.worldgen.ground.yards import yards_of
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
+from vico.worldgen.laying import cladding_in, ground_in, yards_in
 from vico.worldgen.objects.detections.matching import things_from_detections
 from vico.worldgen.objects.models import models_of
 from vico.worldgen.objects.parking import parking_from_osm
@@ -62,7 +60,7 @@ from vico.worldgen.writing import Layers, WorldParts, WorldWriter, faces, manife
 _LEAST_COVERED = 0.3
 
 
-def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages) -> World:
+def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages, ahead: Ahead) -> World:
     """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
     if request.sources.installed_things:
         read_things()  # refuses before anything is built if they are not installed
@@ -73,14 +71,15 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         shape.plan.evidence, shape.plan.site, shape.plan.tiles, shape.plan.streets, shape.plan.height,
     )  # fmt: skip
     bridges, levels, built, solids = shape.bridges, shape.levels, shape.built, shape.solids
+    if not stages.kept:  # else much of what is to come is likely to be kept too
+        ahead.start(len(built.records))
+    ahead.make("cladding", stages)
     write.terrain(levels, flat=evidence.samples is None and tiles is None)
     roads, lanes, transit = (
         _streets_of(shape, request, stages, write) if request.place is None else _cut(request.place, stages, write)
     )
 
-    # A tile ends where the next one begins: nothing is drawn beyond it.
-    apron = APRON if request.place is None else 0.0
-    yards = run("yards", yards_of, site, streets.carriageway, reach=site.osm.half + apron)
+    yards = yards_in(shape, request, stages)
     outdoors, dropped = run(
         "objects",
         objects_from_osm,
@@ -108,6 +107,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     write.outdoors(outdoors, dropped)
     walkable = run("walkable", walkable_from_site, site, streets, [*solids, *bridges.low, *bridges.cuts], outdoors)
     write.walkable(walkable)
+    trees = outdoors.position[outdoors.kind == "tree", :2]
+    ahead.make("ground", stages, trees=trees.tolist())
 
     places, entrances, dropped = run(
         "places",
@@ -126,26 +127,12 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     write.indoors(indoors, undrawn)
     objects = write.objects(outdoors, indoors)
 
-    trees = outdoors.position[outdoors.kind == "tree", :2]
-    ground = run(
-        "ground",
-        ground_from_osm,
-        site,
-        height,
-        streets,
-        bridges,
-        shape.flights,
-        standing=solids,
-        trees=trees,
-        yards=yards,
-    )
-    wires = run("wires", contact_wires, site, height, solids, reach=request.half)
-    around = run("backdrop", backdrop_of, site, height, streets, built.records, seed=seed) if apron else []
-    ground = joined([*ground, *around, *wires])
+    ground = ground_in(shape, yards, trees, request, stages)
     stages.report("ground", {"faces": faces(ground)})
+    cladding = cladding_in(shape, request, stages)
     with stages.timed("fronts"):
         names = Streets(roads, outdoors, levels, street_habits(site.osm).plates)
-        fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed, streets=names)
+        fronts = street_fronts(indoors.places, entrances, buildings, cladding.walls, seed=seed, streets=names)
     stages.report("fronts", fronts.counts)
 
     models, credits = models_of(objects, installed=request.sources.installed_things)
@@ -163,11 +150,11 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         parking=parking.spots,
         models=models,
     )
-    layers = Layers(ground, built.walls, fronts.surfaces, built.roofs, indoors.surfaces, built.collision)
+    layers = Layers(ground, cladding.walls, fronts.surfaces, cladding.roofs, indoors.surfaces, built.collision)
     manifest = manifest_of(request, evidence, parts, stages, credits)
     if tiles is not None or evidence.images:
         seen = parts.world(manifest, folder, layers)
-        walls, roofs = _painted(evidence.images, tiles, built, seen, request.texturing, stages)
+        walls, roofs = _painted(evidence.images, tiles, cladding, seen, request.texturing, stages)
         layers = replace(layers, walls=walls, roofs=roofs)
     write.meshes(layers, models)
     return parts.world(manifest, folder, layers)
@@ -242,7 +229,7 @@ def _furnished(
 def _painted(
     images: Sequence[StreetImage],
     tiles: TileMesh | None,
-    built: BuildingsResult,
+    cladding: Cladding,
     world: World,
     how: Texturing,
     stages: Stages,
@@ -251,9 +238,11 @@ def _painted(
     if tiles is not None:
         # Where street photos may still come, hardly covered faces wait for them.
         least = 0.0 if images else _LEAST_COVERED
-        painted = stages.run("bake", painted_from_tiles, built.walls, built.roofs, tiles, texel=how.texel, least=least)
+        painted = stages.run(
+            "bake", painted_from_tiles, cladding.walls, cladding.roofs, tiles, texel=how.texel, least=least
+        )
     else:
-        painted = stages.run("bake", painted_as_built, built.walls, built.roofs, texel=how.texel)
+        painted = stages.run("bake", painted_as_built, cladding.walls, cladding.roofs, texel=how.texel)
     if images:
         walls, roofs = painted.surfaces()
         layers = {"ground": world.surfaces("ground"), "buildings": walls, "roofs": roofs}
@@ -269,7 +258,7 @@ def _painted(
             how=how,
         )
         stages.report("streetview", report.counts, report.dropped)
-    painted = kept_where_photographed(built.walls, built.roofs, painted, least=_LEAST_COVERED)
+    painted = kept_where_photographed(cladding.walls, cladding.roofs, painted, least=_LEAST_COVERED)
     painted = stages.run("enhance", enhanced, painted, how)
     stages.report("texture", painted.counts)
     return painted.surfaces()

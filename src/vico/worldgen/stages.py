@@ -107,6 +107,7 @@ class Stages:
         self._again = set(again)
         self._progress = progress
         self._beside = beside
+        self._elsewhere: dict[str, Callable[[], float | None]] = {}
         self._digests: dict[int, tuple[Callable[[], Any], str]] = {}
 
     def given(self, value: T, digest: str) -> T:
@@ -140,11 +141,25 @@ class Stages:
             If it fails as a whole, for no object in particular.
         """
         self._tell(name, 0)
+        elsewhere = self._elsewhere.pop(name, lambda: None)()
         start = time.perf_counter()
-        value = self._product(name, function, inputs, options)
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        value = self._product(name, function, inputs, options, made=elsewhere is not None)
+        seconds = (elsewhere or 0.0) + time.perf_counter() - start
+        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
         self._tell(name, 1)
         return value
+
+    def await_first(self, name: str, made: Callable[[], float | None]) -> None:
+        """Say that a stage is being made elsewhere, and kept with the same key; `run` waits for that first.
+
+        Parameters
+        ----------
+        name
+            Of the stage.
+        made
+            Waits for it, and returns the seconds that it took; None if it was not made.
+        """
+        self._elsewhere[name] = made
 
     @contextmanager
     def timed(self, name: str) -> Iterator[None]:
@@ -188,7 +203,9 @@ class Stages:
             self.lost.update(one.id for one in dropped)
             self.report(name, {TRIED: tried}, dropped)
 
-    def _product(self, name: str, function: Callable[..., T], inputs: tuple[Any, ...], options: dict[str, Any]) -> T:
+    def _product(
+        self, name: str, function: Callable[..., T], inputs: tuple[Any, ...], options: dict[str, Any], *, made: bool
+    ) -> T:
         if self._folder is None:
             with _as_a_whole(name) as losses:
                 value = function(*inputs, **options)
@@ -204,17 +221,18 @@ class Stages:
         key = sha256("\n".join(parts).encode()).hexdigest()
         path = self._folder / f"{name}{SUFFIX}"
         others = [] if self._beside is None else [self._beside / f"{name}{SUFFIX}"]
-        for there in (path, *others) if name not in self._again else ():
+        for there in (path, *others) if made or name not in self._again else ():
             known = self._read(there, key) if there.exists() else None
             if known is not None:
-                self.kept.append(name)
+                if not made:
+                    self.kept.append(name)
                 self._report_losses(name, known[0].dropped, known[0].tried)
                 return self.given(known[0].value, known[1])
         with _as_a_whole(name) as losses:
             value = function(*inputs, **options)
-        made = _Kept(value, losses.dropped, len(losses.tried) if losses.dropped else 0)
-        self._report_losses(name, made.dropped, made.tried)
-        return self.given(value, write_product(path, made, key=key))
+        product = _Kept(value, losses.dropped, len(losses.tried) if losses.dropped else 0)
+        self._report_losses(name, product.dropped, product.tried)
+        return self.given(value, write_product(path, product, key=key))
 
     def _read(self, path: Path, key: str) -> tuple[_Kept, str] | None:
         """Read the product, if it was made under this key and is whole: a torn one is simply made anew."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -136,7 +136,7 @@ def dressed(
     Parameters
     ----------
     mesh
-        The solids; its faces are cut in place.
+        The solids.
     edges
         The lines of their walls.
     plans, seats
@@ -155,7 +155,7 @@ def dressed(
         return [], []
     parts = [part for plan in plans for part in plan.solids]
     levels = _levels(mesh, parts, plans, seats, looks)
-    _cut(mesh, levels)
+    mesh = _cut(mesh, levels)
     faces = _faces(mesh, edges)
     zone = _zones(faces, edges, levels)
     of = mesh.plan_of_part
@@ -211,14 +211,14 @@ def _levels(
     return _Levels(base, ground_top, eaves, plinth, small, by_storey, whole, storeys)
 
 
-def _cut(mesh: SolidMesh, levels: _Levels) -> None:
-    """Cut walls at their plinths, at the tops of their ground floors and at their eaves."""
+def _cut(mesh: SolidMesh, levels: _Levels) -> SolidMesh:
+    """Return the solids with walls cut at their plinths, at the tops of their ground floors and at their eaves."""
     points, faces, owner = mesh.points, mesh.faces, mesh.part
     floors = np.where(levels.ground_top < levels.eaves - 0.2, levels.ground_top, np.nan)
     for heights in (levels.plinth, floors, np.where(levels.whole, np.nan, levels.eaves)):
         points, faces, owner = cut_at_heights(points, faces, owner, heights)
     faces, owner = without_needless(points, faces, owner, len(mesh.points))
-    mesh.points, mesh.faces, mesh.part = points, faces, owner
+    return replace(mesh, points=points, faces=faces, part=owner)
 
 
 def _faces(mesh: SolidMesh, edges: WallLines) -> _Faces:

@@ -1,4 +1,4 @@
-"""Buildings as closed solids on the terrain, dressed, with their records and collision bodies."""
+"""Buildings as closed solids on the terrain, with their records and collision bodies; then what covers them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vico.worldgen.buildings.drafts import Draft, bodies_of, drafted, record_of,
 from vico.worldgen.buildings.dressing import dressed
 from vico.worldgen.buildings.proving import proven
 from vico.worldgen.buildings.roofs.customs import is_flat_town, with_customary_roofs
-from vico.worldgen.buildings.solids import leaky
+from vico.worldgen.buildings.solids import Footing, SolidMesh, leaky
 from vico.worldgen.buildings.wall_lines import fronts_of, is_street, wall_lines
 from vico.worldgen.facades import looks
 from vico.worldgen.facades.catalogue import region_of
@@ -31,6 +31,34 @@ _TALL = 2.2  # metres: what begins higher up is walked under
 
 
 @dataclass(frozen=True)
+class Bare:
+    """Buildings before anything covers them.
+
+    Attributes
+    ----------
+    mesh
+        Their solids.
+    plans, seats
+        What was decided, and where each stands.
+    looks
+        What each solid of each is to wear.
+    """
+
+    mesh: SolidMesh
+    plans: list[BuildingPlan]
+    seats: list[Footing]
+    looks: list[FacadeStyle]
+
+
+@dataclass(frozen=True)
+class Cladding:
+    """What covers buildings: layers "buildings" and "roofs", together closed, part by part."""
+
+    walls: list[Surface]
+    roofs: list[Surface]
+
+
+@dataclass(frozen=True)
 class BuildingsResult:
     """What the stage made.
 
@@ -38,8 +66,8 @@ class BuildingsResult:
     ----------
     records
         One a building, in the order of their entities; none is accessible yet.
-    walls, roofs
-        Layers "buildings" and "roofs": together closed, part by part.
+    bare
+        The same buildings, to be clad.
     collision
         Convex prisms of the walls, one surface each, vertices shared.
     dropped
@@ -51,8 +79,7 @@ class BuildingsResult:
     """
 
     records: list[Building]
-    walls: list[Surface]
-    roofs: list[Surface]
+    bare: Bare
     collision: list[Surface]
     dropped: list[Dropped]
     watertight: int
@@ -91,7 +118,7 @@ def buildings_from_plans(decided: BuildingPlans, osm: OsmData, terrain: HeightFi
     Returns
     -------
     BuildingsResult
-        Records, meshes and collision bodies.
+        Records, solids and collision bodies.
     """
     region = region_of(osm.frame.lat, osm.frame.lon)
 
@@ -127,11 +154,32 @@ def buildings_from_plans(decided: BuildingPlans, osm: OsmData, terrain: HeightFi
         for draft in drafts
         for part in draft.plan.solids
     ]
-    walls, roofs = dressed(mesh, wall_lines(plans, seats, osm), plans, seats, dress, seed)
     records = [record_of(draft, entity) for entity, draft in enumerate(drafts, FIRST_BUILDING)]
     collision = [body for entity, draft in enumerate(drafts, FIRST_BUILDING) for body in bodies_of(draft, entity)]
     rules = {rule: count for rule in RULES if (count := sum(plan.rule == rule for plan in plans))}
-    return BuildingsResult(records, walls, roofs, collision, dropped, len(plans) - len(leaky(mesh)), rules)
+    bare = Bare(mesh, [_without_meshes(plan) for plan in plans], seats, dress)
+    return BuildingsResult(records, bare, collision, dropped, len(plans) - len(leaky(mesh)), rules)
+
+
+def clad(bare: Bare, osm: OsmData, *, seed: int) -> Cladding:
+    """Cover the buildings of a place.
+
+    Parameters
+    ----------
+    bare
+        The buildings.
+    osm
+        The map they come from: its streets decide which walls are fronts.
+    seed
+        Decides where on its sheet each wall begins.
+    """
+    lines = wall_lines(bare.plans, bare.seats, osm)
+    return Cladding(*dressed(bare.mesh, lines, bare.plans, bare.seats, bare.looks, seed))
+
+
+def _without_meshes(plan: BuildingPlan) -> BuildingPlan:
+    """Return a plan without the meshes of its small solids: all solids are in one mesh by now."""
+    return replace(plan, rooftop=[replace(part, mesh=None) for part in plan.rooftop])
 
 
 _DRESS_KEYS = (

@@ -107,17 +107,28 @@ def without_needless(
     wanted[candidates] = True
     near = np.unique(faces[wanted[faces].any(axis=1)])
     wanted[near] = True
-    fan = _Fan(dict(enumerate(faces.tolist())), {}, points.tolist(), normal.tolist())
-    for k in np.flatnonzero(wanted[faces].any(axis=1)).tolist():
-        for v in fan.triangles[k]:
+    touched = np.flatnonzero(wanted[faces].any(axis=1))
+    corners = np.unique(faces[touched])
+    fan = _Fan(
+        dict(zip(touched.tolist(), faces[touched].tolist(), strict=True)),
+        {},
+        dict(zip(corners.tolist(), points[corners].tolist(), strict=True)),
+        dict(zip(touched.tolist(), normal[touched].tolist(), strict=True)),
+    )
+    for k, triangle in fan.triangles.items():
+        for v in triangle:
             fan.around.setdefault(v, set()).add(k)
     for v in candidates.tolist():
         ring = fan.ring(v)
         for w in sorted(ring):
             if fan.spots[w][2] == fan.spots[v][2] and fan.drawn_into(v, w, ring):
                 break
-    kept_faces = np.array(list(fan.triangles), np.int64)
-    return np.array(list(fan.triangles.values()), np.int64).reshape(-1, 3), owner[kept_faces]
+    left = np.array(list(fan.triangles), np.int64)
+    changed, kept = faces.copy(), np.ones(len(faces), bool)
+    kept[touched] = False
+    kept[left] = True
+    changed[left] = np.array(list(fan.triangles.values()), np.int64).reshape(-1, 3)
+    return changed[kept], owner[kept]
 
 
 def _within_flat_walls(
@@ -139,8 +150,8 @@ class _Fan:
 
     triangles: dict[int, list[int]]
     around: dict[int, set[int]]
-    spots: list[list[float]]
-    facing: list[list[float]]
+    spots: dict[int, list[float]]
+    facing: dict[int, list[float]]
 
     def ring(self, v: int) -> set[int]:
         """Return the points that share a triangle with one."""

@@ -27,6 +27,7 @@ STEP_IN = 0.6  # metres from a doorway to the spot inside it
 _BESIDE_BED, _NEAR_SIDE, _SAMPLES = 0.85, 1.4, 16
 _DOOR_CLEAR = (1.1, 0.95)  # width and depth kept free before a doorway, metres
 _LOW = 1.0  # what is lower may stand before a window
+_BESIDE = ndimage.generate_binary_structure(2, 1)  # cells that one steps between
 
 Box = tuple[float, float, float, float]
 Member = tuple[str, float, float, float]  # prototype, x, y in the set's frame, yaw in degrees
@@ -176,7 +177,7 @@ class RoomDraft:
 
     def reachable(self) -> NDArray[np.bool_]:
         """Cells where a body can stand that came in by the first door, indexed ``[iy, ix]``."""
-        labels, _ = ndimage.label(~self.taken)
+        labels, _ = ndimage.label(~self.taken, _BESIDE)
         home = labels[self._spots[0]] if self._spots else 0
         return np.asarray((labels == home) & (home > 0))
 
@@ -201,7 +202,7 @@ class RoomDraft:
         return not met.all()
 
     def _is_whole(self) -> bool:
-        labels, _ = ndimage.label(~self.taken)
+        labels, _ = ndimage.label(~self.taken, _BESIDE)
         marks = {int(labels[cell]) for cell in self._spots}
         return len(marks) == 1 and 0 not in marks
 
@@ -212,7 +213,7 @@ class RoomDraft:
         a, b, c, d = max(y0 - 1, 0), min(y1 + 1, ny), max(x0 - 1, 0), min(x1 + 1, nx)
         ring = ~self.taken[a:b, c:d]
         ring[y0 - a : y1 - a, x0 - c : x1 - c] = False
-        return int(ndimage.label(ring)[1]) <= 1
+        return int(ndimage.label(ring, _BESIDE)[1]) <= 1
 
     def _block(self, box: Box) -> tuple[int, int, int, int]:
         """Take a rectangle and what is too near to it; the rows and columns of cells that were taken."""

@@ -54,8 +54,7 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
         return measured_solid(polygon, low - eaves, roof.facets).translate((0.0, 0.0, eaves))
     rings = rings_of(polygon)
     if roof.shape == "flat":
-        body = prism(rings, low, eaves)
-        return _with_parapet(body, polygon, eaves, roof.height) if roof.height > 0.05 else body
+        return _with_parapet(polygon, low, eaves, roof.height) if roof.height > 0.05 else prism(rings, low, eaves)
     if roof.height <= 0.05:
         return prism(rings, low, eaves)
     # The roof is made over eaves at 0: its highest point is then stretched to the height asked, exactly.
@@ -92,15 +91,14 @@ def _as_high_as(solid: Manifold, height: float) -> Manifold:
     return solid.warp_batch(stretched)
 
 
-def _with_parapet(body: Manifold, polygon: Polygon, eaves: float, height: float) -> Manifold:
+def _with_parapet(polygon: Polygon, low: float, eaves: float, height: float) -> Manifold:
+    rings = rings_of(polygon)
     inner = overlay.buffer(polygon, -0.35, join_style="mitre", mitre_limit=2.0)
     pools = [part for part in shapely.get_parts(inner) if part.geom_type == "Polygon" and part.area > 4.0]
-    raised = prism(rings_of(polygon), 0.0, height).translate((0.0, 0.0, eaves))
-    hollow = [prism(rings_of(pool), eaves - 1.0, eaves + height + 1.0) for pool in pools]
-    if not hollow:
-        return body
-    rim = Manifold.batch_boolean([raised, *hollow], manifold3d.OpType.Subtract)
-    return body + rim
+    if not pools:
+        return prism(rings, low, eaves)
+    hollow = [prism(rings_of(pool), eaves, eaves + height + 1.0) for pool in pools]
+    return Manifold.batch_boolean([prism(rings, low, eaves + height), *hollow], manifold3d.OpType.Subtract)
 
 
 def _skillion(rings: list[NDArray[np.float64]], low: float, roof: Roof) -> Manifold:
