@@ -44,11 +44,16 @@ def machine() -> str:
     )
 
 
-def vico(*arguments: str) -> Child:
-    """Run `vico` in a process of its own; its peak memory is that of its largest process."""
+def vico(*arguments: str, checkout: Path | None = None) -> Child:
+    """Run `vico`, or that of another checkout, in a process of its own; its peak memory is that of the process."""
+    environment = os.environ if checkout is None else {**os.environ, "PYTHONPATH": str(checkout / "src")}
     began = time.perf_counter()
     process = subprocess.Popen(
-        [sys.executable, "-m", "vico.cli.main", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-m", "vico.cli.main", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
     )
     # Both are small, and stderr is lines only: neither pipe fills before the other is read.
     assert process.stdout is not None

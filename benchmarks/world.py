@@ -1,11 +1,13 @@
 """How long a world takes to build, stage by stage, and how much memory; how time grows with the radius; other cities.
 
-    python benchmarks/world.py [--radius 400] [-n 3] [--data FOLDER] [--keep FOLDER] [--table TABLE]
+    python benchmarks/world.py [--radius 400] [-n 3] [--before CHECKOUT] [--data FOLDER] [--keep FOLDER] [--table TABLE]
 
 The packaged place, built anew each time in a process of its own. Stage seconds are wall time, as the world's own
-``build.json`` tells them; the last lines are the whole command, imports and report included. With ``--data`` (a folder
-with ``places/NAME/NAME.osm.pbf``, and ``SOURCE.txt`` beside it that tells the centre) every place there is built once,
-and one at several radii. No extract covers a radius of 800 m, so the largest are built from a map that repeats it.
+``build.json`` tells them, and those of stages that a second process makes meanwhile are that one's; the last lines are
+the whole command, imports and report included. With ``--before`` another version builds the same place in turn. With
+``--data`` (a folder with ``places/NAME/NAME.osm.pbf``, and ``SOURCE.txt`` beside it that tells the centre) every place
+there is built once, and one at several radii. No extract covers a radius of 800 m, so the largest are built from a map
+that repeats it.
 """
 
 from __future__ import annotations
@@ -81,6 +83,33 @@ def beside_the_paper(facts: dict[str, Any], others: Sequence[dict[str, Any]]) ->
                 line += f" {np.mean(counts):,.0f} | {min(counts):,} | {max(counts):,} |"
             lines.append(line)
     return lines
+
+
+def beside_before(
+    now: Sequence[tuple[dict[str, Any], float]], before: Sequence[tuple[dict[str, Any], float]]
+) -> list[str]:
+    """Return a table of medians of this version and of the one before, stage by stage, built in turn."""
+    lines = ["", f"## Beside the version before, built in turn, medians of {len(now)}", ""]
+    lines += ["| stage | before s | now s | ratio |", "|---|---|---|---|"]
+    names = [*before[0][0]["seconds"], *(name for name in now[0][0]["seconds"] if name not in before[0][0]["seconds"])]
+    for name in (name for name in names if name != "total"):
+        was, is_now = (
+            [facts["seconds"][name] for facts, _ in runs if name in facts["seconds"]] for runs in (before, now)
+        )
+        lines.append(_ratio(name, was, is_now))
+    return [*lines, _ratio("whole command", [s for _, s in before], [s for _, s in now])]
+
+
+def _ratio(name: str, before: Sequence[float], now: Sequence[float]) -> str:
+    if not before or not now:
+        old, new = (f"{np.median(values):.2f}" if values else "" for values in (before, now))
+        return f"| {name} | {old} | {new} | |"
+    old, new = float(np.median(before)), float(np.median(now))
+    return (
+        f"| {name} | {old:.2f} | {new:.2f} | {new / old:.2f} |"
+        if old >= 0.1
+        else f"| {name} | {old:.2f} | {new:.2f} | |"
+    )
 
 
 def _count(facts: dict[str, Any], key: str) -> int:
@@ -165,12 +194,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--radius", type=float, default=400.0)
     parser.add_argument("-n", type=int, default=3, help="builds")
+    parser.add_argument("--before", type=Path, help="another checkout, to compare with")
     parser.add_argument("--data", type=Path, help="folder with more places")
     parser.add_argument("--keep", type=Path, help="empty folder to keep the worlds in")
     parser.add_argument("--table", type=Path)
     given = parser.parse_args()
     place, about = packaged_extract(), machine()
     facts, whole, peaks = [], [], []
+    before: list[tuple[dict[str, Any], float]] = []
     with nullcontext(given.keep) if given.keep else tempfile.TemporaryDirectory(prefix="vico-") as folder:
         for k in range(given.n):
             where = ["--lat", str(place.lat), "--lon", str(place.lon), "--radius", str(given.radius)]
@@ -178,10 +209,17 @@ def main() -> None:
             facts.append(json.loads(child.output))
             whole.append(child.seconds)
             peaks.append(child.peak_mb)
+            if given.before:
+                child = vico(
+                    "world", "build", *where, "--out", f"{folder}/before", "--force", "--json", checkout=given.before
+                )
+                before.append((json.loads(child.output), child.seconds))
         others: list[dict[str, Any]] = []
         more = of_radii(given.data, Path(folder)) + of_places(given.data, Path(folder), others) if given.data else []
     last = facts[-1]
     more = beside_the_paper(last, others) + more
+    if before:
+        more = beside_before(list(zip(facts, whole, strict=True)), before) + more
     how = "vico bench world --table benchmarks/results/world.md"
     if given.data:
         how = f"python benchmarks/world.py -n {given.n} --data DATA --table benchmarks/results/world.md"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import multiprocessing
 import os
@@ -50,6 +51,7 @@ def serve(connection: Connection, maker: str, options: str, environment: dict[st
 def attend() -> None:
     """Do tasks for a `Helper`: lines of JSON come in, and go out; ends with whoever asks."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started this process; it ends it then
+    gc.set_threshold(20_000, 20, 20)  # as the command line does: what is imported is never garbage
     asked = json.loads(sys.stdin.readline())
     tasks = _Tasks()
     threading.Thread(target=tasks.take_in, daemon=True).start()
