@@ -210,9 +210,8 @@ def main() -> None:
             whole.append(child.seconds)
             peaks.append(child.peak_mb)
             if given.before:
-                child = vico(
-                    "world", "build", *where, "--out", f"{folder}/before", "--force", "--json", checkout=given.before
-                )
+                # A folder of its own each time: what is kept in one would be read again.
+                child = vico("world", "build", *where, "--out", f"{folder}/before{k}", "--json", checkout=given.before)
                 before.append((json.loads(child.output), child.seconds))
         others: list[dict[str, Any]] = []
         more = of_radii(given.data, Path(folder)) + of_places(given.data, Path(folder), others) if given.data else []
@@ -221,8 +220,9 @@ def main() -> None:
     if before:
         more = beside_before(list(zip(facts, whole, strict=True)), before) + more
     how = "vico bench world --table benchmarks/results/world.md"
-    if given.data:
-        how = f"python benchmarks/world.py -n {given.n} --data DATA --table benchmarks/results/world.md"
+    if given.data or given.before:
+        words = f"-n {given.n}{' --before CHECKOUT' if given.before else ''}{' --data DATA' if given.data else ''}"
+        how = f"python benchmarks/world.py {words} --table benchmarks/results/world.md"
     lines = [
         "# World: seconds a stage",
         "",
