@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,15 @@ def test_a_process_that_fails_costs_only_time(
 ) -> None:
     monkeypatch.setattr(ahead, "_MAKER", maker)
     monkeypatch.setattr(Helper, "withdraw", lambda self, number: False)
+    built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
+    assert sorted(made_here) == sorted(AHEAD.values())
+    assert built == corner.manifest
+
+
+def test_where_no_process_can_be_started_all_is_made_here(
+    corner: World, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "nothing"))
     built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert sorted(made_here) == sorted(AHEAD.values())
     assert built == corner.manifest

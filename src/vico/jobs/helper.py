@@ -12,7 +12,8 @@ from typing import Any
 from vico import threads
 from vico.jobs.contract import Answer, Json, Service, answer_of
 
-_COMMAND = "from vico.jobs.worker import attend; attend()"
+_COMMAND = "from vico.jobs.worker import attend; attend({})"
+_STDERR = 2
 
 
 class Helper:
@@ -27,14 +28,32 @@ class Helper:
         What it does.
     share
         Threads it may use.
+
+    Raises
+    ------
+    OSError
+        If no process can be started.
     """
 
     def __init__(self, service: Service, *, share: int = 1) -> None:
         path = [folder or os.getcwd() for folder in sys.path]
         about = {threads.WORKERS: str(share), "PYTHONPATH": os.pathsep.join(path), "PYTHONSAFEPATH": "1"}
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _COMMAND], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ | about
-        )
+        # Answers have a pipe of their own: whatever prints must not get in between.
+        ours, theirs = os.pipe()
+        self._heard = os.fdopen(ours, "rb")
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-u", "-c", _COMMAND.format(theirs)],
+                stdin=subprocess.PIPE,
+                stdout=_STDERR,
+                pass_fds=(theirs,),
+                env=os.environ | about,
+            )
+        except OSError:
+            self._heard.close()
+            raise
+        finally:
+            os.close(theirs)
         self._asked = 0
         self._answers: dict[int, Answer] = {}
         self._withdrawn: dict[int, bool] = {}
@@ -78,10 +97,10 @@ class Helper:
     def close(self) -> None:
         """End the process, whatever it is at: files are written whole or not at all."""
         self._process.kill()
-        for stream in (self._process.stdin, self._process.stdout):
-            assert stream is not None
-            with suppress(OSError):  # what it was told last it will never read
-                stream.close()
+        self._heard.close()
+        assert self._process.stdin is not None
+        with suppress(OSError):  # what it was told last it will never read
+            self._process.stdin.close()
         self._process.wait()
 
     def _send(self, message: dict[str, Any]) -> None:
@@ -92,8 +111,7 @@ class Helper:
 
     def _hear(self) -> bool:
         """Take the next message in; False if there will be none."""
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
+        line = self._heard.readline()
         if not line.endswith(b"\n"):
             self._process.wait()
             return False

@@ -48,12 +48,12 @@ def serve(connection: Connection, maker: str, options: str, environment: dict[st
         send(message_of(work, content))
 
 
-def attend() -> None:
-    """Do tasks for a `Helper`: lines of JSON come in, and go out; ends with whoever asks."""
+def attend(answers: int) -> None:
+    """Do tasks for a `Helper`: lines of JSON come in, and go out to `answers`, a pipe; ends with whoever asks."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started this process; it ends it then
     gc.set_threshold(20_000, 20, 20)  # as the command line does: what is imported is never garbage
     asked = json.loads(sys.stdin.readline())
-    tasks = _Tasks()
+    tasks = _Tasks(answers)
     threading.Thread(target=tasks.take_in, daemon=True).start()
     try:
         work = made(Service(asked["maker"], asked["options"]), lambda _: None)
@@ -67,9 +67,8 @@ def attend() -> None:
 class _Tasks:
     """What a helper has still to do, while it is at something."""
 
-    def __init__(self) -> None:
-        self._answers = os.fdopen(os.dup(1), "w")
-        os.dup2(2, 1)  # whatever prints must not get in between
+    def __init__(self, answers: int) -> None:
+        self._answers = os.fdopen(answers, "w")
         self._waiting: dict[int, Json] = {}
         self._changed = threading.Condition()
 

@@ -63,7 +63,10 @@ class Ahead:
         alone = request.place is None and not (sources.tiles or sources.photos)
         if alone and buildings >= _FEWEST and threads.workers() > 1:
             options = {"request": request.to_json(), "folder": str(self._folder.absolute())}
-            self._helper = Helper(Service(_MAKER, options), share=max(1, threads.workers() // 2))
+            try:
+                self._helper = Helper(Service(_MAKER, options), share=max(1, threads.workers() // 2))
+            except OSError as error:
+                _log.info("no second process could be started: %s", error)
 
     def make(self, name: str, stages: Stages, **known: Any) -> None:
         """Have a stage made, if it was started; all stages that it depends on are made and kept.
