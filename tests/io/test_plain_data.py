@@ -93,11 +93,18 @@ def test_bytes_from_anywhere_are_refused(content: bytes) -> None:
         decode(content)
 
 
-@given(
-    st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner), max_leaves=8)
-)
+KEYS = st.text().filter(lambda key: key != "__array__")  # which says that an array stands there
+
+
+@given(st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner), max_leaves=8))
 def test_json_values_come_back_exactly(value: Any) -> None:
     assert decode(encode(value)) == value
+
+
+@pytest.mark.parametrize("key", [3, "__array__"])
+def test_keys_that_say_something_else_are_refused(key: Any) -> None:
+    with pytest.raises(InputError, match=r"inner: a key is .*keys have to be text other than '__array__'"):
+        encode({"inner": {key: None}})
 
 
 def test_files_hold_what_was_written(tmp_path: Path) -> None:

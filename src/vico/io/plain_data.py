@@ -126,7 +126,9 @@ def _shown(value: Any, where: str, depth: int, arrays: list[NDArray[Any]]) -> An
     if isinstance(value, Mapping):
         odd = next((key for key in value if not isinstance(key, str) or key == _ARRAY), None)
         if odd is not None:
-            raise InputError(f"plain data: {where or 'the whole'}: a key is {odd!r:.40}; keys have to be text")
+            raise InputError(
+                f"plain data: {where or 'the whole'}: a key is {odd!r:.40}; keys have to be text other than {_ARRAY!r}"
+            )
         return {key: _shown(part, f"{where}.{key}".lstrip("."), depth + 1, arrays) for key, part in value.items()}
     if isinstance(value, (list, tuple)):
         return [_shown(part, f"{where}[{k}]", depth + 1, arrays) for k, part in enumerate(value)]
