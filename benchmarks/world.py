@@ -233,6 +233,8 @@ def main() -> None:
         f"{last['places']} places, {last['roads']} roads, {last['indoor_objects']} things indoors; "
         f"{last['megabytes']:.0f} MB on disk. Goal: {GOAL:.0f} s for 800 m x 800 m.",
         "",
+        "Stages that a second process makes run beside the others: the total may be more than the whole command.",
+        "",
         "| stage | median s | least | greatest | n |",
         "|---|---|---|---|---|",
     ]

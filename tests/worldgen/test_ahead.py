@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from pathlib import Path
 
@@ -59,14 +60,24 @@ def test_what_has_not_been_begun_is_made_here(
 
 
 @pytest.mark.parametrize("maker", ["vico.worldgen.aside:nothing", "toy_service:doubler"])
-def test_a_process_that_fails_costs_only_time(
-    corner: World, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch, maker: str
+def test_a_process_that_fails_is_told_and_costs_only_time(
+    corner: World,
+    tmp_path: Path,
+    made_here: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    maker: str,
 ) -> None:
     monkeypatch.setattr(ahead, "_MAKER", maker)
     monkeypatch.setattr(Helper, "withdraw", lambda self, number: False)
-    built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
+    with caplog.at_level(logging.WARNING, logger="vico"):
+        built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert sorted(made_here) == sorted(AHEAD.values())
     assert built == corner.manifest
+    told = [record.getMessage() for record in caplog.records]
+    assert [message.split(",")[0] for message in told if "second process" in message] == [
+        f"stage {name} was not made by the second process" for name in ("ground", "cladding")
+    ]
 
 
 def test_where_no_process_can_be_started_all_is_made_here(

@@ -91,6 +91,6 @@ def _made(helper: Helper, number: int, name: str) -> float | None:
         return None
     answer = helper.answer(number)
     if answer.content is None:
-        _log.info("stage %s was not made ahead: %s", name, answer.reason)
+        _log.warning("stage %s was not made by the second process, and is made here: %s", name, answer.reason)
         return None
     return float(answer.content["seconds"])
