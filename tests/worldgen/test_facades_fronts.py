@@ -24,11 +24,13 @@ _START = np.array([3.0, 7.0])
 _stuff = cache(material)
 
 
-def _wall(name: str, *, length: float = 18.0, bays: int = 6, first: float = 2.0, high: float = 4.0) -> Surface:
+def _wall(
+    name: str, *, length: float = 18.0, bays: int = 6, first: float = 2.0, high: float = 4.0, before: float = 0.0
+) -> Surface:
     """A wall of one building, in two stretches that meet, base at height 10."""
     parts = []
     for a, b in ((0.0, 0.4 * length), (0.4 * length, length)):
-        ends = [_START + _RIGHT * a, _START + _RIGHT * b]
+        ends = [_START + _RIGHT * a + _OUT * before, _START + _RIGHT * b + _OUT * before]
         corners = [(*ends[0], 10.0), (*ends[1], 10.0), (*ends[1], 10.0 + high), (*ends[0], 10.0 + high)]
         u0, u1 = (first + a / length * bays) / BAYS, (first + b / length * bays) / BAYS
         parts.append((corners, [(u0, 0.004), (u1, 0.004), (u1, 0.996), (u0, 0.996)]))
@@ -85,6 +87,14 @@ def test_a_wall_and_its_bays_are_read_off_its_triangles() -> None:
     assert wall.bay_edges(5.0, 7.0) == (pytest.approx(3.0, abs=1e-3), pytest.approx(9.0, abs=1e-3))
     assert GroundFloors([_wall("ground_plain")]).at(1000, *(_START + _RIGHT * 7.0), _FACING + 2.0) is None
     assert GroundFloors([_wall("ground_plain")]).at(1001, *(_START + _RIGHT * 7.0), _FACING) is None
+
+
+def test_of_walls_close_before_one_another_the_outermost_has_the_doors() -> None:
+    walls = [_wall("ground_plain"), _wall("ground_cafes", before=0.05), _wall("ground_shops", before=0.5)]
+    wall = GroundFloors(walls).at(1000, *(_START + _RIGHT * 7.0), _FACING)
+    assert wall is not None
+    assert wall.material == "ground_cafes"
+    assert wall.length == pytest.approx(18.0, abs=1e-4)
 
 
 @pytest.mark.parametrize("s", [0.4, 4.5, 6.1, 9.0, 17.7])

@@ -39,3 +39,15 @@ def test_a_plane_needs_few_corners_and_a_bump_keeps_its_own() -> None:
     bump = thinned(plan, [lambda xy: np.abs(xy[:, 1] - 4.0)], used, tolerance)
     top = np.flatnonzero(np.abs(bump.corners[:, 1] - 4.0) < 1e-9)
     assert np.isin(top, bump.triangles).any()
+
+
+def test_what_lies_along_a_side_stays_on_it() -> None:
+    # A kerb that comes up to the side at a sharp angle: what is left of the pavement beside it is a sliver of 3 mm.
+    tip, bend = (2.058, 10.0), (2.0, 9.997)
+    stone = shapely.Polygon([bend, (4.6, 9.925), (6.0, 10.0), (4.0, 10.0), tip])
+    pavement = shapely.Polygon([(0, 9.7), bend, (2.0, 10.0), (0, 10.0)])
+    street = shapely.Polygon([(0, 0), (10, 0), (10, 10), (6.0, 10.0), (4.6, 9.925), bend, (0, 9.7)])
+    plan = conforming([triangulated([shape]) for shape in (stone, pavement, street)])
+    made = thinned(plan, [lambda xy: np.zeros(len(xy))], np.zeros(3, np.int64), np.full(3, 0.02))
+    corners = made.corners[np.unique(made.triangles[made.piece == 0])]
+    assert sorted(corners[corners[:, 1] == 10.0, 0].tolist()) == [2.058, 6.0]

@@ -257,6 +257,20 @@ def test_an_outline_its_parts_cover_partly_keeps_the_rest() -> None:
     assert sum(part.polygon.area for part in plan.parts) == pytest.approx(600.0, abs=1.0)
 
 
+def test_what_goes_on_under_a_part_has_no_sliver_beside_another() -> None:
+    plan = planned(
+        [
+            (shapely.box(0, 0, 30, 20), {"building": "yes", "height": "4"}),
+            # As maps have it, a part ends a little before the outline: the lower storey would go on as a thin wall.
+            (shapely.box(0, 0, 20, 19.95), {"building:part": "yes", "height": "10"}),
+            (shapely.box(0, 0, 30, 20), {"building:part": "yes", "height": "12", "min_height": "4"}),
+        ]
+    )["w1"]
+    low = [part.polygon for part in plan.parts if part.low == 0.0]
+    assert sorted(round(polygon.area) for polygon in low) == [200, 399]
+    assert all(len(polygon.exterior.coords) == 5 for polygon in low)
+
+
 @pytest.mark.parametrize(
     ("module", "function"), [(apart, "_settled"), (apart, "_beside"), (buildings, "_pieces"), (buildings, "part_of")]
 )

@@ -19,6 +19,7 @@ from vico.world.mesh import Surface
 from vico.worldgen.facades.textures.walls import BAYS
 
 _U, _V = 3, 4  # columns of a corner after its position: texture coordinates
+_BEHIND = 0.02  # metres from which on a wall lies behind another
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,10 @@ class GroundFloors:
         self._entity = entity[self._order]
 
     def at(self, entity: int, x: float, y: float, facing: float) -> Wall | None:
-        """Return the wall of a building on which a point lies; None where no ground floor has a picture there."""
+        """Return the wall of a building on which a point lies; None where no ground floor has a picture there.
+
+        Of walls close before one another it is the outermost, which is the one that is seen.
+        """
         low, high = np.searchsorted(self._entity, [entity, entity + 1])
         mine = self._order[low:high]
         if not len(mine):
@@ -117,13 +121,17 @@ class GroundFloors:
             return None
         normal = self._normal[mine][:, :2]
         normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        away = np.abs(((np.array([x, y]) - self._corner[mine, 0, :2]) * normal).sum(axis=1))
+        before = ((self._corner[mine, 0, :2] - np.array([x, y])) * normal).sum(axis=1)
+        away = np.abs(before)
         right = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
         s = np.einsum("nki,ni->nk", self._corner[mine][:, :, :2] - np.array([x, y]), right)
         beside = np.maximum(np.maximum(s.min(axis=1), -s.max(axis=1)), 0.0)
         best = int(np.argmin(away + beside))
         if away[best] > 0.35 or beside[best] > 0.3:
             return None
+        seen = np.flatnonzero((away <= 0.35) & (beside <= beside[best]) & (before > before[best] + _BEHIND))
+        if len(seen):
+            best = int(seen[np.argmax(before[seen])])
         n, r = normal[best], right[best]
         same = (dot(normal, n) > 0.9995) & (self._name[mine] == self._name[mine[best]])
         same &= np.abs(dot(self._corner[mine][:, :, :2] - self._corner[mine[best], 0, :2], n)).max(axis=1) < 0.04

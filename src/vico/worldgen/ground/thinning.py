@@ -13,6 +13,7 @@ from vico.worldgen.ground.conform import Heights, PlanMesh
 
 _STRAIGHT = 0.004  # metres that a border may bend
 _LONGEST = 14.0  # metres: corners carry the large patches of colour
+_ON_SIDE = 1e-4  # metres from a side of the plan within which a corner lies on it
 _MOST_ABOUT = 40  # triangles about one corner
 _PASSES = (0.2, 0.5, 1.0)  # the smoothest corners go first
 
@@ -36,7 +37,8 @@ def thinned(
     Returns
     -------
     PlanMesh
-        The same pieces with the same outlines (to four millimetres), corners numbered as before.
+        The same pieces with the same outlines (to four millimetres), corners numbered as before. What lies along the
+        sides of the whole stays there: another plan may go on beyond them.
     """
     if not len(plan.triangles):
         return plan
@@ -49,6 +51,7 @@ def thinned(
         z=np.stack([height(corners) for height in heights], axis=1),
         triangles=triangles,
         piece=plan.piece,
+        sides=_sides(corners, triangles),
         used=used,
         owner=order // 3,
         first=np.searchsorted(triangles.ravel()[order], np.arange(len(corners) + 1)),
@@ -61,6 +64,14 @@ def thinned(
     for share in _PASSES:
         _collapse_corners(mesh, tolerance * share, turn)
     return PlanMesh(corners, triangles[mesh.alive], plan.piece[mesh.alive])
+
+
+def _sides(corners: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Tell which sides of the box around all triangles each corner lies on: a bit a side."""
+    drawn = corners[triangles.ravel()]
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    on = np.concatenate([corners <= low + _ON_SIDE, corners >= high - _ON_SIDE], axis=1)
+    return np.asarray((on * np.array([1, 2, 4, 8])).sum(axis=1), np.int64)
 
 
 class _Mesh(NamedTuple):
@@ -76,6 +87,8 @@ class _Mesh(NamedTuple):
         Corners of each triangle, int64, shape ``(m, 3)``.
     piece
         The piece of the plan each triangle belongs to, int64, shape ``(m,)``.
+    sides
+        Sides of the whole plan that each corner lies on, a bit a side, int64, shape ``(n,)``.
     used
         The kind of heights each piece lies at, int64, shape ``(pieces,)``.
     owner, first
@@ -96,6 +109,7 @@ class _Mesh(NamedTuple):
     z: NDArray[np.float64]
     triangles: NDArray[np.int64]
     piece: NDArray[np.int64]
+    sides: NDArray[np.int64]
     used: NDArray[np.int64]
     owner: NDArray[np.int64]
     first: NDArray[np.int64]
@@ -224,6 +238,8 @@ def _border_through(mesh, ring, v, size):  # type: ignore[no-untyped-def]
     if borders == 0:
         return True, -1, -1
     if borders != 2:
+        return False, one, two
+    if mesh.sides[v] & mesh.sides[one] & mesh.sides[two] != mesh.sides[v]:
         return False, one, two
     xy = mesh.xy
     length = np.hypot(xy[two, 0] - xy[one, 0], xy[two, 1] - xy[one, 1])

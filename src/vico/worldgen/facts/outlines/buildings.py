@@ -276,7 +276,8 @@ def _rest_of_outline(main: PartPlan, parts: list[PartPlan]) -> list[PartPlan]:
         eaves = min(main.eaves, part.low)
         if eaves > main.low + 0.3:  # else the outline itself begins higher up, and nothing of it is below the part
             low = replace(main, eaves=eaves, levels=max(round(eaves / STOREY), 1), roof=Roof("flat", 0.0))
-            solids += [replace(low, polygon=piece) for piece in polygons_of(under, 6.0)]
+            pieces = without_slivers(under, main.polygon)
+            solids += [replace(low, polygon=piece) for piece in pieces if piece.area > 6.0]
         rest = overlay.areas_of(overlay.difference(rest, part.polygon, grid=0.001))
     pieces = [piece for piece in without_slivers(rest, main.polygon) if piece.area > 6.0]
     return [replace(main, polygon=piece) for piece in pieces] + solids
