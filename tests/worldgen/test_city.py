@@ -28,7 +28,7 @@ from vico.world.mesh import Material, Surface
 from vico.world.model import Origin
 from vico.world.world import World
 from vico.worldgen import city_map
-from vico.worldgen.city_build import bare_ground, build_city, city_request, divide_map
+from vico.worldgen.city_build import build_city, city_request, divide_map, divide_sources
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_tiles import plan
 from vico.worldgen.facts.site import site_facts
@@ -147,7 +147,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> CityRequest:
     """Two tiles of Helsinki side by side, planned but not built."""
     out = tmp_path_factory.mktemp("pair")
     request = CityRequest(Sources(EXTRACT), *CENTRE, PAIR, 0, out)
-    divide_map(request)
+    divide_sources(request)
     for tile in PAIR:
         plan(request, tile)
     return request
@@ -233,8 +233,7 @@ def test_heights_that_cover_one_tile_alone_go_on_in_the_next(tmp_path: Path) -> 
     ]
     tifffile.imwrite(dem, np.full((rows, columns), 7.0, np.float32), extratags=tags)
     request = CityRequest(Sources(EXTRACT, dem=(dem,)), *CENTRE, PAIR, 0, tmp_path / "city")
-    divide_map(request)
-    bare_ground(request)
+    divide_sources(request)
     assert [plan(request, tile) for tile in PAIR] == [{}, {}]
     west, east = (kept_product(request.plans / tile_name(tile), "grading")[0] for tile in PAIR)
     assert west.smooth([[0.0, 0.0]])[0] == pytest.approx(7.0, abs=0.3)

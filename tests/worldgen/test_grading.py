@@ -7,24 +7,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from shapely.affinity import translate
 
 from road_city import roads_of
 from stages_alone import ground_of
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData, OsmWay, read_osm
+from vico.geo.osm import OsmArea, OsmData, OsmWay, read_osm
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.worldgen.facts.ground_kinds import ground_partition, water_pieces
+from vico.worldgen.facts.expendable import NamedShape
+from vico.worldgen.facts.ground_kinds import ground_partition, water_of_map, water_pieces
 from vico.worldgen.facts.levels import CLEARANCE, OVER_A_STREET, overpasses, passages
 from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.facts.waters import WaterBody
 from vico.worldgen.ground.bridges.decks import decks_of
 from vico.worldgen.ground.bridges.portals import portal_feet, portals_of
-from vico.worldgen.ground.grading import graded, open_water
+from vico.worldgen.ground.grading import graded
 from vico.worldgen.ground.kerbs import KERB, lowered_kerbs
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
+from vico.worldgen.ground.waters import open_water, water_bodies
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import is_traffic_street, streets_from_osm
 
@@ -117,7 +121,8 @@ def test_streets_of_a_mountain_town_are_level_across(shared_data: Path) -> None:
                 tilts.append(abs(float(field.smooth(here + side) - field.smooth(here - side))) / (street.width - 1.0))
     assert len(tilts) > 100
     assert np.percentile(tilts, 85) < 0.03
-    for water in open_water(field, water_pieces(site_facts(osm), streets, shapely.box(-HALF, -HALF, HALF, HALF))):
+    pieces = water_pieces(site_facts(osm), streets, shapely.box(-HALF, -HALF, HALF, HALF))
+    for water in open_water(site_facts(osm), field, pieces):
         bank = shapely.get_coordinates(water.polygon.exterior)
         assert np.median(field.smooth(bank) - water.level(bank)) > 0.1
 
@@ -241,3 +246,46 @@ def _plan(surface: Surface, above: float = -1.0) -> np.ndarray:
     corners = surface.positions[surface.triangles].astype(np.float64)
     shapes: np.ndarray = shapely.polygons(corners[corners[:, :, 2].min(axis=1) > above][:, :, :2])
     return shapes[shapely.area(shapes) > 1e-4]
+
+
+def test_a_part_of_a_city_has_its_waters_as_high_as_the_city_says() -> None:
+    x, y = np.meshgrid(np.linspace(-400.0, 400.0, 81), np.linspace(-400.0, 400.0, 81))
+    valley = HeightField((0.02 * x + 0.01 * y).astype(np.float32), 400.0)
+    river = shapely.box(-390.0, -12.0, 390.0, 12.0)
+    (body,) = water_bodies(valley, [NamedShape("w1", river)])
+    seen = []
+    for shift in (-100.0, 100.0):  # two tiles that meet at x = 0 have different pieces of it
+        own = WaterBody(translate(body.outline, -shift, 0.0), body.shore - [shift, 0.0], body.banks, body.drop)
+        site = replace(site_facts(OsmData(FRAME, 100.0, 60.0, [], [], [], [])), waters=[own])
+        window = shapely.box(-100.0, -100.0, 100.0, 100.0)
+        piece = shapely.intersection(translate(river, -shift, 0.0), window)
+        (water,) = open_water(site, flat_terrain(half=160.0), [piece])
+        seen.append(water.level(np.array([[-shift, -10.0], [-shift, 0.0], [-shift, 10.0]])))
+    assert np.allclose(seen[0], seen[1], atol=1e-9)
+    assert ((seen[0] < -1.3) & (seen[0] > -3.5)).all()  # below the banks near by, which lie between -1 and 1 m
+    upstream, downstream = body.level(np.array([[200.0, 0.0], [-200.0, 0.0]]))
+    assert upstream - downstream > 4.0
+
+
+def test_a_tip_of_water_over_a_border_is_of_the_body_that_it_belongs_to() -> None:
+    pond = shapely.Polygon([(-2.0, 0.0), (60.0, 60.0), (60.0, -60.0)])
+    (body,) = water_bodies(flat_terrain(half=200.0), [NamedShape("w1", pond)])
+    site = replace(site_facts(OsmData(FRAME, 100.0, 60.0, [], [], [], [])), waters=[body])
+    tip = shapely.intersection(pond, shapely.box(-10.0, -10.0, -1.7, 10.0))
+    assert not body.outline.contains(tip)
+    assert open_water(site, flat_terrain(half=200.0), [tip])[0].body is body
+
+
+def test_a_stream_goes_on_as_a_line_where_the_water_that_is_mapped_ends() -> None:
+    # Half of it is mapped as an area, too, beside which its line runs: two parts of the map agree on the other half.
+    stream = _way(1, [1, 2, 3], [(-90, 5), (0, 5), (90, 5)], waterway="river", width="6")
+    area = OsmArea("w2", shapely.box(-95, -4, 0, 4), {"natural": "water"})
+    osm = OsmData(FRAME, HALF, 60.0, [], [stream], [area], [])
+    whole = shapely.union_all([one.shape for one in water_of_map(osm, shapely.box(-100, -100, 100, 100))])
+    assert whole.intersection(shapely.box(-100, -9, -5, 9)).area == pytest.approx(90 * 8)
+    assert whole.intersection(shapely.box(10, -9, 100, 9)).area == pytest.approx(80 * 6)
+    assert len(shapely.get_parts(whole)) == 1  # without a gap
+    for west, east in ((-100.0, 30.0), (30.0, 100.0)):
+        window = shapely.box(west, -100, east, 100)
+        part = shapely.union_all([one.shape for one in water_of_map(osm, window)])
+        assert part.symmetric_difference(whole.intersection(window)).area < 1e-6

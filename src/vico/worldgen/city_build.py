@@ -15,10 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.affinity import translate
 
 from vico.errors import InputError, StageError
+from vico.geo import overlay
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
+from vico.geo.osm import polygons_of
 from vico.geo.osm_parts import OsmParts
 from vico.io.files import read_json, sha256_of, write_json
 from vico.io.memory import give_back_memory
@@ -26,15 +31,19 @@ from vico.jobs import Answer, Service, Task, open_executor
 from vico.version import __version__
 from vico.world.city import CITY, TILES, City, CityManifest, CityTile, read_city
 from vico.world.city_files import COST, REACHED, ROOM, SURFACES, WHOLE
+from vico.world.heights import HeightField
 from vico.world.model import Origin
 from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_report import write_city_report
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import make_streets
 from vico.worldgen.city_tiles import GATES
-from vico.worldgen.ground.terrain import APRON, terrain_from_dem
+from vico.worldgen.facts.ground_kinds import water_of_map
+from vico.worldgen.facts.waters import WaterBody
+from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem
+from vico.worldgen.ground.waters import piped_waters, water_bodies
 from vico.worldgen.seams.grid import HALO, Tile, TileGrid, grid_of, grid_over, tile_name
-from vico.worldgen.seams.join import MAP
+from vico.worldgen.seams.join import MAP, WATERS
 from vico.worldgen.seams.walking import write_gates, write_walking
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
@@ -135,8 +144,7 @@ def build_city(
         If the sources can't be used, and then a city that was there stays; or if the streets can't be made.
     """
     request.plans.mkdir(parents=True, exist_ok=True)
-    region = divide_map(request)
-    bare_ground(request)
+    region = divide_sources(request)
     # The sources are good: from here on what the city has as a whole may be another one's until all is written.
     (request.out / CITY).unlink(missing_ok=True)
     failed: dict[str, str] = {}
@@ -214,6 +222,13 @@ def _tell(progress: Progress | None, step: str, done: int) -> None:
         progress(step, done, 1)
 
 
+def divide_sources(request: CityRequest) -> RegionMap:
+    """Keep for each tile what the region's map and ground say of it; return that map, as `divide_map`."""
+    region = divide_map(request)
+    divide_waters(request, region, bare_ground(request))
+    return region
+
+
 def divide_map(request: CityRequest) -> RegionMap:
     """Keep for each tile what of the region's map lies there, and return that map: read if it has changed alone."""
     region, known = RegionMap(request), request.plans / "map.json"
@@ -230,16 +245,46 @@ def divide_map(request: CityRequest) -> RegionMap:
     return region
 
 
-def bare_ground(request: CityRequest) -> None:
-    """Fit the bare ground of the whole city, if anything tells its heights."""
-    if not request.sources.dem:
-        return
-    frame = LocalFrame(request.lat, request.lon)
+def bare_ground(request: CityRequest) -> HeightField:
+    """Fit the bare ground of the whole city, level where nothing tells its heights."""
     half = request.grid.half + HALO
+    if not request.sources.dem:
+        return flat_terrain(half=half)
+    frame = LocalFrame(request.lat, request.lon)
     stages = Stages(request.plans)
     samples = read_elevation(request.sources.dem, frame, half)
     stages.given(samples, f"{samples.sha256} {frame} {half}")
-    stages.run("terrain", terrain_from_dem, samples, half=half, apron=APRON)
+    return stages.run("terrain", terrain_from_dem, samples, half=half, apron=APRON)
+
+
+def divide_waters(request: CityRequest, region: RegionMap, ground: HeightField) -> None:
+    """Keep for each tile the bodies of water in and around it, as high everywhere as the whole city has them.
+
+    How high a river lies is told by its banks, and how far below them by how large it is: of its part in one tile other
+    numbers would come than next to it.
+    """
+    stages = Stages(request.plans)
+    stages.given(region, region.key)
+    bodies = stages.run("bodies", _bodies, region, ground)
+    outlines = shapely.STRtree([body.outline for body in bodies])
+    half = request.grid.size / 2 + HALO
+    for tile in request.grid:
+        middle = np.array(request.grid.centre(tile))
+        window = shapely.box(*(middle - half), *(middle + half))
+        near = [bodies[k] for k in np.sort(outlines.query(window, predicate="intersects")).tolist()]
+        parts = [part for body in near for part in _part_of(body, window, middle)]
+        keep_product(request.plans / tile_name(tile), WATERS, parts)
+
+
+def _bodies(region: RegionMap, ground: HeightField) -> list[WaterBody]:
+    osm, half = region.whole, ground.half
+    return water_bodies(ground, [*water_of_map(osm, shapely.box(-half, -half, half, half)), *piped_waters(osm)])
+
+
+def _part_of(body: WaterBody, window: shapely.Polygon, middle: NDArray[np.float64]) -> list[WaterBody]:
+    """Return what of a body lies in a window, as high as it is, told from another middle."""
+    here = polygons_of(overlay.intersection(body.outline, window))
+    return [replace(body, outline=translate(part, *(-middle).tolist()), shore=body.shore - middle) for part in here]
 
 
 def _done(

@@ -31,7 +31,7 @@ from vico.worldgen.previews.stage import write_map
 from vico.worldgen.product import digest_of, read_head
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import Tile, tile_name
-from vico.worldgen.seams.join import CUT, MAP
+from vico.worldgen.seams.join import CUT, MAP, WATERS
 from vico.worldgen.seams.mosaic import TileShape
 from vico.worldgen.seams.walking import around, square_of
 from vico.worldgen.shaping import SEAMS, map_of, planned, shaped
@@ -56,7 +56,7 @@ def plan(request: CityRequest, tile: Tile) -> dict[str, Any]:
     """Plan a tile's streets and ground; bare ground where that fails, for its neighbours need one."""
     folder = request.plans / tile_name(tile)
     terrain = request.plans / f"terrain{SUFFIX}"
-    made_of = [_head(folder, MAP), read_head(terrain)[1] if terrain.exists() else ""]
+    made_of = [_head(folder, MAP), _head(folder, WATERS), read_head(terrain)[1] if terrain.exists() else ""]
     return _unless_kept(request, tile, "plan", made_of, lambda: _plan(request, tile))
 
 
@@ -112,7 +112,8 @@ def build(request: CityRequest, tile: Tile) -> dict[str, Any]:
 def _plans(request: CityRequest, tile: Tile) -> list[str]:
     """Return digests of a tile's map, and of what it and its neighbours planned."""
     around = [request.plans / tile_name(one) for one in request.grid.around(tile)]
-    return [_head(request.plans / tile_name(tile), MAP), *(_head(folder, name) for folder in around for name in SEAMS)]
+    own = request.plans / tile_name(tile)
+    return [_head(own, MAP), _head(own, WATERS), *(_head(folder, name) for folder in around for name in SEAMS)]
 
 
 def fit(request: CityRequest, tile: Tile) -> dict[str, Any]:

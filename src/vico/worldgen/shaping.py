@@ -27,7 +27,7 @@ from vico.worldgen.ground.stairs import Flights, flights_of
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.request import WorldRequest
 from vico.worldgen.seams.heights import cropped
-from vico.worldgen.seams.join import MAP, TilePlace, parted, seamless
+from vico.worldgen.seams.join import MAP, WATERS, TilePlace, parted, seamless
 from vico.worldgen.stages import Stages, kept_product
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.tables import read_tables
@@ -69,7 +69,7 @@ def planned(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan:
     read_tables()
     run = stages.run
     evidence, known = _merged(evidence, stages)
-    site = _left(_site(evidence.data, stages), stages)
+    site = _left(_site(evidence.data, request.place, stages), stages)
     plans = run("plans", building_plans, site.osm, seed=request.seed, **known)
     bare, tiles = _terrain(evidence, plans, request, stages)
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
@@ -131,10 +131,10 @@ def _among_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> tupl
     streets = stages.given(known["streets"], f"streets {both}")
     heights = stages.given(known["grading"], f"heights {both}")
     joined = stages.run("seams", seamless, place.grid, place.tile, streets, heights, apron=APRON)
-    plans, beyond = parted(plan.plans, request.half)
+    plans, beyond = parted(plan.plans, place.grid, place.tile)
     osm = plan.site.osm
     less = replace(osm, half=request.half, margin=osm.margin + osm.half - request.half)
-    site = stages.given(site_facts(less), f"{stages.digest(plan.site)} within {request.half}")
+    site = stages.given(site_facts(less, plan.site.waters), f"{stages.digest(plan.site)} within {request.half}")
     return replace(
         plan,
         site=site,
@@ -154,10 +154,11 @@ def _merged(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict[str, Any
     return replace(evidence, data=data), {"measured": merged.facets, "origins": merged.origins}
 
 
-def _site(data: OsmData, stages: Stages) -> SiteFacts:
-    """Read the facts of the site off its map; they are known by the map's own digest."""
+def _site(data: OsmData, place: TilePlace | None, stages: Stages) -> SiteFacts:
+    """Read the facts of the site off its map; they are known by the digest of that and of what a city knows beside."""
+    waters, known = (None, "") if place is None else kept_product(place.own, WATERS)
     with stages.timed("facts"):
-        return stages.given(site_facts(data), f"facts {stages.digest(data)}")
+        return stages.given(site_facts(data, waters), f"facts {stages.digest(data)} {known}")
 
 
 def _left(site: SiteFacts, stages: Stages) -> SiteFacts:

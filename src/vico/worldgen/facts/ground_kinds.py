@@ -13,8 +13,8 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmData, polygons_of
-from vico.worldgen.facts.expendable import NamedShape, expendable, named_parts, united
+from vico.geo.osm import OsmArea, OsmData, polygons_of
+from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import PAVINGS, StreetPolygons
 from vico.worldgen.facts.tags import number, on_the_ground
@@ -50,6 +50,7 @@ _SPORTS = {
 }
 _PAVED_KINDS = ("carriageway", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 _RAILS = ("rail", "light_rail", "narrow_gauge")
+_BESIDE = 8.0  # metres from a mapped water within which the line of a stream is that water's
 _BED = 2.6  # metres of ballast on each side of a track: tracks side by side share it
 # Square metres: smaller pieces of ground are left out; smaller ones still at the window's edge.
 _LEAST_PIECE, _SPECK = 0.02, 1e-4
@@ -242,7 +243,7 @@ def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[NamedShape]
             with expendable(f"w{way.id}"):
                 strip = overlay.buffer(shapely.LineString(way.line), _BED, cap_style="flat")
                 found["ballast"].append(NamedShape(f"w{way.id}", strip))
-    found["water"] += _streams(osm, window, found["water"])
+    found["water"] += _streams(osm, window)
     # A pond within a park is water, a lawn within a wood is lawn: small before large comes with the kinds' order, but
     # the sea comes last of the waters and gives way to everything mapped on it (piers, moles).
     sea: list[Polygon] = []
@@ -258,21 +259,59 @@ def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[NamedShape]
     return found
 
 
-def _streams(osm: OsmData, window: Polygon, mapped: list[NamedShape]) -> list[NamedShape]:
-    """Rivers, canals and streams that are drawn as lines only."""
-    usual = {"river": 8.0, "canal": 8.0, "stream": 1.6, "drain": 1.0, "ditch": 0.8}
-    known = united(mapped, grid=_GRID)
+def water_of_map(osm: OsmData, window: Polygon) -> list[NamedShape]:
+    """Return all that is mapped as water in a window, the sea with everything that is mapped on it."""
     found: list[NamedShape] = []
-    for way in osm.ways:
-        tags = way.tags
-        if tags.get("waterway") not in usual or tags.get("tunnel", "no") != "no" or not on_the_ground(tags):
-            continue
-        line = shapely.LineString(way.line)
+    for area in osm.areas:
+        if _is_water(area):
+            with expendable(area.id):
+                found += named_parts(area.id, polygons_of(overlay.intersection(area.polygon, window)))
+    found += _streams(osm, window)
+    with expendable("sea"):
+        sea = sea_polygons(osm, window) if osm.sea is None else osm.sea
+        found += named_parts(
+            "sea", [part for whole in sea for part in polygons_of(overlay.intersection(whole, window))]
+        )
+    return found
+
+
+def _is_water(area: OsmArea) -> bool:
+    tags = area.tags
+    return _kind_of(tags) == "water" and on_the_ground(tags) and tags.get("building", "no") == "no"
+
+
+def _streams(osm: OsmData, window: Polygon) -> list[NamedShape]:
+    """Rivers, canals and streams where they are drawn as lines only.
+
+    Where a line runs through a mapped water or close beside it, it is that water. Decided stretch by stretch: what lies
+    far away has no say, so that parts of a map agree on what they share.
+    """
+    usual = {"river": 8.0, "canal": 8.0, "stream": 1.6, "drain": 1.0, "ditch": 0.8}
+    ways = [
+        way
+        for way in osm.ways
+        if way.tags.get("waterway") in usual and way.tags.get("tunnel", "no") == "no" and on_the_ground(way.tags)
+    ]
+    lines = np.array([shapely.LineString(way.line) for way in ways], object)
+    tree = shapely.STRtree(lines)
+    mapped = [
+        NamedShape(area.id, area.polygon)
+        for area in osm.areas
+        if _is_water(area) and len(tree.query(area.polygon, predicate="dwithin", distance=_BESIDE))
+    ]
+    known = united(changed(mapped, lambda shapes: overlay.buffer(shapes, _BESIDE, quad_segs=2)))
+    found: list[NamedShape] = []
+    for k in np.sort(tree.query(window, predicate="intersects")).tolist():
+        way, line = ways[k], lines[k]
         with expendable(f"w{way.id}"):
-            if known.intersects(line) and overlay.common_length(known, line) > 0.3 * line.length:
-                continue
-            width = min(max(number(tags.get("width")) or usual[tags["waterway"]], 0.6), 60.0)
-            strip = overlay.buffer(line, width / 2, cap_style="flat", quad_segs=2)
+            stretch = line
+            if known.intersects(line):
+                # Up to the mapped water, which may begin a little later than the line leaves what is close to it.
+                parts = shapely.get_parts(overlay.difference(line, known))
+                apart = shapely.MultiLineString([part for part in parts if part.length > _BESIDE])
+                stretch = overlay.intersection(overlay.buffer(apart, 1.5 * _BESIDE), line)
+            width = min(max(number(way.tags.get("width")) or usual[way.tags["waterway"]], 0.6), 60.0)
+            strip = overlay.buffer(stretch, width / 2, cap_style="flat", quad_segs=2)
             found += named_parts(f"w{way.id}", polygons_of(overlay.intersection(strip, window)))
     return found
 

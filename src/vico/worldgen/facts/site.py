@@ -9,6 +9,7 @@ from vico.geo.osm import OsmData
 from vico.worldgen.facts.driving_side import keeps_left
 from vico.worldgen.facts.levels import StreetLevels, street_levels
 from vico.worldgen.facts.named_places import NamedPlace, named_places
+from vico.worldgen.facts.waters import WaterBody
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,15 @@ class SiteFacts:
         Whether traffic keeps left.
     named
         Named places people go to, in the order of the map.
+    waters
+        Of a part of a city: the bodies of water in it as the whole city has them; None: this map is all there is.
     """
 
     osm: OsmData
     levels: StreetLevels
     left_driving: bool
     named: list[NamedPlace]
+    waters: list[WaterBody] | None = None
 
     def without(self, ids: Set[str]) -> SiteFacts:
         """Return the site without objects of these ids: what one stage can't make, no later stage is to see."""
@@ -43,6 +47,6 @@ class SiteFacts:
         return replace(self, osm=osm, named=[named for named in self.named if named.id not in ids])
 
 
-def site_facts(osm: OsmData) -> SiteFacts:
-    """Read the facts of a site off its map."""
-    return SiteFacts(osm, street_levels(osm), keeps_left(osm), named_places(osm))
+def site_facts(osm: OsmData, waters: list[WaterBody] | None = None) -> SiteFacts:
+    """Read the facts of a site off its map; see `SiteFacts` for its waters."""
+    return SiteFacts(osm, street_levels(osm), keeps_left(osm), named_places(osm), waters)

@@ -15,20 +15,20 @@ import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
-from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmData
 from vico.world.heights import HeightField
-from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.ground_kinds import water_pieces
 from vico.worldgen.facts.levels import ON_FOOT, Passage
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
 from vico.worldgen.facts.tags import is_bridge, on_the_ground
-from vico.worldgen.ground.kerbs import Water, steps_field
+from vico.worldgen.ground.kerbs import steps_field
 from vico.worldgen.ground.profiles import Network
+from vico.worldgen.ground.waters import open_water
 
 Floats = NDArray[np.float64]
 
@@ -40,8 +40,6 @@ _TERRACE, _STEEPEST = 0.3, 0.15  # metres and slope that heights along one stree
 _WALL_ROOM = 2.0  # metres between two streets for a wall that holds the upper one
 _HIGH, _RAMP = 12.0, 4.0  # how much a deck's height over a street counts, and its ramps', where the ground counts 1
 _BANK = 8.0  # metres over which the ground goes back to the elevation model's
-_FREEBOARD, _FREEBOARD_SMALL, _BRIM = 1.3, 0.4, 0.12  # metres from banks down to waters, ponds, basins
-_SMALL, _BASIN = 2500.0, 150.0  # square metres
 _STEP_CELL, _STEP_CELL_LARGE, _LARGE = 0.5, 1.0, 700.0
 
 
@@ -64,7 +62,7 @@ def graded(height: HeightField, site: SiteFacts, streets: StreetPolygons) -> Hei
     """
     base = _levelled(replace(height, steps=None), site)
     window = shapely.box(-height.half, -height.half, height.half, height.half)
-    waters = open_water(base, water_pieces(site, streets, window), piped_waters(site.osm))
+    waters = open_water(site, base, water_pieces(site, streets, window))
     cell = _STEP_CELL if height.half < _LARGE else _STEP_CELL_LARGE
     return replace(base, steps=steps_field(base, streets, waters, cell=cell))
 
@@ -265,57 +263,3 @@ def _lay_pitch(heights: Floats, height: HeightField, pitch: BaseGeometry) -> Non
     target = plane[0] * (x - x.mean()) + plane[1] * (y - y.mean()) + plane[2]
     # To a tenth of a millimetre: the last bits of a solver differ from processor to processor.
     view[:] = np.round(view + (1.0 - part) * (target - view), 4)
-
-
-def piped_waters(osm: OsmData) -> list[NamedShape]:
-    """Waters that the map has under the ground: under bridges too, where what flows on is the same water."""
-    return [
-        NamedShape(area.id, area.polygon)
-        for area in osm.areas
-        if area.tags.get("natural") == "water" and not on_the_ground(area.tags)
-    ]
-
-
-def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[NamedShape] = ()) -> list[Water]:
-    """Return the waters of a map with their surfaces: level, or as gently sloped as their banks.
-
-    Parameters
-    ----------
-    height
-        The smooth ground counts.
-    pieces
-        `ground_partition`'s waters. Pieces that only a bridge parts belong together.
-    piped
-        Waters under the ground that join pieces, under their ids.
-    """
-    if not pieces:
-        return []
-    wide = changed([*named_parts("water", pieces), *piped], lambda shapes: overlay.buffer(shapes, 12.0, quad_segs=2))
-    whole = overlay.buffer(united(wide), -11.5, quad_segs=2)
-    bodies = polygons_of(whole)
-    tree = shapely.STRtree(bodies)
-    shores: dict[int, tuple[Floats, Floats, float]] = {}
-    waters = []
-    for piece in pieces:
-        hits = tree.query(piece.representative_point(), predicate="intersects")
-        body = int(hits.min()) if len(hits) else -1
-        if body not in shores or body < 0:
-            outline = bodies[body] if body >= 0 else piece
-            shores[body] = _shore(height, outline)
-        waters.append(Water(piece, *shores[body]))
-    return waters
-
-
-def _shore(height: HeightField, body: Polygon) -> tuple[Floats, Floats, float]:
-    """Points of a water's banks, their heights, and how far below them the surface lies."""
-    reach = height.half - 1.0
-    inside = overlay.intersection(body, shapely.box(-reach, -reach, reach, reach))
-    spacing = min(max(body.exterior.length / 200.0, 2.0), 12.0)
-    shore = shapely.get_coordinates(
-        shapely.segmentize(inside.boundary if not inside.is_empty else body.boundary, spacing)
-    )
-    levels = height.smooth(shore)
-    drop = _FREEBOARD if body.area > _SMALL else _FREEBOARD_SMALL if body.area > _BASIN else _BRIM
-    if float(np.ptp(levels)) < 2.0 or body.area < _SMALL:
-        return shore[:1], levels.min(keepdims=True) if body.area < _SMALL else np.percentile(levels, [15.0]), drop
-    return shore[:: max(len(shore) // 400, 1)], levels[:: max(len(levels) // 400, 1)], drop

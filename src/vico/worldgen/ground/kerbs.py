@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -18,6 +17,7 @@ from vico.world.heights import EDGE_RANGE, HeightField, Steps
 from vico.world.walkable import fill_polygon
 from vico.worldgen.facts.outlines.roof_shapes import rings_of
 from vico.worldgen.facts.streets import Crossing, StreetPolygons
+from vico.worldgen.ground.waters import Water
 
 KERB = 0.12
 """Metres a sidewalk lies above the carriageway."""
@@ -29,50 +29,6 @@ _FADE = 1.5  # metres over which a kerb runs out beside a drive
 _FLUSH = 0.01  # metres that stay of a lowered kerb
 _GRID = 0.001
 _MOST = 32_000  # millimetres
-
-
-_SHORE_REACH = 30.0
-_SHORE_SOFT = 0.7
-
-
-@dataclass(frozen=True)
-class Water:
-    """A piece of open water.
-
-    Attributes
-    ----------
-    shore, banks
-        Points of its banks and their heights, metres, shapes ``(n, 2)`` and ``(n,)``; one point for a level surface.
-    drop
-        How far the surface lies below the lowest banks nearby, metres.
-    """
-
-    polygon: Polygon
-    shore: NDArray[np.float64]
-    banks: NDArray[np.float64]
-    drop: float
-
-    def level(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Height of the surface at points, shape ``(n, 2)``."""
-        if len(self.shore) == 1:
-            return np.full(len(xy), float(self.banks[0]) - self.drop)
-        out = np.empty(len(xy))
-        _soft_least(np.ascontiguousarray(xy, np.float64), self.shore, self.banks, out)
-        return out - self.drop
-
-
-@compiled
-def _soft_least(xy, shore, banks, out):  # type: ignore[no-untyped-def]
-    """About the lowest bank near each point, smooth from point to point."""
-    lowest = banks.min()
-    for k in range(len(xy)):
-        total, weight = 0.0, 1e-12
-        for i in range(len(shore)):
-            square = (xy[k, 0] - shore[i, 0]) ** 2 + (xy[k, 1] - shore[i, 1]) ** 2
-            near = 1.0 / (1.0 + square / _SHORE_REACH**2) ** 2
-            weight += near
-            total += near * np.exp(-(banks[i] - lowest) / _SHORE_SOFT)
-        out[k] = lowest - _SHORE_SOFT * np.log(max(total / weight, 1e-12))
 
 
 def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:

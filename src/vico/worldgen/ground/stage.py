@@ -32,8 +32,8 @@ from vico.worldgen.ground.bridges.stage import Bridges
 from vico.worldgen.ground.conform import PlanMesh, conforming
 from vico.worldgen.ground.contours import region_above
 from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Grid, Heights, curtain, triangulated
-from vico.worldgen.ground.grading import is_level, open_water, piped_waters
-from vico.worldgen.ground.kerbs import RAMP, Water, lowered_kerbs
+from vico.worldgen.ground.grading import is_level
+from vico.worldgen.ground.kerbs import RAMP, lowered_kerbs
 from vico.worldgen.ground.markings import Quads, road_markings
 from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
 from vico.worldgen.ground.pitches import pitch_lines
@@ -43,6 +43,7 @@ from vico.worldgen.ground.tactile import street_bearing, tactile_fields
 from vico.worldgen.ground.thinning import thinned
 from vico.worldgen.ground.tree_pits import tree_pits
 from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
+from vico.worldgen.ground.waters import Water, open_water, piped_waters
 from vico.worldgen.ground.yards import Yards
 
 #: Metres of ground beyond the square of a world by itself: its edge is not in sight from within streets.
@@ -117,7 +118,7 @@ def ground_from_osm(
     level = is_level(terrain)
     if terrain.steps is not None:
         pieces = _with_tactile(pieces, tactile_fields(streets, window), window)
-    waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
+    waters = open_water(site, terrain, pieces.get("water", [])) if terrain.steps is not None else []
     hidden = _hidden(osm, standing)
     laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, yards=yards)
     wet = overlay.union_all([water.polygon for water in waters])

@@ -19,6 +19,8 @@ from vico.worldgen.seams.streets import adopted
 CUT = "cut"
 #: Product with what of the map lies in a tile and around it.
 MAP = "map"
+#: Product with the city's bodies of water in a tile and around it, as the whole city has them.
+WATERS = "waters"
 
 
 @dataclass(frozen=True)
@@ -77,10 +79,19 @@ def seamless(
     )
 
 
-def parted(plans: BuildingPlans, half: float) -> tuple[BuildingPlans, list[Polygon]]:
-    """Return the buildings whose middle lies in a tile, and the footprints of what else stands around it."""
-    square = shapely.box(-half, -half, half, half)
-    own = [square.contains(plan.outline.centroid) for plan in plans.plans]
-    mine = BuildingPlans([plan for plan, kept in zip(plans.plans, own, strict=True) if kept], plans.dropped)
-    others = BuildingPlans([plan for plan, kept in zip(plans.plans, own, strict=True) if not kept], [])
-    return mine, [shape.shape for shape in others.standing()]
+def parted(plans: BuildingPlans, grid: TileGrid, tile: Tile) -> tuple[BuildingPlans, list[Polygon]]:
+    """Return the buildings whose middle lies in a tile, and the footprints of those around it that other tiles have.
+
+    What has its middle beyond the city stands in no tile: there is open ground.
+    """
+    square, (x, y) = grid.box(tile, seen_from=tile), grid.centre(tile)
+    west, south, east, north = grid.edges
+    city = shapely.box(west - x, south - y, east - x, north - y)
+    middles = [plan.outline.centroid for plan in plans.plans]
+    mine = [plan for plan, middle in zip(plans.plans, middles, strict=True) if square.contains(middle)]
+    others = [
+        plan
+        for plan, middle in zip(plans.plans, middles, strict=True)
+        if city.contains(middle) and not square.contains(middle)
+    ]
+    return BuildingPlans(mine, plans.dropped), [shape.shape for shape in BuildingPlans(others, []).standing()]
