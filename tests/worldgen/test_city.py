@@ -14,6 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.affinity import translate
 
+from damaged_maps import DrawnMap, DrawnWay, write_map
+from random_windows import painted_once
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
@@ -36,7 +38,7 @@ from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import HALO, TileGrid, grid_of, grid_over, tile_name
 from vico.worldgen.seams.heights import blended, cropped
-from vico.worldgen.seams.join import seamless
+from vico.worldgen.seams.join import BORES, seamless
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import kept_product
 from vico.worldgen.streets.roads import streets_from_osm
@@ -361,6 +363,41 @@ def test_a_tile_that_is_gone_or_another_one_is_named(corner: World, corner_path:
         read_city(tmp_path / "good").world((0, 0))
     with pytest.raises(MissingFileError, match="has no tile 3_4"):
         read_city(tmp_path / "good").world((3, 4))
+
+
+def _river_and_tunnel(path: Path) -> Path:
+    """A map with a river that is a pond to who knows half of it, and a tunnel with a mouth 8 m west of x = 80."""
+    drawn = DrawnMap(LocalFrame(*CENTRE), {}, {}, {}, {})
+    known: dict[tuple[float, float], int] = {}
+
+    def way(points: list[tuple[float, float]], **tags: str) -> None:
+        for point in points:
+            if point not in known:
+                known[point] = drawn.node(*point)
+        drawn.ways[drawn.new_id()] = DrawnWay([known[point] for point in points], tags)
+
+    way([(-200.0, 0.0), (-40.0, 0.0), (72.0, 0.0)], highway="secondary")
+    way([(72.0, 0.0), (210.0, 0.0)], highway="secondary", tunnel="yes", layer="-1")
+    way([(210.0, 0.0), (300.0, 0.0)], highway="secondary")
+    way([(-40.0, 0.0), (-40.0, 70.0)], highway="residential")
+    way([(60.0, -50.0), (232.0, -50.0), (232.0, -34.0), (60.0, -34.0), (60.0, -50.0)], natural="water")
+    for x in (-20.0, 30.0, 140.0, 180.0):
+        way([(x, 20.0), (x + 15.0, 20.0), (x + 15.0, 32.0), (x, 32.0), (x, 20.0)], building="yes")
+    return write_map(drawn, path)
+
+
+def test_a_river_and_a_tunnel_go_on_in_the_next_tile(tmp_path: Path) -> None:
+    request = CityRequest(Sources(_river_and_tunnel(tmp_path / "map.osm.pbf")), *CENTRE, PAIR, 0, tmp_path / "city")
+    with painted_once():
+        city = build_city(request)
+    assert border_findings(city, (0, 0), (1, 0), 0) == []
+    west, east = (kept_product(request.plans / tile_name(tile), BORES)[0] for tile in PAIR)
+    along = np.stack([np.linspace(70.0, 90.0, 21), np.zeros(21)], axis=1)
+    floors = [np.interp(along[:, 0] - shift, one.line[:, 0], one.z) for (one,), shift in ((west, 0.0), (east, 160.0))]
+    assert np.allclose(*floors, atol=1e-9)
+    assert floors[0][-1] < -1.0
+    levels = [city.world(tile).height.lower([[x, -42.0]])[0] for tile, x in (((0, 0), 70.0), ((1, 0), -60.0))]
+    assert levels == pytest.approx([-1.3, -1.3], abs=0.01)
 
 
 @pytest.mark.slow

@@ -289,3 +289,15 @@ def test_a_stream_goes_on_as_a_line_where_the_water_that_is_mapped_ends() -> Non
         window = shapely.box(west, -100, east, 100)
         part = shapely.union_all([one.shape for one in water_of_map(osm, window)])
         assert part.symmetric_difference(whole.intersection(window)).area < 1e-6
+
+
+def test_a_river_lies_close_below_its_banks_however_far_it_falls() -> None:
+    along = np.arange(-3000.0, 3000.0, 12.0)
+    shore = np.concatenate([np.stack([along, np.full_like(along, y)], axis=1) for y in (-8.0, 8.0)])
+    river = WaterBody(shapely.box(-3000.0, -8.0, 3000.0, 8.0), shore, 0.03 * shore[:, 0], drop=1.3)
+    middle = np.stack([np.linspace(-2500.0, 2500.0, 101), np.zeros(101)], axis=1)
+    below = 0.03 * middle[:, 0] - river.level(middle)
+    assert ((below > 1.3) & (below < 2.0)).all()
+    one_low = np.where(np.abs(shore[:, 0]) < 30.0, shore[:, 1] / 8.0, 1.0)  # by a stretch of 60 m of one bank
+    lower = replace(river, banks=one_low * 3.0).level(np.array([[0.0, 0.0], [500.0, 0.0]]))
+    assert lower == pytest.approx([-3.0 - 1.3 + 0.4, 3.0 - 1.3], abs=0.4)

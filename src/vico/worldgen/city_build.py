@@ -38,6 +38,7 @@ from vico.worldgen.city_report import write_city_report
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import make_streets
 from vico.worldgen.city_tiles import GATES
+from vico.worldgen.city_tunnels import divide_tunnels, tiles_with_tunnels
 from vico.worldgen.facts.ground_kinds import water_of_map
 from vico.worldgen.facts.waters import WaterBody
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem
@@ -163,7 +164,10 @@ def build_city(
             failed.update({tile_name(one): reason for one, reason in refused.items()})
             return [one for one in tiles if one not in refused]
 
-        left = done("shape", done("plan", list(request.grid)))
+        left = done("plan", list(request.grid))
+        tunnels = done("join", [tile for tile in tiles_with_tunnels(request, region) if tile in left])
+        divide_tunnels(request, region, tunnels)
+        left = done("shape", left)
         if left:
             _tell(progress, "streets", 0)
             reports = make_streets(request, region)

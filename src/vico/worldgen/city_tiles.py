@@ -31,10 +31,10 @@ from vico.worldgen.previews.stage import write_map
 from vico.worldgen.product import digest_of, read_head
 from vico.worldgen.seams.border_fit import conformed
 from vico.worldgen.seams.grid import Tile, tile_name
-from vico.worldgen.seams.join import CUT, MAP, WATERS
+from vico.worldgen.seams.join import BORES, CUT, JOINED, MAP, WATERS
 from vico.worldgen.seams.mosaic import TileShape
 from vico.worldgen.seams.walking import around, square_of
-from vico.worldgen.shaping import SEAMS, map_of, planned, shaped
+from vico.worldgen.shaping import SEAMS, among_neighbours, map_of, planned, shaped
 from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
 
 #: Product with a tile's gates.
@@ -78,9 +78,25 @@ def _evidence(request: CityRequest, tile: Tile) -> tuple[Stages, Evidence]:
     return stages, gather(asked.sources, asked.frame, asked.reach, stages, part=map_of(place))
 
 
+def join(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Make a tile's streets and ground one with its neighbours', for the city's tunnels."""
+
+    def made() -> dict[str, Any]:
+        stages, evidence = _evidence(request, tile)
+        asked = request.tile(tile)
+        among_neighbours(planned(evidence, asked, stages), asked, stages)
+        return {}
+
+    made_of = _plans(request, tile)
+    if not (request.plans / tile_name(tile) / f"{JOINED}{SUFFIX}").exists():
+        _forget(request, tile, "join")
+    return _unless_kept(request, tile, "join", made_of, made)
+
+
 def shape(request: CityRequest, tile: Tile) -> dict[str, Any]:
     """Make what stands in a tile, for the city's streets."""
-    return _unless_kept(request, tile, "shape", _plans(request, tile), lambda: _shape(request, tile))
+    made_of = [*_plans(request, tile), _head(request.plans / tile_name(tile), BORES)]
+    return _unless_kept(request, tile, "shape", made_of, lambda: _shape(request, tile))
 
 
 def _shape(request: CityRequest, tile: Tile) -> dict[str, Any]:
@@ -100,7 +116,7 @@ def build(request: CityRequest, tile: Tile) -> dict[str, Any]:
     folder, out = request.plans / tile_name(tile), request.out / TILES / tile_name(tile)
     if not (out / "world.json").exists():
         _forget(request, tile, "build")
-    made_of = [*_plans(request, tile), _head(folder, CUT)]
+    made_of = [*_plans(request, tile), _head(folder, BORES), _head(folder, CUT)]
 
     def made() -> dict[str, Any]:
         build_requested(request.tile(tile), out)
@@ -212,6 +228,7 @@ def _unless_kept(
 
 STEPS: dict[str, Callable[[CityRequest, Tile], dict[str, Any]]] = {
     "plan": plan,
+    "join": join,
     "shape": shape,
     "build": build,
     "fit": fit,

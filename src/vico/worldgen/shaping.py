@@ -27,7 +27,7 @@ from vico.worldgen.ground.stairs import Flights, flights_of
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.request import WorldRequest
 from vico.worldgen.seams.heights import cropped
-from vico.worldgen.seams.join import MAP, WATERS, TilePlace, parted, seamless
+from vico.worldgen.seams.join import BORES, JOINED, MAP, WATERS, TilePlace, parted, seamless
 from vico.worldgen.stages import Stages, kept_product
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.tables import read_tables
@@ -104,9 +104,10 @@ class Shape:
 def shaped(plan: Plan, request: WorldRequest, stages: Stages) -> Shape:
     """Run the stages from the plan to what stands there."""
     run = stages.run
-    plan, beyond = _among_neighbours(plan, request, stages)
+    plan, beyond = among_neighbours(plan, request, stages)
     site, plans, height = plan.site, plan.plans, plan.height
-    bridges = run("bridges", bridges_of, site, height, plan.streets)
+    bores = None if request.place is None else stages.given(*kept_product(request.place.own, BORES))
+    bridges = run("bridges", bridges_of, site, height, plan.streets, bores)
     site = _left(site, stages)
     flights = run("stairs", flights_of, site, height, plan.streets.steps)
     site = _left(site, stages)
@@ -119,7 +120,7 @@ def shaped(plan: Plan, request: WorldRequest, stages: Stages) -> Shape:
     return Shape(replace(plan, site=site, plans=plans), bridges, flights, levels, built, solids)
 
 
-def _among_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> tuple[Plan, list[Polygon]]:
+def among_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> tuple[Plan, list[Polygon]]:
     """Return the plan of a tile as its neighbours see it, and what stands just beyond it; others as they are."""
     place = request.place
     if place is None:
@@ -130,7 +131,7 @@ def _among_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> tupl
     both = " ".join(digest for products in found.values() for _, digest in products)
     streets = stages.given(known["streets"], f"streets {both}")
     heights = stages.given(known["grading"], f"heights {both}")
-    joined = stages.run("seams", seamless, place.grid, place.tile, streets, heights, apron=APRON)
+    joined = stages.run(JOINED, seamless, place.grid, place.tile, streets, heights, apron=APRON)
     plans, beyond = parted(plan.plans, place.grid, place.tile)
     osm = plan.site.osm
     less = replace(osm, half=request.half, margin=osm.margin + osm.half - request.half)

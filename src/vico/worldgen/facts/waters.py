@@ -11,6 +11,7 @@ from shapely import Polygon
 from vico.io.compiled import compiled
 
 _REACH = 30.0  # metres along which a surface follows its banks
+_WIDER = 0.75  # of the distance to the nearest bank, where that is more
 _SOFT = 0.7  # metres by which the banks near a point may differ and still count
 
 
@@ -44,14 +45,25 @@ class WaterBody:
 
 @compiled
 def _soft_least(xy, shore, banks, out):  # type: ignore[no-untyped-def]
-    """About the lowest bank near each point, smooth from point to point."""
-    lowest = banks.min()
-    counts = np.exp(-(banks - lowest) / _SOFT)
+    """About the lowest bank near each point, smooth from point to point.
+
+    What counts as near ends: a river falls, and far down it every bank is lower. On wide water it reaches further.
+    """
+    away = np.empty(len(shore))
     for k in range(len(xy)):
-        total, weight = 0.0, 1e-12
+        nearest = np.inf
         for i in range(len(shore)):
-            square = (xy[k, 0] - shore[i, 0]) ** 2 + (xy[k, 1] - shore[i, 1]) ** 2
-            near = 1.0 / (1.0 + square / _REACH**2) ** 2
-            weight += near
-            total += near * counts[i]
-        out[k] = lowest - _SOFT * np.log(max(total / weight, 1e-12))
+            away[i] = (xy[k, 0] - shore[i, 0]) ** 2 + (xy[k, 1] - shore[i, 1]) ** 2
+            nearest = min(nearest, away[i])
+        wide = 8.0 * max(_REACH**2, _WIDER**2 * nearest)
+        lowest = np.inf
+        for i in range(len(shore)):
+            if away[i] - nearest < wide:
+                lowest = min(lowest, banks[i])
+        total, weight = 0.0, 0.0
+        for i in range(len(shore)):
+            share = 1.0 - (away[i] - nearest) / wide
+            if share > 0.0:
+                weight += share**4
+                total += share**4 * np.exp(-(banks[i] - lowest) / _SOFT)
+        out[k] = lowest - _SOFT * np.log(max(total / weight, 1e-300))

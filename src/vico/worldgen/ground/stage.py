@@ -59,6 +59,7 @@ _NARROW = 0.8  # metres, half the width of the narrowest lawn on a hillside
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _AT_EDGE = 0.06  # metres within which two outlines are the same edge
 _OVERHANG = 6.0  # metres beside the ways of bridges where water that is hidden goes on
+_SHOWN = 2.0  # metres along the window's sides where ground within buildings is drawn, too
 _NO_TREES = np.zeros((0, 2))
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
 _BEFORE_CROSSINGS = ("sidewalk", "pedestrian")
@@ -119,7 +120,8 @@ def ground_from_osm(
     if terrain.steps is not None:
         pieces = _with_tactile(pieces, tactile_fields(streets, window), window)
     waters = open_water(site, terrain, pieces.get("water", [])) if terrain.steps is not None else []
-    hidden = _hidden(osm, standing)
+    # Along the window's sides all is drawn: who draws what lies beyond may know of other walls.
+    hidden = overlay.intersection(_hidden(osm, standing), overlay.buffer(window, -_SHOWN, join_style="mitre"))
     laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, yards=yards)
     wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [

@@ -21,6 +21,10 @@ CUT = "cut"
 MAP = "map"
 #: Product with the city's bodies of water in a tile and around it, as the whole city has them.
 WATERS = "waters"
+#: Product with the city's tunnels in a tile and around it.
+BORES = "near bores"
+#: Product of a tile's own streets and ground made one with its neighbours'.
+JOINED = "seams"
 
 
 @dataclass(frozen=True)

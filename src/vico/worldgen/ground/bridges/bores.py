@@ -80,12 +80,12 @@ class _Piece:
         return np.asarray(self.z[0] + np.clip(share, 0.0, 1.0) * (self.z[1] - self.z[0]))
 
 
-def bore_surfaces(bores: Sequence[Bore], terrain: HeightField) -> list[Surface]:
-    """Draw tunnels; what of them lies outside the window is left out."""
+def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) -> list[Surface]:
+    """Draw tunnels; what of them lies outside the window, a square around the middle, is left out."""
     if not bores:
         return []
     stone, floors = Masonry(), _Floors.of(bores)
-    reach = terrain.half - 0.5
+    reach = min(terrain.half - 0.5, float(window.bounds[2]))
     window = shapely.box(-reach, -reach, reach, reach)
     plan = overlay.intersection(overlay.union_all([bore.plan() for bore in bores]), window)
     roofed = overlay.intersection(overlay.union_all([bore.roofed() for bore in bores]), plan)

@@ -16,7 +16,7 @@ from vico.worldgen.ground.bridges.bores import bore_surfaces
 from vico.worldgen.ground.bridges.decks import Deck, decks_of, kept_clear, pier_feet
 from vico.worldgen.ground.bridges.portals import Portal, portal_feet, portal_surfaces, portals_of
 from vico.worldgen.ground.bridges.surfaces import bridge_surfaces
-from vico.worldgen.ground.bridges.tunnels import Bore, bores_of, cuts_of
+from vico.worldgen.ground.bridges.tunnels import Bore, bores_of, cuts_of, paved_of
 from vico.worldgen.ground.bridges.usable import deck_surfaces, low_parts, usable_decks
 
 
@@ -66,14 +66,30 @@ class Bridges:
         return [
             *bridge_surfaces(self.decks, site, terrain, streets, window),
             *portal_surfaces(self.portals, terrain, window),
-            *bore_surfaces(self.bores, terrain),
+            *bore_surfaces(self.bores, terrain, window),
         ]
 
 
-def bridges_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -> Bridges:
-    """Decide the bridges above streets and the tunnels; `terrain` is graded to `streets`."""
+def bridges_of(
+    site: SiteFacts, terrain: HeightField, streets: StreetPolygons, bores: Sequence[Bore] | None = None
+) -> Bridges:
+    """Decide the bridges above streets and the tunnels.
+
+    Parameters
+    ----------
+    site
+        The map.
+    terrain
+        The ground, graded to `streets`.
+    streets
+        The streets.
+    bores
+        The tunnels that can be used, where a whole city has decided; None: they are decided here.
+    """
     decks = decks_of(site, terrain)
-    bores = bores_of(site, terrain, streets)
+    if bores is None:
+        reach = terrain.half - 1.0
+        bores = bores_of(site, terrain, (-reach, -reach, reach, reach), paved_of(streets))
     used = {bore.way.id for bore in bores}
     portals = [portal for portal in portals_of(site.osm, streets) if portal.way not in used]
     feet = [*pier_feet(decks, terrain, kept_clear(site.osm, streets)), *portal_feet(portals)]

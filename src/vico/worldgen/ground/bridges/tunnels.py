@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 import shapely
@@ -20,8 +21,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmWay
-from vico.world.heights import HeightField
+from vico.geo.osm import OsmData, OsmWay
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
@@ -31,6 +31,8 @@ from vico.worldgen.ground.kerbs import KERB
 from vico.worldgen.ground.profiles import Network
 
 Floats = NDArray[np.float64]
+#: West, south, east and north, metres.
+Box = tuple[float, float, float, float]
 
 HEADROOM, HEADROOM_ON_FOOT = 4.5, 2.6
 """Clear height of tunnels for vehicles and of those for walkers, metres."""
@@ -49,6 +51,16 @@ _MOST_PAVED = 6.0  # m2 that a cut may take of other streets: corners that overl
 _TAPER = 8.0  # metres in which the floor comes down by a kerb where the street at the mouth has none
 _DRIVEN = {"motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"}
 _PRIVATE = {"no", "private", "permit", "delivery", "agricultural", "forestry", "military", "customers"}
+
+
+class Ground(Protocol):
+    """What tunnels lie under: the ground with streets graded into it, of one place or of all tiles of a city."""
+
+    def smooth(self, xy: Floats, /) -> Floats:
+        """Return heights without kerbs at points, metres, shape ``(n, 2)`` or ``(2,)``."""
+
+    def __call__(self, xy: Floats, /) -> Floats:
+        """Return heights with kerbs at points, metres."""
 
 
 @dataclass(frozen=True)
@@ -104,16 +116,25 @@ class Bore:
         return np.stack([self.line[[0, -1]] - side, self.line[[0, -1]] + side], axis=1)
 
 
-def bores_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -> list[Bore]:
-    """Return the tunnels that can be used; `terrain` is graded to `streets`."""
-    ways = [way for way in site.osm.ways if _is_bore(way, terrain.half - 1.0)]
+def bores_of(site: SiteFacts, ground: Ground, window: Box, paved: BaseGeometry) -> list[Bore]:
+    """Return the tunnels that can be used.
+
+    Parameters
+    ----------
+    site
+        The map.
+    ground
+        Graded to the streets; known within the window.
+    window
+        Beyond it the ground is not known.
+    paved
+        Where people and vehicles move on the ground: see `paved_of`.
+    """
+    ways = bored_ways(site.osm, window)
     if not ways:
         return []
     built = shapely.STRtree(
         [area.polygon for area in site.osm.areas if area.tags.get("building", "no") not in ("no", "roof")]
-    )
-    paved = overlay.union_all(
-        [streets.carriageway, streets.sidewalk, streets.pedestrian, streets.cycleway, streets.parking], grid=None
     )
     shapely.prepare(paved)
     open_nodes = {
@@ -123,11 +144,28 @@ def bores_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -> 
         for node in way.nodes
     }
     # Of the floors that were laid together some may be refused; the others stay as they lie.
-    bores, mouths = _bores(ways, terrain, open_nodes)
-    bores = [bore for bore in bores if _is_usable(bore, mouths, built, paved, terrain)]
-    while refused := _crossing(bores) | _blind(bores, mouths, terrain.half - 1.0):
+    bores, mouths = _bores(ways, ground, window, open_nodes)
+    bores = [bore for bore in bores if _is_usable(bore, mouths, built, paved, window)]
+    while refused := _crossing(bores) | _blind(bores, mouths, window):
         bores = [bore for bore in bores if bore.way.id not in refused]
     return bores
+
+
+def bored_ways(osm: OsmData, window: Box) -> list[OsmWay]:
+    """Return the ways that are tunnels to use, if nothing is in their way."""
+    return [way for way in osm.ways if _is_bore(way, window)]
+
+
+def paved_of(streets: StreetPolygons) -> BaseGeometry:
+    """Return where people and vehicles move on the ground."""
+    parts = [streets.carriageway, streets.sidewalk, streets.pedestrian, streets.cycleway, streets.parking]
+    return overlay.union_all(parts, grid=None)
+
+
+def _within(points: Floats, box: Box) -> NDArray[np.bool_]:
+    """Tell which points, shape ``(n, 2)``, lie in a box."""
+    low, high = np.array(box[:2]), np.array(box[2:])
+    return np.asarray(((points > low) & (points < high)).all(axis=-1))
 
 
 def cuts_of(bores: Sequence[Bore]) -> list[Polygon]:
@@ -147,7 +185,7 @@ def _strip(line: Floats, chosen: NDArray[np.bool_], half: float, *, both: bool =
     return overlay.union_all([overlay.mended(piece) for piece in pieces])
 
 
-def _is_bore(way: OsmWay, reach: float) -> bool:
+def _is_bore(way: OsmWay, window: Box) -> bool:
     """Whether a way is a tunnel outdoors for everybody, long enough for two mouths, within the window."""
     tags = way.tags
     kind = tags.get("highway", "").removesuffix("_link")
@@ -158,21 +196,24 @@ def _is_bore(way: OsmWay, reach: float) -> bool:
     allowing = ("foot", "access") if kind in ON_FOOT else ("motorcar", "motor_vehicle", "vehicle", "access")
     if next((tags[key] for key in allowing if key in tags), "yes") in _PRIVATE or way.closed:
         return False
-    inside = np.abs(way.line).max() < 4 * reach and bool((np.abs(way.line) < reach).all(axis=1).any())
+    wide, high = window[2] - window[0], window[3] - window[1]
+    middle = np.array([window[0] + window[2], window[1] + window[3]]) / 2
+    inside = np.abs(way.line - middle).max() < 2 * max(wide, high) and bool(_within(way.line, window).any())
     return inside and bool(shapely.LineString(way.line).length >= _LEAST)
 
 
-def _bores(ways: Sequence[OsmWay], terrain: HeightField, open_nodes: Collection[int]) -> tuple[list[Bore], Floats]:
+def _bores(
+    ways: Sequence[OsmWay], terrain: Ground, window: Box, open_nodes: Collection[int]
+) -> tuple[list[Bore], Floats]:
     """Lay the floors of tunnels; returns them, and their mouths, metres, shape ``(m, 2)``."""
     network = Network.of([way.line for way in ways], spacing=_SPACING)
-    reach = terrain.half - 1.0
     is_mouth = np.zeros(len(network.points), bool)
     for way, row in zip(ways, network.rows, strict=True):
         for node, k in ((way.nodes[0], int(row[0])), (way.nodes[-1], int(row[-1]))):
             is_mouth[k] |= node in open_nodes
     ground = terrain.smooth(network.points)
     # Beyond the window the ground is not known: tunnels go on level.
-    is_known = np.abs(network.points).max(axis=1) <= reach
+    is_known = _within(network.points, window)
     roof = np.zeros(len(ground))
     for way, row in zip(ways, network.rows, strict=True):
         headroom = HEADROOM_ON_FOOT if way.tags["highway"] in ON_FOOT else HEADROOM
@@ -260,7 +301,7 @@ def _open_length(network: Network, rows: Sequence[int], is_open: NDArray[np.bool
     return longest
 
 
-def _kerbed(line: Floats, z: Floats, is_mouth: NDArray[np.bool_], terrain: HeightField) -> Floats:
+def _kerbed(line: Floats, z: Floats, is_mouth: NDArray[np.bool_], terrain: Ground) -> Floats:
     """Lower a floor by a kerb, as the street's is that leads in; where that has none, little by little."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     drop = np.full(len(line), KERB)
@@ -270,13 +311,13 @@ def _kerbed(line: Floats, z: Floats, is_mouth: NDArray[np.bool_], terrain: Heigh
     return z - drop
 
 
-def _is_usable(bore: Bore, mouths: Floats, built: shapely.STRtree, paved: BaseGeometry, terrain: HeightField) -> bool:
+def _is_usable(bore: Bore, mouths: Floats, built: shapely.STRtree, paved: BaseGeometry, window: Box) -> bool:
     """Whether nothing of a tunnel is too steep, and its cuts begin at mouths, are short and in the open."""
     run = np.maximum(np.hypot(*np.diff(bore.line, axis=0).T), 0.3)
     if float((np.abs(np.diff(bore.z)) / run).max()) > 1.35 * _steepest(bore.way):
         return False
     along = np.concatenate([[0.0], np.cumsum(run)])
-    inside = np.abs(bore.line).max(axis=1) < terrain.half - 1.0
+    inside = _within(bore.line, window)
     is_open = ~bore.covered & inside
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_open, [False]]).astype(np.int8)))
     for first, last in edges.reshape(-1, 2).tolist():
@@ -318,7 +359,7 @@ def _one_above(first: Bore, second: Bore, line: shapely.LineString) -> bool:
     return bool((np.abs(first.z[near] - z) > _SAME_FLOOR).any())
 
 
-def _blind(bores: Sequence[Bore], mouths: Floats, reach: float) -> set[int]:
+def _blind(bores: Sequence[Bore], mouths: Floats, window: Box) -> set[int]:
     """Return ways of which one end is neither a mouth, nor in another tunnel, nor outside the window."""
     at: dict[int, int] = defaultdict(int)
     for bore in bores:
@@ -329,6 +370,6 @@ def _blind(bores: Sequence[Bore], mouths: Floats, reach: float) -> set[int]:
     for bore in bores:
         for node, point in ((bore.way.nodes[0], bore.line[0]), (bore.way.nodes[-1], bore.line[-1])):
             is_mouth = len(mouths) > 0 and float(np.hypot(*(mouths - point).T).min()) < 0.1
-            if at[node] < 2 and node not in inner and not is_mouth and np.abs(point).max() < reach:
+            if at[node] < 2 and node not in inner and not is_mouth and _within(point, window):
                 found.add(bore.way.id)
     return found
