@@ -287,6 +287,17 @@ def test_a_kerb_stays_a_kerb() -> None:
     assert [round(float(one.positions[1, 2]), 4) for one in fitted] == [0.0, 0.12]
 
 
+def test_a_drive_and_the_stone_beside_it_end_at_their_own_heights() -> None:
+    """Both are of concrete, and the drive comes up where the stone is lowered: ends at one spot, 5 cm apart."""
+    first = profile_of(
+        [_strip([-80.0, 4.0], [-0.06, -0.03], east=True), _strip([4.0, 80.0], [-0.08, 0.0], east=True)], Side(0, 80.0)
+    )
+    drive = conformed([_strip([-80.0, 4.05], [-0.06, -0.03], east=False)], Side(0, -80.0), first)[0]
+    stone = conformed([_strip([4.05, 80.0], [-0.08, 0.0], east=False)], Side(0, -80.0), first)[0]
+    assert drive.positions[1, 1:].tolist() == pytest.approx([4.0, -0.03])
+    assert stone.positions[0, 1:].tolist() == pytest.approx([4.0, -0.08])
+
+
 def test_bad_sizes_are_refused_in_a_sentence(tmp_path: Path) -> None:
     for options, said in (
         ({"extent": 500.0, "tile": 100.0}, "multiple of 8 within 160"),

@@ -14,6 +14,7 @@ from vico.world.mesh import Surface
 
 Floats = NDArray[np.float64]
 
+_HEIGHT_COUNTS = 0.01  # what a metre of height counts beside one along the border
 _SLIP = 0.15  # metres along the border that both sides may disagree where one kind of ground ends
 
 
@@ -47,9 +48,12 @@ def _conformed(surface: Surface, side: Side, first: Profile) -> Surface:
     # Where a kind of ground ends a little earlier or later than across the border, it ends there, too.
     theirs = first.ends(stuff)
     for at, height in profile_of([surface], side).ends(stuff).tolist() if len(theirs) else []:
-        off = np.abs(theirs[:, 0] - at) + np.where(np.abs(theirs[:, 1] - height) <= NEAR, 0.0, np.inf)
+        # Of ends at one spot, of a drive and of the stone beside it, that at the same height.
+        rise = np.abs(theirs[:, 1] - height)
+        away = np.abs(theirs[:, 0] - at) + _HEIGHT_COUNTS * rise
+        off = np.where(rise <= NEAR, away, np.inf)
         if not np.isfinite(off).any():
-            off = np.abs(theirs[:, 0] - at) + np.where(np.abs(theirs[:, 1] - height) <= ALIKE, 0.0, np.inf)
+            off = np.where(rise <= ALIKE, away, np.inf)
         best = int(off.argmin())
         if off[best] <= _SLIP:
             here = (np.abs(t - at) < SAME) & (np.abs(z - height) < SAME)
