@@ -15,15 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
-from numpy.typing import NDArray
-from shapely.affinity import translate
 
 from vico.errors import InputError, StageError
-from vico.geo import overlay
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import polygons_of
 from vico.geo.osm_parts import OsmParts
 from vico.io.files import read_json, sha256_of, write_json
 from vico.io.memory import give_back_memory
@@ -39,12 +34,10 @@ from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import make_streets
 from vico.worldgen.city_tiles import GATES
 from vico.worldgen.city_tunnels import divide_tunnels, tiles_with_tunnels
-from vico.worldgen.facts.ground_kinds import water_of_map
-from vico.worldgen.facts.waters import WaterBody
+from vico.worldgen.city_waters import divide_waters
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem
-from vico.worldgen.ground.waters import piped_waters, water_bodies
 from vico.worldgen.seams.grid import HALO, Tile, TileGrid, grid_of, grid_over, tile_name
-from vico.worldgen.seams.join import MAP, WATERS
+from vico.worldgen.seams.join import MAP
 from vico.worldgen.seams.walking import write_gates, write_walking
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
@@ -259,36 +252,6 @@ def bare_ground(request: CityRequest) -> HeightField:
     samples = read_elevation(request.sources.dem, frame, half)
     stages.given(samples, f"{samples.sha256} {frame} {half}")
     return stages.run("terrain", terrain_from_dem, samples, half=half, apron=APRON)
-
-
-def divide_waters(request: CityRequest, region: RegionMap, ground: HeightField) -> None:
-    """Keep for each tile the bodies of water in and around it, as high everywhere as the whole city has them.
-
-    How high a river lies is told by its banks, and how far below them by how large it is: of its part in one tile other
-    numbers would come than next to it.
-    """
-    stages = Stages(request.plans)
-    stages.given(region, region.key)
-    bodies = stages.run("bodies", _bodies, region, ground)
-    outlines = shapely.STRtree([body.outline for body in bodies])
-    half = request.grid.size / 2 + HALO
-    for tile in request.grid:
-        middle = np.array(request.grid.centre(tile))
-        window = shapely.box(*(middle - half), *(middle + half))
-        near = [bodies[k] for k in np.sort(outlines.query(window, predicate="intersects")).tolist()]
-        parts = [part for body in near for part in _part_of(body, window, middle)]
-        keep_product(request.plans / tile_name(tile), WATERS, parts)
-
-
-def _bodies(region: RegionMap, ground: HeightField) -> list[WaterBody]:
-    osm, half = region.whole, ground.half
-    return water_bodies(ground, [*water_of_map(osm, shapely.box(-half, -half, half, half)), *piped_waters(osm)])
-
-
-def _part_of(body: WaterBody, window: shapely.Polygon, middle: NDArray[np.float64]) -> list[WaterBody]:
-    """Return what of a body lies in a window, as high as it is, told from another middle."""
-    here = polygons_of(overlay.intersection(body.outline, window))
-    return [replace(body, outline=translate(part, *(-middle).tolist()), shore=body.shore - middle) for part in here]
 
 
 def _done(
