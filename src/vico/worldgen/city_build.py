@@ -160,6 +160,7 @@ def build_city(
         left = done("plan", list(request.grid))
         tunnels = done("join", [tile for tile in tiles_with_tunnels(request, region) if tile in left])
         divide_tunnels(request, region, tunnels)
+        give_back_memory()
         left = done("shape", left)
         if left:
             _tell(progress, "streets", 0)

@@ -5,7 +5,7 @@ A tile knows of a tunnel what lies in it; its neighbour would lay another floor,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,8 +78,10 @@ def _tiles_with_tunnels(region: RegionMap, grid: TileGrid) -> list[Tile]:
 def _bores(region: RegionMap, joined: _Joined) -> list[Bore]:
     if not joined.tiles:
         return []
-    ground = joined.ground()
-    return bores_of(site_facts(region.whole), ground, _window(joined.request.grid), ground.paved)
+    osm, window = region.whole, _window(joined.request.grid)
+    ends = np.concatenate([way.line[[0, -1]] for way in bored_ways(osm, window)])
+    ground = joined.ground(ends)
+    return bores_of(site_facts(osm), ground, window, ground.paved)
 
 
 @dataclass(frozen=True)
@@ -89,14 +91,26 @@ class _Joined:
     request: CityRequest
     tiles: Sequence[Tile]
 
-    def ground(self) -> _Ground:
-        grid, heights, paved = self.request.grid, {}, []
-        for tile in self.tiles:
+    def ground(self, ends: Floats) -> _Ground:
+        """Read the ground; kerbs are looked at where tunnels end, metres, shape ``(n, 2)``: they take gigabytes."""
+        grid, paved = self.request.grid, []
+        heights: dict[Tile, HeightField] = {}
+        kerbed, owner = np.zeros(len(ends)), _owners(ends, self.tiles, grid)
+        for k, tile in enumerate(self.tiles):
             joined: Seamless = kept_product(self.request.plans / tile_name(tile), JOINED)[0]
-            heights[tile] = joined.height
+            kerbed[owner == k] = joined.height(ends[owner == k] - grid.centre(tile))
+            heights[tile] = replace(joined.height, steps=None)
             own = overlay.intersection(paved_of(joined.streets), grid.box(tile, seen_from=tile))
             paved.append(translate(own, *grid.centre(tile)))
-        return _Ground(grid, heights, overlay.union_all(paved, grid=None))
+        return _Ground(
+            grid, heights, shapely.STRtree(shapely.points(ends)), kerbed, overlay.union_all(paved, grid=None)
+        )
+
+
+def _owners(points: Floats, tiles: Sequence[Tile], grid: TileGrid) -> NDArray[np.int64]:
+    """Return which tile each point lies in, or of those that are there is nearest to."""
+    away = np.abs(points[:, None] - np.array([grid.centre(tile) for tile in tiles])[None]).max(axis=2)
+    return np.asarray(away.argmin(axis=1), np.int64)
 
 
 @dataclass(frozen=True)
@@ -105,28 +119,24 @@ class _Ground:
 
     grid: TileGrid
     heights: Mapping[Tile, HeightField]
+    ends: shapely.STRtree
+    kerbed: Floats
     paved: BaseGeometry
 
     def smooth(self, xy: Floats) -> Floats:
         """Return heights without kerbs at points, metres; of those in other tiles the nearest there are."""
-        return self._look_up(xy, lambda field, points: field.smooth(points))
+        points = np.asarray(xy, np.float64).reshape(-1, 2)
+        owner = _owners(points, list(self.heights), self.grid)
+        found = np.empty(len(points))
+        for k, (tile, field) in enumerate(self.heights.items()):
+            mine = owner == k
+            if mine.any():
+                found[mine] = field.smooth(points[mine] - self.grid.centre(tile))
+        return found.reshape(np.shape(xy)[:-1])
 
     def __call__(self, xy: Floats) -> Floats:
-        """Return heights with kerbs at points, metres."""
-        return self._look_up(xy, lambda field, points: field(points))
-
-    def _look_up(self, xy: Floats, of: Callable[[HeightField, Floats], Floats]) -> Floats:
-        points = np.asarray(xy, np.float64).reshape(-1, 2)
-        known = np.array(list(self.heights))
-        middles = known * self.grid.size
-        # The tile that a point lies in, or of those that are known the one that is nearest.
-        away = np.abs(points[:, None] - middles[None]).max(axis=2)
-        owner = away.argmin(axis=1)
-        found = np.empty(len(points))
-        for k in np.unique(owner).tolist():
-            mine = owner == k
-            found[mine] = of(self.heights[tuple(known[k].tolist())], points[mine] - middles[k])
-        return found.reshape(np.shape(xy)[:-1])
+        """Return heights with kerbs at ends of tunnels, metres."""
+        return np.asarray(self.kerbed[self.ends.nearest(shapely.points(xy))])
 
 
 def _near(bores: Sequence[Bore], tile: Tile, grid: TileGrid) -> list[Bore]:

@@ -329,7 +329,9 @@ def _is_usable(bore: Bore, mouths: Floats, built: shapely.STRtree, paved: BaseGe
         if all(begins) or along[last - 1] - along[first] > _LONGEST_CUT:
             return False
     cut = bore.cut()
-    near_mouths = overlay.union_all([overlay.buffer(shapely.Point(p), bore.width / 2 + _JOINT) for p in mouths])
+    joint = bore.width / 2 + _JOINT
+    near = mouths[shapely.dwithin(shapely.points(mouths), cut, joint)] if len(mouths) else mouths
+    near_mouths = overlay.union_all([overlay.buffer(shapely.Point(p), joint) for p in near])
     if len(built.query(cut, predicate="intersects")):
         return False
     return overlay.common_area(overlay.difference(cut, near_mouths), paved) <= _MOST_PAVED
