@@ -30,7 +30,6 @@ NEAR = 0.08
 ABOVE = ("wire", "paint")
 """Materials of what is not the ground but lies or hangs over it: broken lines begin where each tile's street does."""
 
-_HIDDEN = 0.3  # metres below the ground on both sides from which on nobody sees what is there
 _AT_ALL = 0.3  # and where there is nothing nearer
 _MOST_STEP = 1e-3  # metres between heights of both sides
 _LEAST = 0.03  # metres along the border: narrower pieces of ground are slivers between two kinds
@@ -109,7 +108,7 @@ class Profile:
         within = (self.start[None] <= along[:, None] + SAME) & (along[:, None] <= self.end[None] + SAME)
         share = np.clip((along[:, None] - self.start[None]) / (self.end - self.start)[None], 0.0, 1.0)
         z = self.low[None] + share * (self.high - self.low)[None]
-        return np.asarray((within & (z > above[:, None] + _HIDDEN)).any(axis=1))
+        return np.asarray((within & (z > above[:, None] + ALIKE)).any(axis=1))
 
     def ends(self, stuff: str) -> Floats:
         """Return where ground of one stuff begins and ends: metres along the side and heights, shape ``(m, 2)``."""

@@ -48,7 +48,9 @@ from vico.worldgen.ground.yards import Yards
 
 #: Metres of ground beyond the square of a world by itself: its edge is not in sight from within streets.
 APRON = 40.0
-_UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
+# Metres below: shows through nothing but the hairlines between two surfaces. Well below carriageways, too: it lies at
+# another depth in a tile whose ground is not level.
+_UNDERLAY, _UNDERLAY_SLOPED = 0.6, 3.0
 _UNDER_STAIRS = 0.3
 _LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
 _STEEP = 1.08  # slope from which bare ground is held by a wall
