@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from vico.community import catalogue
+from vico.community.hours import usual_spans
 from vico.community.jobs import job_of
-from vico.community.usual_hours import usual_spans
 from vico.errors import InputError, SchemaError
 
 PAGE = Path(__file__).parents[2] / "docs" / "adding_people.md"
@@ -70,6 +70,12 @@ def test_usual_hours_of_a_kind_of_ones_own(own_data: Path) -> None:
     (own_data / "hours_mine.toml").write_text('[[usual]]\nhours = "05:00-14:00"\nkinds = ["fish_market"]\n')
     assert usual_spans("fish_market", "store") == [(300, 840)]
     assert usual_spans("cafe", "food") == [(450, 1140)]
+
+
+def test_usual_hours_of_days_alone_are_told(own_data: Path) -> None:
+    (own_data / "hours_mine.toml").write_text('[[usual]]\nhours = "Mo-Fr; Sa 10:00-12:00"\nkinds = ["fish_market"]\n')
+    with pytest.raises(SchemaError, match=r"'Mo-Fr; Sa 10:00-12:00' names days without hours"):
+        usual_spans("fish_market", "store")
 
 
 def test_usual_hours_that_nobody_can_read_are_told(own_data: Path) -> None:

@@ -11,9 +11,9 @@ import pytest
 from toytown import PLACES, make_world
 from vico.clock import seconds_of_day
 from vico.community import Community, build_community, check_community, date_of, read_community, write_community
-from vico.community.hours import open_spans
 from vico.community.model import ActivityTag, ItemType, Resident, ScheduleItem
 from vico.errors import InputError
+from vico.world.opening_hours import open_spans
 from vico.world.world import World
 
 _SATURDAY, _SUNDAY = date(2025, 6, 7), date(2025, 6, 8)
@@ -72,12 +72,13 @@ def test_nobody_works_seven_days_a_week(week: Community) -> None:
 
 def test_nobody_visits_a_closed_place(week: Community, town: World) -> None:
     """By the hours that places give, as the validator has it, and on the days that they are closed."""
+    where = (town.manifest.origin.lat, town.manifest.origin.lon)
     for day in week.dates:
         for resident in week.on(day).residents:
             for item in resident.schedule:
                 place = town.place_by_id.get(item.place or "")
                 if place is not None and place.opening_hours and place.id not in (resident.home, resident.workplace):
-                    spans = open_spans(place.opening_hours, day.weekday())
+                    spans = open_spans(place.opening_hours, day, where)
                     assert spans, (resident.name, place.name, day)
 
 

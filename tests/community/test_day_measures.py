@@ -88,7 +88,7 @@ def test_two_households_of_one_house_are_no_company(community: Community) -> Non
 
 def test_places_employ_no_more_than_they_have_room_for(helsinki: World) -> None:
     community = build_community(helsinki, residents=150, seed=5)
-    index = PlaceIndex(helsinki, community.date.weekday())
+    index = PlaceIndex(helsinki, community.date)
     staff: dict[str, int] = {}
     for r in community.residents:
         if r.workplace is not None and r.age >= 18 and not r.occupation.startswith("student"):
@@ -113,7 +113,7 @@ def test_shops_with_two_hands_are_staffed_while_open(town: World) -> None:
     covered = []
     for seed in range(4):
         community = build_community(town, residents=60, seed=seed)
-        index = PlaceIndex(town, community.date.weekday())
+        index = PlaceIndex(town, community.date)
         for place in (p for p in town.places if p.category in ("store", "food")):
             staff = [r for r in community.residents if r.workplace == place.id]
             if len(staff) < 2:
@@ -131,7 +131,7 @@ def _minute(clock: str) -> int:
 
 
 def test_too_many_for_the_beds_are_refused_with_how_many_there_is_room_for(helsinki: World) -> None:
-    index = PlaceIndex(helsinki, 0)
+    index = PlaceIndex(helsinki, date(2025, 6, 2))
     beds = sum(index.beds(place) for homes in index.homes() for place in homes)
     with pytest.raises(EmptyInputError, match=rf"{beds} beds.*ask for at most {int(0.9 * beds)} residents"):
         build_community(helsinki, residents=1000)
@@ -148,7 +148,7 @@ def test_sunday_closing_is_heeded_by_visitors() -> None:
 
 
 def test_the_nearest_places_of_some_kinds_are_those_of_the_whole_order(helsinki: World) -> None:
-    index = PlaceIndex(helsinki, 0)
+    index = PlaceIndex(helsinki, date(2025, 6, 2))
     for home in [place.id for place in index.homes()[0]][::40]:
         order = index.by_nearness(home)
         food = [place.id for place in order if place.category is Category.FOOD][:3]

@@ -14,7 +14,7 @@ from vico.world.world import World
 
 @pytest.fixture(scope="module")
 def index(town: World, community: Community) -> PlaceIndex:
-    return PlaceIndex(town, community.date.weekday())
+    return PlaceIndex(town, community.date)
 
 
 @pytest.fixture

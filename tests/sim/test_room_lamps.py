@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import date
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def lit(hour: int, *, cut: bool = False, lies: bool = False) -> list[bool]:
     state.people.room[0], state.people.posture[0] = SHOP, Posture.LYING if lies else Posture.STANDING
     if cut:
         state.environment.start_event("power_cut", region=(-6.0, 11.0, 5.0))
-    return RoomLamps(state.world, 3).lit(state).tolist()
+    return RoomLamps(state.world, date(2026, 6, 11)).lit(state).tolist()
 
 
 def test_rooms_are_lit_by_day_when_they_are_open_and_when_somebody_is_awake_in_them() -> None:
@@ -107,7 +108,7 @@ def city_with_homes() -> Simulation:
 def test_windows_of_a_home_shine_while_somebody_is_awake_in_it_and_shops_while_they_are_open() -> None:
     sim = city_with_homes()
     people, world = sim.state.people, sim.world
-    lights = WindowLights(world, sim.residents, RoomLamps(world, 3))
+    lights = WindowLights(world, sim.residents, RoomLamps(world, date(2026, 6, 11)))
     scene = Scene([], lighting=Lighting.at(3 * 3600.0))
     seen = []
     for place, posture in ((0, Posture.STANDING), (0, Posture.LYING), (-1, Posture.STANDING), (1, Posture.STANDING)):

@@ -15,7 +15,7 @@ from vico.clock import clock_of
 from vico.community.biography import Biographer, honest_character, lifestyle_of
 from vico.community.childhood import POCKET_MONEY
 from vico.community.day_measures import day_measures
-from vico.community.days import FIRST_DAY, DayDrafts, DaySchedules, drafts_on, planning_day, write_days
+from vico.community.days import FIRST_DAY, DayDrafts, DaySchedules, drafts_on, planning_date, write_days
 from vico.community.findings import CommunityFinding
 from vico.community.groups import Meeting, form_groups, meetings_by_member
 from vico.community.households import draw_households
@@ -132,7 +132,7 @@ def procedural_author(
     """
     day = date or FIRST_DAY + timedelta(days=int(rng(seed, "community", "day").integers(5)))
     dates = [day + timedelta(days=k) for k in range(days)]
-    index = PlaceIndex(world, planning_day(day.weekday()))
+    index = PlaceIndex(world, planning_date(day), holidays=False)
     problem: EmptyInputError | None = None
     # Few people or few places may leave somebody who is never free with others: other jobs, another try.
     for attempt in range(len(findings and [0]), 12):
@@ -149,8 +149,9 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
         return rng(seed, "community", name, attempt)
 
     planned = _plan(index, count, stream)
-    working_day = dates[0].weekday() == index.weekday
-    first = planned if working_day else drafts_on(index.on(dates[0].weekday()), planned, stream)
+    first_day = index.on(dates[0])
+    as_planned = (first_day.date, first_day.weekday) == (index.date, index.weekday)
+    first = planned if as_planned else drafts_on(first_day, planned, stream)
     playmates = form_playmates(stream("playmates"), first.index, first.cares)
     meetings = form_groups(stream("groups"), first.index, first.people, playmates)
     relations = draw_relations(stream("relations"), index, planned.households, meetings, dates[0].year)

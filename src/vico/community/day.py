@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vico.clock import clock_of
-from vico.community.hours import Span, staffed
+from vico.community.hours import staffed
 from vico.community.model import ActivityTag, ItemType, ScheduleItem
 from vico.community.place_index import PlaceIndex
 from vico.rules import WALK_SPEED
+from vico.world.opening_hours import Span
 
 MIDNIGHT = 24 * 60
 

@@ -28,9 +28,9 @@ _BEFORE_LESSONS = 10
 Streams = Callable[[str], np.random.Generator]
 
 
-def planning_day(weekday: int) -> int:
-    """Return the day of the week that jobs and schools are planned for: the first day itself if it is a working day."""
-    return weekday if weekday in SCHOOL_DAYS else _MIDWEEK
+def planning_date(day: date) -> date:
+    """Return the date that jobs and schools are planned for: the first day, or a working day of its week."""
+    return day if day.weekday() in SCHOOL_DAYS else day + timedelta(days=_MIDWEEK - day.weekday())
 
 
 def date_of(text: str, dates: Sequence[date] | None = None) -> date:
@@ -205,7 +205,7 @@ def write_days(
     for later, when in enumerate(dates):
         day, met = first, list(meetings)
         if later:
-            day = drafts_on(planned.index.on(when.weekday()), planned, streams)
+            day = drafts_on(planned.index.on(when), planned, streams)
             met = meetings_on(day, meetings, (when - dates[0]).days)
         writer = DayWriter(streams("days" if not later else f"days/{later}"), day.index, up_late)
         items, frequented = writer.write(day.households, met, relations)

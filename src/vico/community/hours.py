@@ -1,102 +1,110 @@
-"""Opening hours: the common forms of OSM's `opening_hours`."""
+"""When places are open and staffed: their own hours where the map says them, the usual ones of their kind elsewhere.
+
+Usual hours are data: ``vico/data/community/hours.toml`` and a user's own files.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date as Date
+from pathlib import Path
 
-DAYS = ("Mo", "Tu", "We", "Th", "Fr", "Sa", "Su")
-MINUTES = 24 * 60
-
-#: Open from, until, in minutes of the day; `until` may lie past midnight.
-Span = tuple[int, int]
+from vico.errors import SchemaError
+from vico.io.data_files import DataRecord, cached_data, data_files, read_record
+from vico.world.model import Place
+from vico.world.opening_hours import DAYS, MINUTES, Coordinates, Span, customary_weekday, open_spans, weekly_hours
 
 #: Staff are at their place so long before it opens and after it closes, at most, minutes.
 STAFF_MARGIN = 60
 
-_DAY = "(?:Mo|Tu|We|Th|Fr|Sa|Su|PH|SH)"
-_DAYS = re.compile(rf"{_DAY}(?:\s*-\s*{_DAY})?(?:\s*,\s*{_DAY}(?:\s*-\s*{_DAY})?)*")
-_TIMES = re.compile(r"(\d{1,2})(?::(\d{2}))?\s*-\s*(\d{1,2})(?::(\d{2}))?")
-# A comma before a day name starts a new rule ("Mo-Fr 8:00-20:00, Sa 9:00-18:00"), unless it only lists days.
-_RULES = re.compile(rf";|,\s*(?={_DAYS.pattern}\s*(?:\d|off|closed))")
+_GUIDE = "docs/adding_people.md"
+# Rules of a value of `opening_hours`, and days that are all there is in one: open round the clock, by the letter.
+_RULES = re.compile(r";|\|\|")
+_DAYS = re.compile(r"(?:Mo|Tu|We|Th|Fr|Sa|Su|PH|SH|[-,\s])+")
 
 
-def _days_of(text: str) -> set[int]:
-    found: set[int] = set()
-    for part in text.split(","):
-        ends = [p.strip() for p in part.split("-")]
-        if ends[0] not in DAYS or ends[-1] not in DAYS:
-            continue  # public and school holidays: the communities' day is neither
-        first, last = DAYS.index(ends[0]), DAYS.index(ends[-1])
-        found.update((first + k) % 7 for k in range((last - first) % 7 + 1))
-    return found
+class _Usual(DataRecord):
+    hours: str
+    kinds: tuple[str, ...]
 
 
-def _spans_of(text: str) -> list[Span] | None:
-    spans: list[Span] = []
-    for part in text.split(","):
-        match = _TIMES.fullmatch(part.strip().rstrip("+"))
-        if match is None:
-            return None
-        first_hour, first_minute, last_hour, last_minute = (int(part or 0) for part in match.groups())
-        start, end = first_hour * 60 + first_minute, last_hour * 60 + last_minute
-        if start > MINUTES or end > 30 * 60:
-            return None
-        spans.append((start, end if end > start else end + MINUTES))
-    return spans
+class _HoursFile(DataRecord):
+    otherwise: str | None = None
+    usual: tuple[_Usual, ...] = ()
 
 
-def is_within(spans: Sequence[Span], minute: float) -> bool:
-    """Return whether a minute of the day, 0..1440, lies in one of some spans, those of the day before included."""
-    return any(start <= minute < end or start <= minute + MINUTES < end for start, end in spans)
+@dataclass(frozen=True)
+class UsualHours:
+    """Spans of the seven days, Monday first, by kind or category of place, and of all others."""
+
+    by_kind: Mapping[str, list[list[Span]]]
+    otherwise: list[list[Span]]
 
 
-def weekly_hours(text: str) -> list[list[Span]] | None:
-    """Read an `opening_hours` value.
+@cached_data
+def usual_hours() -> UsualHours:
+    """Return when places are usually open; a kind has the hours that named it last.
+
+    Raises
+    ------
+    SchemaError
+        If a file can't be used, or hours can't be read.
+    """
+    by_kind: dict[str, list[list[Span]]] = {}
+    otherwise: list[list[Span]] = [[] for _ in DAYS]
+    for path in data_files("community", "hours"):
+        file = read_record(path, _HoursFile, guide=_GUIDE)
+        for k, entry in enumerate(file.usual):
+            by_kind |= dict.fromkeys(entry.kinds, _week(path, f"usual.{k}.hours", entry.hours))
+        if file.otherwise is not None:
+            otherwise = _week(path, "otherwise", file.otherwise)
+    return UsualHours(by_kind, otherwise)
+
+
+def _week(path: Path, where: str, text: str) -> list[list[Span]]:
+    """Return the hours of a week with those that spill over from the day before, or refuse a data file's value."""
+    week = weekly_hours(text)
+    if any(_DAYS.fullmatch(rule.strip()) for rule in _RULES.split(text) if rule.strip()):
+        raise SchemaError(f"{path}: {where}: {text!r} names days without hours; write them like Mo-Fr 09:00-17:00")
+    if week is None or not any(week[:5]):
+        raise SchemaError(f"{path}: {where}: {text!r} says no hours of a working day; write them like 09:00-17:00")
+    late = [[(0, end - MINUTES) for _, end in day if end > MINUTES] for day in week]
+    return [sorted(late[k - 1] + day) for k, day in enumerate(week)]
+
+
+def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
+    """When a place of this kind is usually open on a day, minutes; empty where it is closed.
 
     Parameters
     ----------
-    text
-        For example ``Mo-Fr 08:00-20:00; Sa 10:00-18:00; PH off``, ``Tu-Sa 11:00-14:30,17:00-00:00`` or ``24/7``.
-
-    Returns
-    -------
-    list of list of Span or None
-        For each day, Monday first, when it is open; None if the value has forms not read here (months, sunset,
-        comments): nothing is known then.
+    weekday
+        0 Monday .. 6 Sunday; a working day unless given.
     """
-    if text.strip() == "24/7":
-        return [[(0, MINUTES)] for _ in DAYS]
-    week: list[list[Span]] = [[] for _ in DAYS]
-    for rule in _RULES.split(text):
-        if not (rule := rule.strip()):
-            continue
-        match = _DAYS.match(rule)
-        days = set(range(7)) if match is None else _days_of(match[0])
-        rest = rule[match.end() :].strip(" :") if match else rule
-        if rest in ("off", "closed"):
-            spans: list[Span] | None = []
-        elif rest == "":
-            spans = [(0, MINUTES)]
-        else:
-            spans = _spans_of(rest)
-        if spans is None:
-            return None
-        for day in sorted(days):
-            week[day] = list(spans)
-    return week
+    usual = usual_hours()
+    week = usual.by_kind.get(kind) or usual.by_kind.get(category, usual.otherwise)
+    return list(week[weekday])
 
 
-def open_spans(text: str, weekday: int) -> list[Span] | None:
-    """When a place is open on a day (0 Monday .. 6 Sunday), by its `opening_hours`; None if they can't be read.
+def given_hours(place: Place, date: Date, coordinates: Coordinates, *, holidays: bool = True) -> list[Span] | None:
+    """When a place says that it is open on a date, minutes; None if it says nothing that can be read.
 
-    Spans that reach past midnight are kept whole; what spills over from the day before comes first.
+    Parameters
+    ----------
+    coordinates
+        Latitude and longitude of the world, degrees: for public holidays and the sun.
+    holidays
+        Whether public holidays count.
     """
-    week = weekly_hours(text)
-    if week is None:
-        return None
-    spill = [(0, end - MINUTES) for _, end in week[(weekday - 1) % 7] if end > MINUTES]
-    return sorted(spill + week[weekday])
+    said = place.opening_hours
+    return None if said is None else open_spans(said, date, coordinates, holidays=holidays)
+
+
+def hours_on(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
+    """When a place is open on a date, minutes: what it says, else what is usual for its kind."""
+    given = given_hours(place, date, coordinates)
+    return usual_spans(place.kind, place.category, customary_weekday(date, coordinates)) if given is None else given
 
 
 def staffed_stretches(spans: Sequence[Span]) -> list[list[Span]]:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Collection, Iterable, Sequence
+from datetime import date as Date
+from datetime import timedelta
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.community.hours import Span, open_spans
+from vico.community.hours import given_hours, usual_spans
 from vico.community.place_rooms import PlaceRooms
 from vico.community.ride_times import RideTimes
-from vico.community.usual_hours import usual_spans
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
 from vico.io.recent import Recent
 from vico.rules import WALK_SPEED
 from vico.world.model import Category, Place, Point2
+from vico.world.opening_hours import Span, customary_weekday
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World
 
@@ -41,13 +43,16 @@ class PlaceIndex:
     ----------
     world
         Where people are to live.
-    weekday
-        0 Monday .. 6 Sunday: the day whose opening hours count.
+    date
+        The day whose opening hours count.
+    holidays
+        Whether public holidays count. Jobs are planned without them.
     """
 
-    def __init__(self, world: World, weekday: int) -> None:
+    def __init__(self, world: World, date: Date, *, holidays: bool = True) -> None:
         self.world = world
-        self.weekday = weekday
+        self.date, self.holidays = date, holidays
+        self.coordinates = world.manifest.origin.lat, world.manifest.origin.lon
         self.router = world.router
         self.walks = Walks.of(world)
         self.place_by_id = {p.id: p for p in world.places}
@@ -61,21 +66,30 @@ class PlaceIndex:
         self._estimates: Recent[str, NDArray[np.int16]] = Recent(_ESTIMATES)
         self._reachable: dict[str, bool] = {}
         self._lists: dict[Category | frozenset[str], NDArray[np.int64]] = {}
-        self._hours: dict[tuple[str, int], list[Span]] = {}
+        self._hours: dict[tuple[str, Date, bool], list[Span]] = {}
+
+    @property
+    def weekday(self) -> int:
+        """The day of the week whose customs hold, 0 Monday .. 6 Sunday: Sunday's on public holidays."""
+        return customary_weekday(self.date, self.coordinates) if self.holidays else self.date.weekday()
 
     @cached_property
     def rides(self) -> RideTimes:
         """Trips by bus, tram and bicycle."""
         return RideTimes(self.world.transit, self.walks)
 
-    def on(self, weekday: int) -> PlaceIndex:
-        """Return the same index for another day of the week, 0 Monday .. 6 Sunday; what is known of ways is shared."""
-        if weekday == self.weekday:
+    def on(self, date: Date, *, holidays: bool = True) -> PlaceIndex:
+        """Return the same index for another date; what is known of ways is shared."""
+        if (date, holidays) == (self.date, self.holidays):
             return self
         _ = self.rides  # built once for all days
         other = copy.copy(self)
-        other.weekday = weekday
+        other.date, other.holidays = date, holidays
         return other
+
+    def in_same_week(self, weekday: int) -> PlaceIndex:
+        """Return the same index for a day of its week, 0 Monday .. 6 Sunday."""
+        return self.on(self.date + timedelta(days=weekday - self.date.weekday()), holidays=self.holidays)
 
     def reachable(self, place: Place) -> bool:
         """Whether a place can be reached on foot from the map's edge."""
@@ -218,11 +232,11 @@ class PlaceIndex:
 
     def given_hours(self, place: Place) -> list[Span] | None:
         """When the place says it is open on the day, minutes; None if it doesn't say, or not in a form we read."""
-        return None if place.opening_hours is None else open_spans(place.opening_hours, self.weekday)
+        return given_hours(place, self.date, self.coordinates, holidays=self.holidays)
 
     def hours(self, place: Place) -> list[Span]:
         """When a place is open on the day, minutes: what it says, else what is usual for its kind."""
-        key = place.id, self.weekday
+        key = place.id, self.date, self.holidays
         if key not in self._hours:
             given = self.given_hours(place)
             self._hours[key] = usual_spans(kind_of(place), place.category, self.weekday) if given is None else given

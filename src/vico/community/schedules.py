@@ -13,13 +13,13 @@ from vico.community.company import Company, Party
 from vico.community.day import MIDNIGHT, Block, Day, in_fives
 from vico.community.groups import Meeting, meetings_by_member
 from vico.community.homelife import Homelife, fill_day
-from vico.community.hours import Span
 from vico.community.model import ActivityTag, ItemType, Relation, ScheduleItem
 from vico.community.outings import Outings
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
 from vico.community.school_days import SchoolDays
 from vico.world.model import Category
+from vico.world.opening_hours import Span
 
 # Places that close for so long, minutes, do so for a midday break; staff go home if they have so long there.
 _CLOSED, _HOME_FOR_LUNCH = 30, 40

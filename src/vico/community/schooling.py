@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vico.community.childhood import ALONE_FROM, ESCORT_FROM, School, childhood, schools
-from vico.community.hours import Span, staffed
+from vico.community.hours import staffed
 from vico.community.people import Duty, Household, Lessons, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
 from vico.world.model import Place
+from vico.world.opening_hours import Span
 
 #: Monday to Friday there is school.
 SCHOOL_DAYS = range(5)

@@ -55,10 +55,10 @@ def check_community(community: Community, world: World) -> list[CommunityFinding
         ]
     if not community.residents:
         return [CommunityFinding("residents", "nobody lives here", "write at least one resident")]
-    index = PlaceIndex(world, community.date.weekday())
+    index = PlaceIndex(world, community.date)
     found = _Check(community.on(community.date), index).run()
     for k, day in enumerate(community.further_days):
-        found += _further_day(community, k, index.on(day.date.weekday()))
+        found += _further_day(community, k, index.on(day.date))
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vico.community.catalogue import Job, trades, ways_of_life
 from vico.community.day import MIDNIGHT
-from vico.community.hours import Span, staffed_stretches
+from vico.community.hours import staffed_stretches
 from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
@@ -18,6 +18,7 @@ from vico.community.schooling import Care, between
 from vico.community.staff import staff_capacity
 from vico.errors import EmptyInputError
 from vico.world.model import Category, Place
+from vico.world.opening_hours import Span
 
 # From this share of the beds on homes are chosen that leave few free; so many can be filled with households.
 _CROWDED, _FILLED = 0.5, 0.9
@@ -235,7 +236,7 @@ class _JobMarket:
         """
         if job.shift in _OFFICE_DAYS:
             return frozenset(_WEEKEND)
-        open_on = [day for day in range(7) if workdays(self._index.on(day).hours(place))]
+        open_on = [day for day in range(7) if workdays(self._index.in_same_week(day).hours(place))]
         free: list[int] = []
         options = [day for day in open_on if day != self._index.weekday]
         for _ in range(len(open_on) - _WORKING_DAYS):

@@ -82,7 +82,7 @@ class SimSettings:
     events
         Of the city: ``"none"``, ``"changing"``, or the content of a file of events (docs/events.md).
     opening_hours
-        Whether places keep the hours that the map says, on the community's weekday, or the date's without one.
+        Whether places keep the hours that the map says, on the community's date, or the run's without one.
     periods
         How often agents act and observe, seconds by agent's name; 1 s where nothing else is said. For robots also
         ``"model"``, which is the control period of the robot's model, and the name ``"robots"`` for all of them.

@@ -35,7 +35,7 @@ def initial_state(
     residents: Sequence[Resident],
     days: Sequence[Sequence[Appointment]],
     config: SimConfig,
-    weekday: int | None = None,
+    day: date | None = None,
 ) -> SimulationState:
     """Make the state before the first step.
 
@@ -43,8 +43,8 @@ def initial_state(
     ----------
     residents, days
         Who takes part, and their appointments: residents start where these put them.
-    weekday
-        Of their days, 0 Monday .. 6 Sunday; None: that of the run's date.
+    day
+        The date that their days are of; None: the run's own.
 
     Raises
     ------
@@ -59,8 +59,9 @@ def initial_state(
     state = SimulationState(base, people, MovableObjects.none(), avatars, events, environment, tick=tick)
     state.lines = Lines.of(len(people))
     if config.opening_hours:
-        weekday = date.fromisoformat(config.date).weekday() if weekday is None else weekday
-        state.openings = OpeningHours(base.world.places, weekday, residents, days)
+        origin = base.world.manifest.origin
+        opened = day or date.fromisoformat(config.date)
+        state.openings = OpeningHours(base.world.places, opened, (origin.lat, origin.lon), residents, days)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(base, config)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import date as Date
 
 from vico.clock import DAY
-from vico.community.hours import DAYS, Span, is_within, open_spans
+from vico.community.hours import given_hours
 from vico.community.model import ActivityTag, Resident
 from vico.sim.appointments import Appointment
 from vico.world.model import Place
+from vico.world.opening_hours import DAYS, Coordinates, Span, is_within
 
 
 class OpeningHours:
@@ -20,8 +22,10 @@ class OpeningHours:
     ----------
     places
         Of the world.
-    weekday
-        Of the first day, 0 Monday .. 6 Sunday; every day is like it, as the days of a community are.
+    date
+        The first day; every day is like it, as the days of a community are.
+    coordinates
+        Latitude and longitude of the world, degrees: for public holidays and the sun.
     residents, days
         The first of the state's people, and their appointments.
     """
@@ -29,14 +33,15 @@ class OpeningHours:
     def __init__(
         self,
         places: Sequence[Place],
-        weekday: int,
+        date: Date,
+        coordinates: Coordinates,
         residents: Sequence[Resident] = (),
         days: Sequence[Sequence[Appointment]] = (),
     ) -> None:
         self._spans: dict[str, list[Span]] = {}
-        self._weekday = weekday
+        self._weekday = date.weekday()
         for place in places:
-            spans = open_spans(place.opening_hours, weekday) if place.opening_hours and place.rooms else None
+            spans = given_hours(place, date, coordinates) if place.rooms else None
             if spans is not None:
                 self._spans[place.id] = spans
         belongs = {(i, place) for i, one in enumerate(residents) for place in (one.home, one.workplace) if place}

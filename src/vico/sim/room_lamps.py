@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from datetime import date as Date
+
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.clock import DAY
-from vico.community.hours import MINUTES, Span, is_within, open_spans
-from vico.community.usual_hours import usual_spans
+from vico.community.hours import hours_on
 from vico.sim.scene_part import ScenePart
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
 from vico.world.model import Category, Place
+from vico.world.opening_hours import MINUTES, Coordinates, Span, is_within
 from vico.world.world import World
 
 # Rooms that nobody in particular switches the light of.
@@ -36,20 +38,22 @@ class RoomLamps:
     ----------
     world
         The world.
-    weekday
-        Of the first day, 0 Monday .. 6 Sunday.
+    date
+        The first day.
     part
         Of a city, whose rooms are meant; none: all.
     """
 
-    def __init__(self, world: World, weekday: int, part: ScenePart | None = None) -> None:
+    def __init__(self, world: World, date: Date, part: ScenePart | None = None) -> None:
         self._rows = None if part is None else part.rooms
         world = world if part is None else part.world
         number = {place.id: k for k, place in enumerate(world.places)}
         self._xy = np.array([room.centre[:2] for room in world.rooms], np.float64).reshape(-1, 2)
         self._place = np.array([number.get(room.place, -1) for room in world.rooms], np.int64)
         self._shared = np.array([room.kind in _SHARED for room in world.rooms], bool) | (self._place < 0)
-        self._hours = [(k, _hours_of(place, weekday)) for k, place in enumerate(world.places) if place.kind != HOME]
+        origin = world.manifest.origin
+        where = (origin.lat, origin.lon)
+        self._hours = [(k, _hours_of(place, date, where)) for k, place in enumerate(world.places) if place.kind != HOME]
         self._private = np.array([room.kind in _PRIVATE for room in world.rooms], bool)
         self._looked_up = -1.0
         self._open = np.zeros(len(world.places), bool)
@@ -80,9 +84,6 @@ class RoomLamps:
         return self._open
 
 
-def _hours_of(place: Place, weekday: int) -> list[Span]:
+def _hours_of(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
     """Return when a place that is nobody's home is open on a day."""
-    if place.category is Category.ACCOMMODATION:
-        return [(0, MINUTES)]
-    said = open_spans(place.opening_hours, weekday) if place.opening_hours else None
-    return usual_spans(place.kind, place.category, weekday) if said is None else said
+    return [(0, MINUTES)] if place.category is Category.ACCOMMODATION else hours_on(place, date, coordinates)

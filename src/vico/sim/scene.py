@@ -116,7 +116,7 @@ class SceneRenderer:
 
     def _attach(self, sim: RenderedSimulation) -> None:
         self._sim, part = sim, self._part
-        self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date).weekday(), part)
+        self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date), part)
         self._window_lights = WindowLights(sim.world, sim.residents, self._room_lamps, part)
         self._lit: tuple[float, ...] = ()
         self.wait()

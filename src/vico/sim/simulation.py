@@ -133,8 +133,8 @@ class Simulation:
         self.metrics = Metrics()
         self.residents = list(community.residents)[: self.config.residents] if community is not None else []
         days = self.base.days(community)[: len(self.residents)] if community is not None else []
-        weekday = None if community is None else community.date.weekday()
-        self.state = initial_state(self.base, self.residents, days, self.config, weekday)
+        date = None if community is None else community.date
+        self.state = initial_state(self.base, self.residents, days, self.config, date)
         self._dressed_for = self.state.environment.weather
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)

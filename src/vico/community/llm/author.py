@@ -112,7 +112,7 @@ class LlmCommunityAuthor:
             the procedural author and `only` is set.
         """
         base = procedural_author(world, residents=residents, seed=seed)
-        cast = Cast(base, PlaceIndex(world, base.date.weekday()))
+        cast = Cast(base, PlaceIndex(world, base.date))
         named = frozenset(f.where.partition(".")[0] for f in findings)
         unasked = frozenset(r.id for r in base.residents if r.id in named)
         desk = ModelDesk(self.model, workers=self.workers, rounds=self.rounds, progress=self._progress)

@@ -14,13 +14,14 @@ import shapely
 from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, Pattern
 from vico.geo.osm import OsmData, OsmRelation, Tags
 from vico.world.model import Dropped
+from vico.world.opening_hours import weekly_hours
 from vico.worldgen.facts.expendable import expendable
 
 NOT_ON_THE_MAP = "its rails are not on the map, or not chosen"
 _SAME_STOP = 60.0  # metres within which a platform and a stop position of one name are one stop
 _BESIDE = 35.0  # and of any name, where one follows the other in the relation
 _GONE = ("disused", "abandoned", "proposed", "construction", "razed", "removed")
-_HOURS = re.compile(r"(\d{1,2}):(\d\d)\s*-\s*(\d{1,2}):(\d\d)")
+_WORKING_DAY = 1  # Tuesday, 0 Monday
 _CLOCK = re.compile(r"(?:(\d{1,2}):)?(\d{1,3})(?::(\d\d))?")
 _PERIOD = re.compile(r"PT(?:(\d+)H)?(?:(\d+)M)?", re.IGNORECASE)
 _HEX = re.compile(r"#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
@@ -265,10 +266,8 @@ def interval_of(tags: Tags) -> int | None:
 
 
 def _hours(tags: Tags) -> tuple[int, int] | None:
-    """Read the first span of hours that the map gives, seconds of the day."""
-    match = _HOURS.search(tags.get("opening_hours") or tags.get("service_times") or tags.get("hours") or "")
-    if match is None:
+    """Return the first and the last second at which the map says that buses run on an ordinary working day."""
+    week = weekly_hours(tags.get("opening_hours") or tags.get("service_times") or tags.get("hours") or "")
+    if week is None or not (spans := week[_WORKING_DAY]):
         return None
-    first_hour, first_minute, last_hour, last_minute = (int(part) for part in match.groups())
-    first, last = first_hour * 3600 + first_minute * 60, last_hour * 3600 + last_minute * 60
-    return (first, last) if 0 <= first < last <= DAY else None
+    return spans[0][0] * 60, min(spans[-1][1] * 60, DAY)
