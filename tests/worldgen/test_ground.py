@@ -19,7 +19,6 @@ from vico.worldgen.facts.expendable import NamedShape
 from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, sea_of_map, sea_polygons
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width, lane_count
-from vico.worldgen.facts.tags import number
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
 from vico.worldgen.streets.polygons import road_polygons
 
@@ -67,13 +66,6 @@ def test_lanes_are_as_tagged_or_as_usual() -> None:
     assert lane_count({"highway": "primary", "lanes": "3"}) == 3
     assert lane_count({"highway": "primary"}) == 4
     assert lane_count({"highway": "residential", "oneway": "yes"}) == 1
-
-
-@pytest.mark.parametrize(
-    ("text", "value"), [("12 m", 12.0), ("40'", 12.192), ("3,5", 3.5), ("x", None), ("nan", None), (None, None)]
-)
-def test_numbers_of_tags_are_read_in_metres(text: str | None, value: float | None) -> None:
-    assert number(text) == (pytest.approx(value) if value is not None else None)
 
 
 def test_street_surfaces_do_not_overlap(streets: StreetPolygons) -> None:

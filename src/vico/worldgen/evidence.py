@@ -30,6 +30,7 @@ from vico.io.cache import cache_folder
 from vico.io.files import sha256_of
 from vico.io.http import HttpClient
 from vico.world.model import Dropped, Source
+from vico.worldgen.as_typed import quantities_as_typed
 from vico.worldgen.facts.precedence import Precedence, read_precedence
 from vico.worldgen.product import digest_of
 from vico.worldgen.sources import SERVICES, Sources
@@ -119,6 +120,8 @@ def gather(
         },
         [Dropped(id=key, reason=reason) for key, reason in data.broken],
     )
+    if (typed := quantities_as_typed(data))[1]:
+        stages.report("values of the map", *typed)
     if without is not None:
         stages.report("map", {}, [without])
     if samples is not None and samples.beyond:

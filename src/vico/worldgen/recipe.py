@@ -22,6 +22,7 @@ from vico.world.street_model import Roads
 from vico.world.transit_model import Transit
 from vico.world.world import World
 from vico.worldgen.ahead import Ahead
+from vico.worldgen.as_typed import hours_as_typed
 from vico.worldgen.buildings.stage import Cladding
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.facades.fronts import street_fronts
@@ -123,6 +124,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     )
     buildings = write.buildings(built, entrances)
     stages.report("places", {"places": len(places), "entrances": len(entrances)}, dropped)
+    if (typed := hours_as_typed(places))[1]:
+        stages.report("opening hours", *typed)
     indoors, undrawn = _furnished(places, entrances, buildings, height, request, stages)
     write.indoors(indoors, undrawn)
     objects = write.objects(outdoors, indoors)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
+from vico.geo.quantities import Kind, read
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 
 _GUIDE = "docs/sources.md"
@@ -55,7 +55,7 @@ def tags_of_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
     """Return what a building's attributes say, in OpenStreetMap's words; what they leave open has no tag."""
     names = attribute_names()
     tags: dict[str, str] = {}
-    height, levels = _number(attributes, names.height), _number(attributes, names.levels)
+    height, levels = _number(attributes, names.height, Kind.LENGTH), _number(attributes, names.levels, Kind.STOREYS)
     if height is not None and 1.0 < height < 900.0:
         tags["height"] = f"{height:.2f}"
     if levels is not None and 1 <= levels <= 150:
@@ -90,13 +90,9 @@ def _text(attributes: Mapping[str, object], names: Sequence[str]) -> str:
     return ""
 
 
-def _number(attributes: Mapping[str, object], names: Sequence[str]) -> float | None:
+def _number(attributes: Mapping[str, object], names: Sequence[str], kind: Kind) -> float | None:
     for name in names:
         value = attributes.get(name)
-        try:
-            number = float(value) if isinstance(value, str | int | float) else math.nan
-        except ValueError:
-            continue
-        if math.isfinite(number):
+        if isinstance(value, str | int | float) and (number := read(str(value), kind).value) is not None:
             return number
     return None

@@ -14,10 +14,11 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData, polygons_of
+from vico.geo.quantities import quantity
 from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import PAVINGS, StreetPolygons
-from vico.worldgen.facts.tags import number, on_the_ground
+from vico.worldgen.facts.tags import on_the_ground
 
 _GRID = 0.001  # metres: overlays on a grid are robust where free ones fail on nearly coincident outlines
 _CURB = 0.22  # width of a kerb's top stone, metres
@@ -310,7 +311,7 @@ def _streams(osm: OsmData, window: Polygon) -> list[NamedShape]:
                 parts = shapely.get_parts(overlay.difference(line, known))
                 apart = shapely.MultiLineString([part for part in parts if part.length > _BESIDE])
                 stretch = overlay.intersection(overlay.buffer(apart, 1.5 * _BESIDE), line)
-            width = min(max(number(way.tags.get("width")) or usual[way.tags["waterway"]], 0.6), 60.0)
+            width = min(max(quantity(way.tags, "width") or usual[way.tags["waterway"]], 0.6), 60.0)
             strip = overlay.buffer(stretch, width / 2, cap_style="flat", quad_segs=2)
             found += named_parts(f"w{way.id}", polygons_of(overlay.intersection(strip, window)))
     return found

@@ -12,7 +12,7 @@ from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.worldgen.facts.tags import number
+from vico.geo.quantities import quantity
 
 LANE_WIDTH = 3.2
 """Metres; netconvert's default too, so that its lanes lie within the painted carriageway."""
@@ -201,7 +201,7 @@ class StreetPolygons:
 
 def lane_count(tags: Mapping[str, str]) -> int:
     """Lanes of a drivable way, both directions together."""
-    said = number(tags.get("lanes"))
+    said = quantity(tags, "lanes")
     if said is not None and 1 <= said <= 12:
         return int(said)
     per_direction = DRIVABLE.get(tags.get("highway", ""), _UNKNOWN_CLASS).lanes
@@ -218,7 +218,7 @@ def is_oneway(tags: Mapping[str, str]) -> bool:
 
 def carriageway_width(tags: Mapping[str, str]) -> float:
     """Kerb-to-kerb width of a drivable way, metres: `width` where believable, else lanes, class and parking lanes."""
-    said = number(tags.get("width"))
+    said = quantity(tags, "width")
     if said is not None and 2.0 <= said <= 40.0:
         return said
     kind = tags.get("highway", "")

@@ -12,12 +12,13 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmWay
+from vico.geo.quantities import quantity
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, surface_of_quads
 from vico.world.stairs import Stairs
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.tags import number, on_the_ground
+from vico.worldgen.facts.tags import on_the_ground
 from vico.worldgen.ground.pavings import LOOKS, coloured, ground_material
 
 Floats = NDArray[np.float64]
@@ -120,7 +121,7 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
 
 def _flights(way: OsmWay, terrain: HeightField, where: BaseGeometry) -> list[tuple[BaseGeometry, list[Face]]]:
     """Return the flights of a way: where each lies, and its faces with their normals."""
-    width = min(max(number(way.tags.get("width")) or _WIDTH, 1.2), 12.0)
+    width = min(max(quantity(way.tags, "width") or _WIDTH, 1.2), 12.0)
     found: list[tuple[BaseGeometry, list[Face]]] = []
     for piece in shapely.get_parts(overlay.intersection(shapely.LineString(way.line), where)):
         if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > terrain.half - 1.0:

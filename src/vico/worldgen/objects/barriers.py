@@ -13,9 +13,10 @@ from shapely.geometry.base import BaseGeometry
 from vico.assets.models.street import street_models
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
+from vico.geo.quantities import metres, number, quantity
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.objects import catalogue
-from vico.worldgen.objects.wishes import Wish, metres, number
+from vico.worldgen.objects.wishes import Wish
 
 _LONG = 2.0  # metres of line a model covers at scale 1
 _GATES = ("gate", "lift_gate", "swing_gate", "entrance", "kissing_gate", "turnstile", "full-height_turnstile",
@@ -56,7 +57,7 @@ def barrier_wishes(osm: OsmData, carriageway: BaseGeometry, openings: BaseGeomet
     found: list[Wish] = []
     for key, line, tags in lines:
         kind = tags.get("barrier", "")
-        if key in drawn or (number(tags.get("layer")) or 0) != 0 or np.abs(line).min(axis=0).max() > half:
+        if key in drawn or (quantity(tags, "layer") or 0) != 0 or np.abs(line).min(axis=0).max() > half:
             continue
         if tags.get("location") in ("underground", "indoor") or (number(tags.get("level")) or 0) != 0:
             continue

@@ -15,8 +15,8 @@ from pydantic import Field, model_validator
 from vico.assets.models.street import street_models
 from vico.errors import SchemaError
 from vico.geo.osm import Tags
+from vico.geo.quantities import metres
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
-from vico.worldgen.objects.wishes import number
 
 ROOM = "objects"
 GUIDE = "docs/adding_an_object.md"
@@ -53,7 +53,7 @@ class Condition(DataRecord):
             return self.present is False
         if self.contains is not None and self.contains not in value:
             return False
-        return value.startswith(self.begins or "") and self._within(number(value))
+        return value.startswith(self.begins or "") and self._within(metres(value))
 
     def _within(self, found: float | None) -> bool:
         if found is None:

@@ -7,9 +7,9 @@ import re
 import numpy as np
 
 from vico.geo.osm import OsmData, Tags
+from vico.geo.quantities import numbers
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.objects import catalogue
-from vico.worldgen.objects.wishes import number
 
 
 def region(osm: OsmData) -> str:
@@ -40,9 +40,8 @@ def on_the_ground(tags: Tags) -> bool:
         return False
     if tags.get("indoor", "no") not in ("no", "outdoor") or tags.get("tunnel", "no") not in ("no",):
         return False
-    levels = [number(part) for part in tags.get("level", "").split(";")]
-    known = [level for level in levels if level is not None]
-    return not known or 0.0 in known
+    levels = numbers(tags.get("level"))
+    return not levels or 0.0 in levels
 
 
 def thing_of(tags: Tags, *, where: str = "", random: np.random.Generator | None = None) -> str | None:

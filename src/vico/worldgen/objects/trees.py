@@ -14,12 +14,13 @@ from vico.assets.models.street import street_models
 from vico.geo import overlay
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, Tags
+from vico.geo.quantities import metres
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.objects.catalogue import trees
-from vico.worldgen.objects.wishes import Wish, metres
+from vico.worldgen.objects.wishes import Wish
 
 _SHRUB_ROOM = 7.0
 _BARE = {

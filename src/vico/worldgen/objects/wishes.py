@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.geo.osm import Tags
+from vico.geo.quantities import Kind, read
 
 _POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 
@@ -49,24 +49,8 @@ class Wish:
     piece: bool = False
 
 
-def number(text: str | None) -> float | None:
-    """Read the first number of a tag's value, if it begins with one."""
-    found = re.match(r"\s*(-?\d+(?:[.,]\d+)?)", text or "")
-    return float(found.group(1).replace(",", ".")) if found else None
-
-
-def metres(text: str | None) -> float | None:
-    """Read a length: metres, or feet and inches where the value says so."""
-    value = number(text)
-    if value is None or text is None:
-        return None
-    if "'" in text or "ft" in text:
-        return value * 0.3048
-    return value / 100 if re.search(r"\d\s*cm", text) else value
-
-
 def direction(tags: Tags) -> float | None:
     """Yaw from a `direction` tag: degrees clockwise from north, or a compass point."""
     said = tags.get("direction", tags.get("camera:direction", ""))
-    degrees = 22.5 * _POINTS.index(said) if said in _POINTS else number(said)
+    degrees = 22.5 * _POINTS.index(said) if said in _POINTS else read(said, Kind.ANGLE).value
     return None if degrees is None else math.remainder(math.pi / 2 - math.radians(degrees), 2 * math.pi)

@@ -11,10 +11,10 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.geo.quantities import quantity
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.facts.streets import Crossing, Street
-from vico.worldgen.facts.tags import number
 
 _CROSSING_WIDTH = 3.6
 
@@ -30,7 +30,7 @@ def crossings_of(
     for way in marked:
         node_tags = next((kinds[n] for n in way.nodes if n in kinds), {})
         look = _marking({**node_tags, **way.tags}, "unmarked", with_signals)
-        width = min(max(number(way.tags.get("width")) or _CROSSING_WIDTH, 2.0), 8.0)
+        width = min(max(quantity(way.tags, "width") or _CROSSING_WIDTH, 2.0), 8.0)
         with expendable(f"w{way.id}"):
             for piece in shapely.get_parts(overlay.intersection(LineString(way.line), carriageway)):
                 if isinstance(piece, LineString) and 2.0 < piece.length < 40.0:

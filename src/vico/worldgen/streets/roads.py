@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.geo.quantities import quantity
 from vico.world.model import Dropped
 from vico.world.street_model import Junction, Road, Roads
 from vico.worldgen.facts.expendable import expendable
@@ -103,25 +103,17 @@ class NetworkStreet:
         return self.forward > 0
 
 
-def _number(text: str | None) -> float | None:
-    """Read the first number of a tag's value, or None."""
-    found = re.match(r"\s*(\d+(?:\.\d+)?)", text or "")
-    return float(found.group(1)) if found else None
-
-
 def _speed(tags: dict[str, str], default: float) -> float:
-    """`maxspeed` in m/s: km/h unless it says mph."""
-    value = _number(tags.get("maxspeed"))
-    if value is None or value <= 0:
-        return default
-    return round(value * (0.44704 if "mph" in tags["maxspeed"] else 1 / 3.6), 2)
+    """Speed limit, m/s."""
+    said = quantity(tags, "maxspeed")
+    return round(said, 2) if said else default
 
 
 def _lanes(tags: dict[str, str], kind: str, oneway: bool) -> tuple[int, int]:
     """Lanes forward and backward."""
     each = DEFAULTS[kind][0]
-    total = _number(tags.get("lanes"))
-    forward, backward = _number(tags.get("lanes:forward")), _number(tags.get("lanes:backward"))
+    total = quantity(tags, "lanes")
+    forward, backward = quantity(tags, "lanes:forward"), quantity(tags, "lanes:backward")
     if oneway:
         return int(min(max(total or forward or each, 1), MAX_LANES_EACH_WAY + 1)), 0
     if forward is None or backward is None:
@@ -158,12 +150,11 @@ def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64])
     kind = tags.get("highway", "").removesuffix("_link")
     if tags.get("area") == "yes" or (kind not in DEFAULTS and kind not in WALKING):
         return None
-    layer = int(_number(tags.get("layer", "0").removeprefix("-")) or 0)
-    layer = -layer if tags.get("layer", "").startswith("-") else layer
+    layer = round(quantity(tags, "layer") or 0)
     closed = None if on_the_ground(tags) else UNDERGROUND
     name = tags.get("name")
     if kind in WALKING:
-        width = min(_number(tags.get("width")) or WALKING[kind], 8.0)
+        width = min(quantity(tags, "width") or WALKING[kind], 8.0)
         return NetworkStreet(
             way.id, part, nodes, line, kind, name, 0, 0, width, 1.4, "none", "all", layer, tags, closed
         )

@@ -13,10 +13,11 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmWay, means_area
+from vico.geo.quantities import quantity
 from vico.worldgen.facts.expendable import NamedShape, expendable, named_parts
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import DRIVABLE, PAVINGS, Street, carriageway_width, is_oneway, lane_count
-from vico.worldgen.facts.tags import is_bridge, number, on_the_ground
+from vico.worldgen.facts.tags import is_bridge, on_the_ground
 
 _SIDEWALK_WIDTH = 2.6
 _TRAM_REACH = 3.0  # metres from a street's centre line within which tram tracks run in it
@@ -114,7 +115,7 @@ def _strips_of_way(way: OsmWay, trams: shapely.STRtree) -> Strips:
     if kind in DRIVABLE:
         _add_carriageway(strips, way, line, tracks=bool(len(trams.query(line, "dwithin", _TRAM_REACH))))
     elif kind in ("pedestrian", "platform"):
-        wide = max(number(way.tags.get("width")) or 5.0, 2.0)
+        wide = max(quantity(way.tags, "width") or 5.0, 2.0)
         strip = NamedShape(f"w{way.id}", overlay.buffer(line, wide / 2, quad_segs=4))
         strips.square.append(strip)
         _note_paving(strips.paved, way.tags, strip)
@@ -154,7 +155,7 @@ def _add_footway(strips: Strips, way: OsmWay, line: LineString) -> None:
     if tags.get("footway") == "crossing" or tags.get("cycleway") == "crossing":
         strips.crossings.append(way)
         return
-    width = number(tags.get("width")) or (2.6 if tags.get("footway") == "sidewalk" else _FOOT_WIDTH[kind])
+    width = quantity(tags, "width") or (2.6 if tags.get("footway") == "sidewalk" else _FOOT_WIDTH[kind])
     strip = NamedShape(f"w{way.id}", overlay.buffer(line, min(max(width, 1.4), 12.0) / 2, quad_segs=3))
     unpaved = tags.get("surface") in _LOOSE or (kind in ("path", "track") and "surface" not in tags)
     _note_paving(strips.paved, tags, strip)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.geo.quantities import quantity
 from vico.worldgen.buildings.fitting.measure import LEAST_POINTS, RoofSamples
 from vico.worldgen.facts.outlines.heights import STOREY
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
-from vico.worldgen.facts.tags import number
 
 _LEAST_EAVES = 2.2
 _ABSENT = 1.5  # metres over the ground floor under which the mesh shows no building
@@ -54,7 +54,7 @@ def _raised_part(part: PartPlan, model: NDArray[np.float64], seen: NDArray[np.fl
     if eaves < part.low + (_LEAST_EAVES if part.levels else 0.3):
         return None
     levels = part.levels
-    if levels and number(part.tags.get("building:levels")) is None:
+    if levels and quantity(part.tags, "building:levels") is None:
         levels = max(round((eaves - part.low - 0.6) / STOREY), 1)
     return replace(part, eaves=eaves, levels=levels, roof=part.roof.risen(round(new_rise, 3)))
 

@@ -10,12 +10,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.geo.quantities import quantity
 from vico.worldgen.buildings.roofs.eaves import edges_of
 from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facades.families import picked
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, inradius, shape_named
-from vico.worldgen.facts.tags import number
 
 _SUPPOSED = ("gabled", "hipped", "half-hipped", "mansard")
 _STREETS = 3  # storeys from which on a house belongs to a street, and its region's roofs
@@ -86,8 +86,8 @@ def is_flat_town(plans: Sequence[BuildingPlan]) -> bool:
 def _supposed(part: PartPlan, *, flat_too: bool) -> bool:
     """Return whether nobody said what roof a part has; a flat one among pitched ones only where it has the room."""
     tags = part.tags
-    said = shape_named(tags.get("roof:shape")) or number(tags.get("roof:height"))
-    if said or number(tags.get("roof:levels")) is not None or part.roof.facets or part.levels < 1:
+    said = shape_named(tags.get("roof:shape")) or quantity(tags, "roof:height")
+    if said or quantity(tags, "roof:levels") is not None or part.roof.facets or part.levels < 1:
         return False
     if part.roof.shape != "flat":
         return part.roof.shape in _SUPPOSED

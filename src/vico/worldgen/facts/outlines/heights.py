@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from shapely import Polygon
 
 from vico.geo.osm import Tags
-from vico.worldgen.facts.tags import number
+from vico.geo.quantities import quantity
 
 STOREY = 3.2
 """Metres a storey, where only levels are known."""
@@ -71,8 +71,8 @@ _KIND_EAVES = {
 
 def said_levels(tags: Mapping[str, str]) -> int | None:
     """Storeys that tags state, or that a tagged height comes to."""
-    levels = number(tags.get("building:levels"))
-    if levels is not None and 1 <= levels <= 150:
+    levels = quantity(tags, "building:levels")
+    if levels is not None:
         return max(round(levels), 1)
     height = said_height(tags)
     return max(round((height - 1.0) / STOREY), 1) if height and height > 2 else None
@@ -80,8 +80,8 @@ def said_levels(tags: Mapping[str, str]) -> int | None:
 
 def said_height(tags: Mapping[str, str]) -> float | None:
     """Metres that tags state, from the ground to the highest point."""
-    height = number(tags.get("height")) or number(tags.get("building:height")) or number(tags.get("est_height"))
-    return height if height is not None and 0.5 < height < 900.0 else None
+    height = quantity(tags, "height") or quantity(tags, "building:height") or quantity(tags, "est_height")
+    return height if height is not None and height > 0.5 else None
 
 
 def kind_eaves(tags: Mapping[str, str], use: str, area: float) -> float | None:
@@ -139,7 +139,7 @@ def level_estimates(
     rules: list[str] = []
     for k, (_, _, tags) in enumerate(outlines):
         if town.said[k]:
-            result[k], rule = town.said[k], "levels tag" if number(tags.get("building:levels")) else "height tag"
+            result[k], rule = town.said[k], "levels tag" if quantity(tags, "building:levels") else "height tag"
         elif typical[k]:
             result[k], rule = typical[k], "parts"
         elif (alike := town.by_kind(k)) is not None:

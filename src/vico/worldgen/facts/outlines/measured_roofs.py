@@ -17,11 +17,11 @@ from vico.geo import overlay
 from vico.geo.buildings.forms import form_of
 from vico.geo.buildings.model import RoofFacet
 from vico.geo.overlay import OverlayError
+from vico.geo.quantities import quantity
 from vico.worldgen.facts.outlines.heights import STOREY
 from vico.worldgen.facts.outlines.plans import PartPlan
 from vico.worldgen.facts.outlines.roof_cells import RoofCell, measured_solid, roof_cells
 from vico.worldgen.facts.outlines.roof_shapes import Roof, rings_of
-from vico.worldgen.facts.tags import number
 
 _STEP = 0.35  # metres between roofs that are two
 _OWN_PART = 12.0  # square metres from which on a stretch of roof is a part of its own
@@ -171,7 +171,7 @@ def _near(facet: RoofFacet, polygon: Polygon) -> RoofFacet:
 
 def _levels(tags: Mapping[str, str], eaves: float) -> int:
     """Storeys below the eaves: as said, where that can be; else by height."""
-    said = number(tags.get("building:levels"))
+    said = quantity(tags, "building:levels")
     if said is not None and 1 <= said <= 150 and 2.2 <= eaves / said <= 6.5:
         return max(round(said), 1)
     return max(round((eaves - 0.6) / STOREY), 1)

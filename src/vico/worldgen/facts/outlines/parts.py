@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo.osm import Tags
+from vico.geo.quantities import Kind, quantity, read
 from vico.world.model import OPEN_KINDS
 from vico.worldgen.facts.outlines.heights import STOREY, kind_eaves, said_height, said_levels
 from vico.worldgen.facts.outlines.plans import PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, inradius, shape_named
-from vico.worldgen.facts.tags import number
 
 SMALL_KINDS = {"kiosk", "garage", "garages", "shed", "hut", "carport", "service", "toilets", "pavilion", "greenhouse"}
 
@@ -105,7 +105,7 @@ def _unsaid_storeys(kind: str, levels: int, may_vary: bool, draw: float) -> int:
 
 def _roof_below(height: float, roof: Roof, tags: Tags, low: float) -> Roof:
     """Return a roof that ends at a stated height: lower where its walls would not be seen."""
-    if number(tags.get("roof:height")) is None and low <= 0.0:
+    if quantity(tags, "roof:height") is None and low <= 0.0:
         roof = replace(roof, height=min(roof.height, 0.4 * height))
     room = height - max(low, 0.0) - (0.05 if low > 0.0 else 0.5)
     return replace(roof, height=max(min(roof.height, room), 0.0))
@@ -113,9 +113,9 @@ def _roof_below(height: float, roof: Roof, tags: Tags, low: float) -> Roof:
 
 def _said_low(tags: Tags, allowance: float) -> float:
     """Height of the underside: stated, else from the first level; 0 on the ground."""
-    low = number(tags.get("min_height")) or number(tags.get("building:min_height"))
+    low = quantity(tags, "min_height") or quantity(tags, "building:min_height")
     if low is None:
-        bottom = number(tags.get("building:min_level")) or number(tags.get("min_level"))
+        bottom = quantity(tags, "building:min_level") or quantity(tags, "min_level")
         # The same allowance as for eaves, so that what is stacked meets and does not overlap.
         low = bottom * STOREY + allowance if bottom else 0.0
     return low if 0.0 < low < 900.0 else 0.0
@@ -141,7 +141,7 @@ def _roof(
     shape = shape_named(tags.get("roof:shape"))
     area = polygon.area
     deep = inradius(polygon)
-    tiers = number(tags.get("roof:levels"))
+    tiers = quantity(tags, "roof:levels")
     if shape is None:
         if open_below:
             shape = "flat"
@@ -152,7 +152,7 @@ def _roof(
         return Roof("flat", 0.0 if open_below or area < 60.0 else 0.5 + 0.5 * float(draw[2]))
     if shape in ("gabled", "round", "gambrel", "saltbox") and deep < 0.5:
         return Roof("flat", 0.0)
-    height = number(tags.get("roof:height"))
+    height = quantity(tags, "roof:height")
     if height is None:
         height = _usual_height(shape, tags, use, deep, float(draw[2]))
     return Roof(shape, float(np.clip(height, 0.3, 90.0)), _direction(polygon, tags, shape))
@@ -160,7 +160,7 @@ def _roof(
 
 def _usual_height(shape: str, tags: Tags, use: str, deep: float, draw: float) -> float:
     """Return how high a roof rises whose height nobody says: by its levels or its angle, else by shape and depth."""
-    tiers, angle = number(tags.get("roof:levels")), number(tags.get("roof:angle"))
+    tiers, angle = quantity(tags, "roof:levels"), quantity(tags, "roof:angle")
     if tiers:
         return 2.8 * min(tiers, 4.0)
     if angle and 3.0 < angle < 75.0:
@@ -210,7 +210,7 @@ def bearing_of(text: str | None) -> float | None:
             joined = joined.replace(long, short)
         word = joined if joined in _POINTS else word
     bearing = _POINTS.get(word)
-    return bearing if bearing is not None else number(word)
+    return bearing if bearing is not None else read(word, Kind.ANGLE).value
 
 
 def _direction(polygon: Polygon, tags: Tags, shape: str) -> float | None:

@@ -14,12 +14,13 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.geo.quantities import quantity
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.levels import ON_FOOT, SLAB, SLAB_ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
-from vico.worldgen.facts.tags import is_bridge, number, on_the_ground
+from vico.worldgen.facts.tags import is_bridge, on_the_ground
 from vico.worldgen.ground.grading import raised, ramp_slope
 from vico.worldgen.ground.kerbs import KERB
 from vico.worldgen.ground.profiles import Network
@@ -55,7 +56,7 @@ def deck_width(way: OsmWay) -> float:
     if kind is None:
         return _TRACK_WIDTH
     if kind in ON_FOOT:
-        return min(max(number(way.tags.get("width")) or 2.6, 1.6), 10.0)
+        return min(max(quantity(way.tags, "width") or 2.6, 1.6), 10.0)
     return carriageway_width(way.tags) + 2 * deck_walk(way.tags)
 
 
