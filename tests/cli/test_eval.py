@@ -228,3 +228,29 @@ def test_influence_refuses_what_it_cannot_do(
         assert vico(*asked, *more) == 2
         assert says in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("spec", "told"),
+    [
+        ("missing.py:Greedy", "missing.py: no such file"),
+        ("mine.py:Gredy", "mine.py has no 'Gredy'"),
+        ("mine.py:Table", "Table has neither act(observation, info) nor predict(observation)"),
+        ("broken.py:Greedy", "broken.py cannot be imported"),
+        ("no_such_module:Greedy", "no_such_module cannot be imported"),
+    ],
+)
+def test_an_agent_that_is_not_there_is_refused_before_the_first_episode(
+    spec: str,
+    told: str,
+    worlds: list[Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text("class Greedy:\n    def act(self, observation, info): return {}\nclass Table: pass\n")
+    Path("broken.py").write_text("class Greedy(:\n")
+    assert vico(*words(worlds, tmp_path / "out", methods=("good", spec))) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -114,9 +114,9 @@ def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
 
 def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool = False, json: bool = False) -> int:
     """Write a city in another format."""
-    from vico.world.exports import export_city
+    from vico.world.exports import EXPORT_FOLDER, export_city
 
-    check_output(out, path, force=force)
+    check_output(out, path, force=force, kind=EXPORT_FOLDER)
     counts = export_city(read_city(path), to, out, rooms=rooms, force=force)
     print_export(out, to, counts, json=json)
     return 0

@@ -73,7 +73,7 @@ def city_export(
         to: gltf, usd, mjcf, geojson or xodr.
         out: Folder to make; refused if it exists, unless --force.
         rooms: With what lies indoors.
-        force: Replace what is in the output folder.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
         json: Print JSON.
     """
     from vico.cli import city as verb

@@ -21,6 +21,7 @@ from vico.community import (
     write_community,
 )
 from vico.community.authorship import Origin
+from vico.community.folder import COMMUNITY_FOLDER
 from vico.community.llm import LlmCommunityAuthor
 from vico.errors import InputError
 from vico.world.folder import read_world
@@ -37,7 +38,7 @@ _TOLD = 40
 def build(options: CommunityBuildOptions) -> int:
     """People a world, write the community, and say who lives there and who wrote what."""
     asks_model = options.asks_model
-    check_output(options.out, options.path, force=options.force)
+    check_output(options.out, options.path, force=options.force, kind=COMMUNITY_FOLDER)
     if asks_model and (options.day is not None or options.days != 1):
         raise InputError("community build: a language model writes one working day; leave out --day and --days")
     first = None if options.day is None else date_of(options.day)
@@ -165,7 +166,7 @@ def _print_authorship(told: dict[str, Any]) -> None:
 
 def day(path: Path, *, day: str, out: Path, force: bool, json: bool) -> int:
     """Write one day of the community at `path` to `out`."""
-    check_output(out, path, force=force)
+    check_output(out, path, force=force, kind=COMMUNITY_FOLDER)
     community = read_community(path)
     one = community.on(date_of(day, community.dates))
     write_community(one, out, force=force or out.is_dir(), world=world_of(path))

@@ -16,7 +16,7 @@ from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.datasets.build import BuildRequest, Contents, build_dataset
 from vico.datasets.checking import findings_of
 from vico.datasets.contact_sheet import write_contact_sheet
-from vico.datasets.folder import Dataset
+from vico.datasets.folder import DATASET_FOLDER, Dataset
 from vico.datasets.splits import SplitRule
 from vico.errors import InputError, OutputExistsError
 from vico.runner.foreign import Terms
@@ -26,7 +26,7 @@ from vico.threads import workers as processors
 def build(options: DatasetOptions) -> int:
     """Make a dataset; 1 if some of its episodes could not be made."""
     request = request_of(options)
-    check_output(options.out, *chain(*options.world, *options.runs), force=options.force)
+    check_output(options.out, *chain(*options.world, *options.runs), force=options.force, kind=DATASET_FOLDER)
     with progress_bars() as report:
         built = build_dataset(
             request, options.out, force=options.force, report=lambda done, total: report("episodes", done, total)

@@ -66,7 +66,7 @@ class DatasetOptions:
     deadline
         Seconds an agent of yours has for an action; 0 waits for it as long as it takes.
     force
-        Replace what is in the output folder.
+        Replace what this verb made there before; refused if the folder holds anything else.
     json
         Print what was made as JSON.
     """

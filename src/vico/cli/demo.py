@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -18,18 +19,30 @@ from vico.cli import run as run_verb
 from vico.cli import world as world_verb
 from vico.cli.options import CommunityBuildOptions, RunOptions
 from vico.cli.output import check_output
-from vico.errors import StageError
+from vico.community.folder import COMMUNITY_FOLDER
+from vico.errors import OutputExistsError, StageError
+from vico.io.folders import check_replaceable
+from vico.sim.recording.schema import RUN_FOLDER
+from vico.world.stored import WORLD_FOLDER
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
+
+#: A run with the film of it.
+EVENING = replace(RUN_FOLDER, names=lambda folder: (*RUN_FOLDER.names(folder), _FILM))
+_FILM = "film.mp4"
 
 
 def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     """Build central Helsinki, people it, simulate half an hour from 08:00 and a rainy evening, show both."""
     unfinished = out / ".unfinished"
-    check_output(out, force=force or unfinished.is_file())
+    again = force or unfinished.is_file()
+    check_output(out, force=again)
     if out.exists() and not out.is_dir():
-        out.unlink()
+        raise OutputExistsError(f"{out}: is a file; choose another --out")
     world, people, run, evening = (out / name for name in ("world", "community", "run", "evening"))
+    # What else lies there stays.
+    for folder, kind in ((world, WORLD_FOLDER), (people, COMMUNITY_FOLDER), (run, RUN_FOLDER), (evening, EVENING)):
+        check_replaceable(folder, force=again, kind=kind)
     console = Console(stderr=True)
     began = time.perf_counter()
     extract = packaged_extract()
@@ -86,7 +99,7 @@ def _evening(world: Path, people: Path, out: Path, seed: int) -> str:
         str(seed),
     ]
     around_the_h1 = ["--follow", "robot_2", "--view", "orbit", "--start", "24"]
-    made = ["--out", str(out / "film.mp4"), "--size", "640x360", "--fps", "15", "--samples", "1"]
+    made = ["--out", str(out / _FILM), "--size", "640x360", "--fps", "15", "--samples", "1"]
     told = ""
     for command in (run, [*vico, "film", str(out), *around_the_h1, *made]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -21,7 +21,7 @@ from vico.challenges.evaluation import Finished, evaluate, jobs_for
 from vico.challenges.records import Challenge, Setting
 from vico.challenges.records import Progress as Told
 from vico.challenges.registry import foreign_parts, load_challenge
-from vico.challenges.tables.files import results_content, write_results
+from vico.challenges.tables.files import EVALUATION_FOLDER, results_content, write_results
 from vico.challenges.tables.markdown import fault_lines, not_played_lines, results_page, time_lines
 from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
@@ -41,7 +41,8 @@ from vico.io.files import write_errors
 from vico.io.folders import is_being_written, new_folder
 from vico.io.stores import Store, is_url, store_at
 from vico.runner.foreign import Terms
-from vico.runner.loading import load
+from vico.runner.isolated import check_loads
+from vico.runner.loading import load_agent
 from vico.threads import workers as processors
 from vico.viewer.server import require_server
 from vico.world.folder import read_world
@@ -168,7 +169,7 @@ def judge(
         worlds=list(worlds),
         seeds=options.seeds,
         first_seed=options.first_seed,
-        terms=_terms(challenge, methods, options),
+        terms=_terms(challenge, methods, next(iter(worlds), Path()), options),
     )
     jobs = [replace(job, setting={**job.setting, **(of_method or {}).get(job.method, {})}) for job in jobs]
     if not 0 <= options.workers <= 256:
@@ -196,12 +197,15 @@ def _in_folder(challenge: Challenge, play: Play, options: EvaluationOptions) -> 
     """Play the jobs, and write the results beside the episodes; give their folder and the outcomes."""
     out = Path(options.out)
     check_output(
-        out, *(Path(one) for one in chain(*options.worlds) if not is_url(one)), force=options.force or options.resume
+        out,
+        *(Path(one) for one in chain(*options.worlds) if not is_url(one)),
+        force=options.force or options.resume,
+        kind=None if options.resume else EVALUATION_FOLDER,
     )
     partial_folder = out.with_name(f"{out.name}.partial")
     if options.resume:
         _take_up(out, partial_folder)
-    with new_folder(out, force=options.force, work=partial_folder) as folder:
+    with new_folder(out, force=options.force, work=partial_folder, kind=EVALUATION_FOLDER) as folder:
         outcomes = _played(play, folder)
         _write(folder, challenge, outcomes, options)
     yield out, outcomes
@@ -249,14 +253,16 @@ def _tell(challenge: Challenge, outcomes: Sequence[Outcome], options: Evaluation
         print(line, file=sys.stderr)
 
 
-def _terms(challenge: Challenge, methods: Sequence[str], options: EvaluationOptions) -> Terms:
+def _terms(challenge: Challenge, methods: Sequence[str], world: Path, options: EvaluationOptions) -> Terms:
     """Return on which terms agents from elsewhere take part; what is wrong with their names is said here."""
     foreign = [part for method in methods for part in foreign_parts(challenge, method) if ":" in part]
     if not foreign:
         return Terms()
-    if options.in_process:
-        for part in foreign:
-            load(part)
+    for part in dict.fromkeys(foreign):
+        if options.in_process:
+            load_agent(part)
+        else:
+            check_loads(part, world)
     return Terms(deadline=options.deadline or None, isolate=not options.in_process, workers=processors())
 
 

@@ -53,7 +53,7 @@ class EvaluationOptions:
     in_process
         Ask agents of yours in the process that simulates, where nothing keeps them from the truth: for a debugger.
     force
-        Replace what is in the output folder.
+        Replace what this verb made there before; refused if the folder holds anything else.
     json
         Print the results as JSON.
     """

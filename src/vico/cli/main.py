@@ -163,7 +163,7 @@ def community_day(path: Positional[Path], day: str, out: Path, force: bool = Fal
         path: Community folder, built with --days.
         day: A date like 2025-06-07, or a day of the week like saturday: the first one there is.
         out: Folder to make; refused if it exists, unless --force.
-        force: Replace what is in the output folder.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
         json: Print the result as JSON.
     """
     from vico.cli import community as verb
@@ -189,7 +189,7 @@ def export(
         to: The format. "usd" needs the extra of that name.
         out: Folder to make; refused if it exists, unless --force.
         rooms: With what lies indoors.
-        force: Replace what is in the output folder.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
         json: Print the result as JSON.
     """
     from vico.cli import world as verb
@@ -308,7 +308,7 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
     Args:
         out: Folder to make; refused if it exists, unless --force.
         seed: Decides everything that is left to chance.
-        force: Replace what is in the output folder.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
     """
     from vico.cli import demo as verb
 

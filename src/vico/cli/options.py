@@ -195,7 +195,7 @@ class CommunityBuildOptions:
     llm_replay
         Such a file, from which they are taken instead; no server is needed.
     force
-        Replace what is in the output folder.
+        Replace what this verb made there before; refused if the folder holds anything else.
     json
         Print the result as JSON.
     """
@@ -336,7 +336,7 @@ class RunOptions:
     port
         With --live: where the page is, on this machine alone; 0 takes a free one.
     force
-        Replace what is in the output folder.
+        Replace what this verb made there before; refused if the folder holds anything else.
     json
         Print the metrics as JSON.
     """

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from vico.errors import InputError
-from vico.io.folders import check_replaceable
+from vico.io.folders import FolderKind, check_replaceable
 
 Report = Callable[[str, int, int], None]
 
@@ -70,7 +70,7 @@ def _lines() -> Report:
     return report
 
 
-def check_output(out: Path, *inputs: Path, force: bool) -> None:
+def check_output(out: Path, *inputs: Path, force: bool, kind: FolderKind | None = None) -> None:
     """Say before any work what would be wrong with an output folder after it.
 
     Parameters
@@ -79,17 +79,19 @@ def check_output(out: Path, *inputs: Path, force: bool) -> None:
         What the verb reads.
     force
         Whether what is there may be replaced.
+    kind
+        What is to be made: nothing else is replaced. None for files.
 
     Raises
     ------
     OutputExistsError
-        If there is something, and `force` is not given.
+        If there is something, and `force` is not given, or if it is something else.
     OutputError
         If another process is writing it.
     InputError
         If nothing can be written there; or if `force` would delete an input, the current folder or the home folder.
     """
-    check_replaceable(out, force=force)
+    check_replaceable(out, force=force, kind=kind)
     ground = out.absolute().parent
     while not ground.exists() and ground != ground.parent:
         ground = ground.parent

@@ -13,6 +13,7 @@ from vico.errors import MissingFileError, SchemaError
 from vico.render import render_top_down
 from vico.render.world_scene import scene_of
 from vico.sim.recording import read_run
+from vico.sim.recording.schema import DEMO_FILM, REPLAY
 from vico.viewer.demo_film import write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.replay import write_replay
@@ -40,11 +41,11 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
         picture = _from_above(place, folder)
         report("ground picture", 1, 1)
         report("replay page", 0, 1)
-        write_replay(path / "replay.html", recording, place, picture=picture)
+        write_replay(path / REPLAY, recording, place, picture=picture)
         report("replay page", 1, 1)
         if film and recording.views:
             report("film", 0, 1)
-            write_demo_film(path / "demo.mp4", recording, place)
+            write_demo_film(path / DEMO_FILM, recording, place)
             report("film", 1, 1)
     print(path / "replay.html")
     return 0

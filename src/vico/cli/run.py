@@ -22,7 +22,7 @@ from vico.clock import seconds_of_day
 from vico.community import Community, read_community
 from vico.errors import InputError, OutputExistsError, SchemaError
 from vico.io.files import read_json
-from vico.io.folders import remove
+from vico.io.folders import check_replaceable, remove
 from vico.llm import LanguageModel, Sampling
 from vico.runner.branches import branched_run
 from vico.runner.control import Control
@@ -37,6 +37,7 @@ from vico.sim.interventions import Line, read_interventions
 from vico.sim.recorder import Recorder
 from vico.sim.recording.checkpoints import checkpoint_steps
 from vico.sim.recording.manifest import read_manifest
+from vico.sim.recording.schema import RUN_FOLDER
 from vico.sim.simulation import Simulation
 from vico.threads import use_workers, workers
 from vico.world.folder import read_world
@@ -173,7 +174,8 @@ class Job:
     ) -> Job:
         """Read what is needed, and look at what is in the output folder."""
         found = None if options.force else _cut_short(out)
-        check_output(out, world, community, force=options.force or found is not None)
+        kind = RUN_FOLDER if options.force else None
+        check_output(out, world, community, force=options.force or found is not None, kind=kind)
         place = read_world(world)
         config = SimConfig(
             seed=options.seed,
@@ -250,6 +252,7 @@ class Job:
         if goes_on:
             return self._resumed(sim, agents, every, self.out, control)
         # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
+        check_replaceable(self.out, force=True, kind=RUN_FOLDER)
         remove(self.out)
         how = self._how(every)
         how["notes"]["faults"] = faults.record()

@@ -15,7 +15,7 @@ from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
-from vico.world.stored import stage_seconds
+from vico.world.stored import WORLD_FOLDER, stage_seconds
 from vico.world.world import World
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.many import PlaceRow
@@ -40,7 +40,7 @@ def build(
 ) -> int:
     """Build a world; without a centre (latitude and longitude) around the map's middle."""
     lat, lon = centre or extract_centre(sources.osm)
-    check_output(out, *sources.files(), force=force)
+    check_output(out, *sources.files(), force=force, kind=WORLD_FOLDER)
     with progress_bars() as report:
         build_world(
             sources,
@@ -248,9 +248,9 @@ def check(path: Path, *, json: bool = False) -> int:
 
 def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool = False, json: bool = False) -> int:
     """Write a world in another format."""
-    from vico.world.exports import export_world
+    from vico.world.exports import EXPORT_FOLDER, export_world
 
-    check_output(out, path, force=force)
+    check_output(out, path, force=force, kind=EXPORT_FOLDER)
     counts = export_world(read_world(path), to, out, rooms=rooms, force=force)
     print_export(out, to, counts, json=json)
     return 0

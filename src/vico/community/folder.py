@@ -24,9 +24,9 @@ from pydantic import TypeAdapter, ValidationError
 from vico.community.authorship import Authorship
 from vico.community.model import SCHEMA, VERSION, Community, CommunityDay, CommunityManifest, Group, Relation, Resident
 from vico.community.tags import with_tags
-from vico.errors import MissingFileError, OutputExistsError, SchemaError
+from vico.errors import MissingFileError, SchemaError
 from vico.io.files import read_json, write_bytes, write_json
-from vico.io.folders import check_replaceable, new_folder
+from vico.io.folders import FolderKind, check_replaceable, new_folder
 from vico.world.folder import is_world
 from vico.world.model import Record
 from vico.world.world import World
@@ -37,7 +37,10 @@ _PARTS = ("residents.json", "groups.json", "relations.json", "days.json")
 # Version 1 had one day, and everybody came to every meeting; what version 2 adds has defaults that say so.
 _READ = (1, VERSION)
 _AUTHORSHIP = "authorship.json"
-_FILES = ("community.json", "origin.json", _AUTHORSHIP, *_PARTS)
+#: What `write_community` makes.
+COMMUNITY_FOLDER = FolderKind(
+    "community", "community.json", lambda _: ("community.json", "origin.json", _AUTHORSHIP, *_PARTS)
+)
 
 
 def _rows(records: Sequence[Record]) -> bytes:
@@ -97,13 +100,9 @@ def write_community(
         If `path` exists and `force` is not given, or holds anything but a community.
     """
     path = Path(path)
-    check_replaceable(path, force=force)
-    if path.exists() or path.is_symlink():
-        strangers = sorted(p.name for p in path.iterdir() if p.name not in _FILES) if path.is_dir() else [path.name]
-        if strangers:
-            raise OutputExistsError(f"{path}: holds {strangers[0]!r}, which no community does; choose another --out")
+    check_replaceable(path, force=force, kind=COMMUNITY_FOLDER)
     parts, manifest = _contents(community)
-    with new_folder(path, force=force) as fresh:
+    with new_folder(path, force=force, kind=COMMUNITY_FOLDER) as fresh:
         for name, content in parts.items():
             write_bytes(fresh / name, content)
         if world is not None:

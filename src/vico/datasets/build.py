@@ -14,7 +14,7 @@ from typing import Any
 
 from vico.challenges.episodes import code_digest
 from vico.datasets.card import card_of
-from vico.datasets.folder import Dataset, write_dataset_record, write_tables
+from vico.datasets.folder import DATASET_FOLDER, Dataset, write_dataset_record, write_tables
 from vico.datasets.formats.registry import FORMATS
 from vico.datasets.layout import Layout
 from vico.datasets.parts import Contents, PartEpisode, read_part
@@ -73,7 +73,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
         If `out` holds something, or cannot be written.
     """
     tasks = tasks_of(request)
-    check_replaceable(out, force=force)
+    check_replaceable(out, force=force, kind=DATASET_FOLDER)
     partial = out.with_name(f"{out.name}.partial")
     _take(partial)
     with FolderLock(partial, name=out):

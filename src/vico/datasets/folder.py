@@ -15,9 +15,12 @@ from vico.datasets.increments import Form, form_of
 from vico.datasets.layout import STATUSES, Layout
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.files import read_json, sha256_of, write_json
+from vico.io.folders import FolderKind, listed_in
 from vico.version import __version__
 
 SCHEMA, VERSION = "vico.dataset", 1
+#: What a build of a dataset makes.
+DATASET_FOLDER = FolderKind("dataset", "dataset.json", listed_in("dataset.json"))
 RECORD, EPISODES, ENTITIES = "dataset.json", "episodes.parquet", "entities.parquet"
 _EPISODE_FIELDS = {
     "frames": pa.int64(),

@@ -11,14 +11,72 @@ import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from vico.errors import OutputError, OutputExistsError, VicoError
-from vico.io.files import reason_of, write_errors
+from vico.io.files import read_json, reason_of, write_errors
 
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
+
+
+# What file managers leave in folders: nobody's work.
+_LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """A kind of folder that a verb makes, so that ``--force`` replaces nothing else.
+
+    Attributes
+    ----------
+    name
+        What to call one in errors: ``run``.
+    manifest
+        File that each of them has.
+    names
+        Returns the names that a folder of this kind may hold directly, given one with its manifest.
+    """
+
+    name: str
+    manifest: str
+    names: Callable[[Path], Collection[str]]
+
+    def require(self, folder: Path) -> None:
+        """Make sure that a folder is of this kind, with nothing of anybody else's in it, or empty.
+
+        Raises
+        ------
+        OutputExistsError
+            If it is not.
+        """
+        if folder.is_symlink() or not folder.is_dir():
+            raise OutputExistsError(f"{folder}: is no folder, and --force replaces a {self.name} alone; choose another")
+        # A file that was being written when the program was killed has the name of the manifest within its own.
+        there = {path.name for path in folder.iterdir() if not path.name.startswith(f".{self.manifest}.")} - _LITTER
+        if there and self.manifest not in there:
+            raise OutputExistsError(
+                f"{folder}: holds {min(there)!r} and no {self.manifest}, so it is no {self.name}, and --force replaces "
+                "nothing else; choose another --out, or take it away yourself"
+            )
+        if others := there - set(self.names(folder) if there else ()) - {self.manifest}:
+            raise OutputExistsError(
+                f"{folder}: holds {min(others)!r}, which no {self.name} does; --force would delete it: choose another "
+                "--out, or take it away yourself"
+            )
+
+
+def listed_in(manifest: str, key: str = "files") -> Callable[[Path], Collection[str]]:
+    """Return what finds the names directly in a folder whose manifest lists its files by relative path."""
+
+    def names(folder: Path) -> Collection[str]:
+        content = read_json(folder / manifest)
+        listed = content.get(key, ()) if isinstance(content, dict) else ()
+        return {str(name).partition("/")[0] for name in listed}
+
+    return names
 
 
 class FolderLock:
@@ -104,24 +162,33 @@ def is_being_written(folder: Path) -> bool:
     return False
 
 
-def check_replaceable(out: Path, *, force: bool) -> None:
+def check_replaceable(out: Path, *, force: bool, kind: FolderKind | None = None) -> None:
     """Make sure that an output folder may be made, or replaced.
+
+    Parameters
+    ----------
+    kind
+        What is to be made; None for folders that only this program has to do with.
 
     Raises
     ------
     OutputExistsError
-        If it holds something and `force` is not given.
+        If it holds something and `force` is not given, or something else than a folder of that kind.
     OutputError
         If another process is writing it.
     """
     if not force and (out.exists() or out.is_symlink()) and (not out.is_dir() or any(out.iterdir())):
         raise OutputExistsError(f"{out}: exists already; choose another --out, or replace it with --force")
+    if kind is not None and (out.exists() or out.is_symlink()):
+        kind.require(out)
     if is_being_written(out):
         raise OutputError(f"{out}: another process is writing it right now; stop that one, or choose another folder")
 
 
 @contextmanager
-def new_folder(out: Path, *, force: bool = False, work: Path | None = None) -> Iterator[Path]:
+def new_folder(
+    out: Path, *, force: bool = False, work: Path | None = None, kind: FolderKind | None = None
+) -> Iterator[Path]:
     """Yield a locked folder that takes the name of `out` when the block ends well.
 
     Parameters
@@ -133,16 +200,18 @@ def new_folder(out: Path, *, force: bool = False, work: Path | None = None) -> I
     work
         Neighbour of `out` to work in. It is kept when the block fails, so that work can go on there the next time,
         unless it is empty. Without, the work is done in an unnamed neighbour that goes away when the block fails.
+    kind
+        What is made; None for folders that only this program has to do with.
 
     Raises
     ------
     OutputExistsError
-        If `out` holds something and `force` is not given.
+        If `out` holds something and `force` is not given, or something else than a folder of that kind.
     OutputError
         If another process writes `out` or `work`, the disk is full, the folder is taken away while it is written, or
         rights are missing. What was at `out` is then still there.
     """
-    check_replaceable(out, force=force)
+    check_replaceable(out, force=force, kind=kind)
     made = [path for path in (*([work] if work else []), *out.parents) if not path.exists()]
     with write_errors(out):
         out.parent.mkdir(parents=True, exist_ok=True)

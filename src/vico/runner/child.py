@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from vico.agents.base import Action, Agent, Info, Observation
-from vico.agents.wrappers import usage_of
+from vico.agents.wrappers import FunctionAgent, usage_of
 from vico.errors import VicoError, sentence_of
 from vico.runner.answers import MalformedError, plain_action
 from vico.runner.given import digest_of, received_info
-from vico.runner.loading import AgentSeat, load, make_agent, source_of
+from vico.runner.loading import AgentSeat, load_agent, make_agent, source_of
 from vico.runner.watch import Watch
 from vico.runner.wire import ClosedError, packed, receive, send
 from vico.world.folder import read_world
@@ -101,7 +101,14 @@ class _Served:
             with watch.paused():
                 return PublicMap.from_world(read_world(world))
 
-        self._agent = make_agent(load(spec), AgentSeat(**message["seat"]), public_map)
+        thing = load_agent(spec)
+        # Without a seat it is only asked whether there is such an agent.
+        seat = message["seat"]
+        self._agent = FunctionAgent(_waits) if seat is None else make_agent(thing, AgentSeat(**seat), public_map)
+
+
+def _waits(observation: Observation, info: Info) -> Action:
+    return {"type": "wait"}
 
 
 def _limit_memory(megabytes: int) -> None:

@@ -53,7 +53,7 @@ class IsolatedAgent:
     spec
         ``my_module:MyAgent``, loaded in that process alone.
     seat
-        What its constructor may ask for.
+        What its constructor may ask for. None: it is loaded and not made.
     world
         Folder of the world whose public map it is given, if its constructor asks for it.
     memory
@@ -74,7 +74,10 @@ class IsolatedAgent:
         If it can't be loaded or made; the message says why.
     """
 
-    def __init__(self, spec: str, seat: AgentSeat, *, world: Path, memory: int = MEMORY, checked: bool = False) -> None:
+    def __init__(
+        self, spec: str, seat: AgentSeat | None, *, world: Path, memory: int = MEMORY, checked: bool = False
+    ) -> None:
+        name = f"agent {spec}" if seat is None else seat.name
         self.left = True
         self.tokens = 0
         self.cost = 0.0
@@ -96,7 +99,7 @@ class IsolatedAgent:
             os.close(lifeline)
         told = {
             "spec": spec,
-            "seat": asdict(seat),
+            "seat": None if seat is None else asdict(seat),
             "world": str(world.resolve()),
             "memory": memory,
             "checked": checked,
@@ -106,10 +109,10 @@ class IsolatedAgent:
             self._ask({"do": "make", **told}, _LONGEST_ANSWER)
         except UnfairError as error:
             self.close()
-            raise UnfairError(f"{seat.name}: {error}") from None
+            raise UnfairError(f"{name}: {error}") from None
         except (EndedError, AgentProcessError, SchemaError) as error:
             self.close()
-            raise InputError(f"{seat.name}: {error}") from None
+            raise InputError(str(error) if seat is None else f"{name}: {error}") from None
         self._channel.settimeout(None)
 
     def act(self, observation: Observation, info: Info) -> Action:
@@ -184,6 +187,22 @@ class IsolatedAgent:
         if why == "timed out":
             return "its process did not answer in time and was ended"
         return f"its process ended with exit status {code}"
+
+
+def check_loads(spec: str, world: Path) -> None:
+    """Make sure that an agent can be loaded, in a process of its own.
+
+    Parameters
+    ----------
+    world
+        Folder of a world that it is to take part in.
+
+    Raises
+    ------
+    InputError, UnfairError
+        If there is no such file, module or class, it can't be imported, or it is no agent.
+    """
+    IsolatedAgent(spec, None, world=world).close()
 
 
 def _has_descriptor(stream: Any) -> bool:

@@ -72,6 +72,27 @@ def load(spec: str) -> Any:
     return found
 
 
+def load_agent(spec: str) -> Any:
+    """Return what `load` finds, if an agent can be made of it.
+
+    Raises
+    ------
+    InputError, MissingFileError
+        As of `load`; also if it is a class whose objects can't act, or a thing that can't.
+    """
+    found = load(spec)
+    if not isinstance(found, type):
+        as_agent(found, name=f"agent {spec}")
+        return found
+    made_later = any(hook in vars(base) for base in found.__mro__ for hook in ("__call__", "__getattr__"))
+    if not made_later and not any(callable(getattr(found, name, None)) for name in ("act", "predict")):
+        raise InputError(
+            f"agent {spec}: {found.__name__} has neither act(observation, info) nor predict(observation); "
+            "name a class that has, or a function"
+        )
+    return found
+
+
 def source_digest(spec: str) -> str:
     """Return a hash of the file that `load` would read for a spec, without running it; "" if there is none."""
     path = source_of(spec)

@@ -27,6 +27,7 @@ from pydantic import ValidationError
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
+from vico.io.folders import FolderKind, listed_in
 from vico.version import __version__
 from vico.world import model
 from vico.world.model import Manifest
@@ -35,6 +36,8 @@ from vico.world.world import World
 
 #: Files that are no part of a world's identity.
 UNHASHED = ("world.json", "build.json", "report.html")
+#: Folder of what the stages of a build made, so that one can be run again.
+STAGES = ".stages"
 
 
 def read_stored(path: Path) -> World:
@@ -89,6 +92,10 @@ REQUIRED = (
     "meshes/prototypes.glb",
     "map.png",
 )
+
+
+#: What a build makes.
+WORLD_FOLDER = FolderKind("world", "world.json", lambda folder: {*listed_in("world.json")(folder), *UNHASHED, STAGES})
 
 
 def world_files(folder: Path) -> list[str]:

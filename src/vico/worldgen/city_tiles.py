@@ -21,12 +21,12 @@ from vico.world.glb import write_glb
 from vico.world.mesh import Surface, joined
 from vico.world.model import Building
 from vico.world.moving import Shift
-from vico.world.stored import read_stored, seal, stage_seconds
+from vico.world.stored import STAGES, read_stored, seal, stage_seconds
 from vico.world.world import World
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import LEVELS, SHAPE
 from vico.worldgen.evidence import Evidence, gather
-from vico.worldgen.pipeline import OF_A_CITY, STAGES, build_requested
+from vico.worldgen.pipeline import OF_A_CITY, build_requested
 from vico.worldgen.previews.stage import write_map
 from vico.worldgen.product import digest_of, read_head
 from vico.worldgen.seams.border_fit import conformed

@@ -18,10 +18,10 @@ import osmium
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.osm import checked_extract
 from vico.io.files import read_json, write_json
-from vico.io.folders import FolderLock, check_replaceable, folder_errors, new_folder, remove
+from vico.io.folders import FolderKind, FolderLock, check_replaceable, folder_errors, new_folder, remove
 from vico.world.folder import read_world
 from vico.world.model import Manifest
-from vico.world.stored import seal
+from vico.world.stored import STAGES, WORLD_FOLDER, seal
 from vico.worldgen.ahead import Ahead
 from vico.worldgen.evidence import gather
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
@@ -33,7 +33,6 @@ from vico.worldgen.shaping import map_of
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress, Stages
 
-STAGES = ".stages"
 #: Files that a tile lacks: its streets are its city's, and only that has them as OpenDRIVE.
 OF_A_CITY = ("roads.xodr",)
 _REQUEST = "request.json"
@@ -117,10 +116,10 @@ def build_world(
         raise InputError(f"radius: {half:g} m; it must lie within {_LEAST_RADIUS:g}..{_MOST_RADIUS:g} m")
     if seed < 0:
         raise InputError(f"seed: {seed}; it must not be negative")
-    check_replaceable(out, force=force)
+    check_replaceable(out, force=force, kind=WORLD_FOLDER)
     half = math.ceil(half * 2) / 2  # a whole number of cells
     request = WorldRequest(sources, lat, lon, half, seed, options.texturing, options.author, options.previews)
-    return _build(request, out, options)
+    return _build(request, out, options, WORLD_FOLDER)
 
 
 def rebuild_world(
@@ -158,7 +157,7 @@ def rebuild_world(
     with folder_errors(partial, name=Path(path)):
         shutil.copytree(kept, partial / STAGES, copy_function=os.link)
     request = WorldRequest.from_json(content, author=author)
-    return _build(request, world.path or Path(path), BuildOptions(again=again, progress=progress))
+    return _build(request, world.path or Path(path), BuildOptions(again=again, progress=progress), WORLD_FOLDER)
 
 
 def build_requested(request: WorldRequest, out: Path) -> Manifest:
@@ -166,12 +165,12 @@ def build_requested(request: WorldRequest, out: Path) -> Manifest:
     return _build(request, out, _DEFAULTS)
 
 
-def _build(request: WorldRequest, out: Path, options: BuildOptions) -> Manifest:
+def _build(request: WorldRequest, out: Path, options: BuildOptions, kind: FolderKind | None = None) -> Manifest:
     """Run all stages into a neighbour folder of `out`, and put that in its place."""
     if request.sources.tiles or request.sources.photos:
         request.texturing.require_extras()
     folder = out.with_name(f"{out.name}.partial")
-    with new_folder(out, force=True, work=folder):
+    with new_folder(out, force=True, work=folder, kind=kind):
         planned, part = (None, None) if request.place is None else (request.place.own, map_of(request.place))
         stages = Stages(folder / STAGES, again=options.again, progress=options.progress, beside=planned)
         evidence = gather(request.sources, request.frame, request.reach, stages, part=part)

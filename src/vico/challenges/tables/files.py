@@ -18,6 +18,7 @@ from vico.challenges.tables.published import Published
 from vico.challenges.tables.summary import Summary, summarise
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_bytes, write_json
+from vico.io.folders import FolderKind
 from vico.version import __version__
 
 SCHEMA = "vico.results"
@@ -70,6 +71,12 @@ def timing_content(outcomes: Sequence[Outcome]) -> dict[str, Any]:
             if o.record is not None
         ],
     }
+
+
+#: What an evaluation makes, in which its episodes lie.
+EVALUATION_FOLDER = FolderKind(
+    "evaluation", "results.json", lambda _: ("results.md", "timing.json", "episodes", "tasks", "runs")
+)
 
 
 def write_results(

@@ -9,6 +9,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from vico.io.folders import FolderKind
+
 SCHEMA = "vico.run"
 VERSION = 2
 
@@ -24,6 +26,10 @@ SETUP, SETUP_SHAPES = "setup.json", "setup.glb"
 SEGMENTS = "segments"
 CHECKPOINTS = "checkpoints"
 VIEWS = "views"
+#: What of a run's folder replays and films make beside the recording, unless they are told where to.
+REPLAY, DEMO_FILM = "replay.html", "demo.mp4"
+_NAMES = (MANIFEST, AGENTS, CAST, METRICS, COMMUNITY, SETUP, SETUP_SHAPES, SEGMENTS, CHECKPOINTS, VIEWS)
+RUN_FOLDER = FolderKind("run", MANIFEST, lambda _: (*_NAMES, REPLAY, DEMO_FILM))
 
 
 class Column(NamedTuple):

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from vico.errors import InputError
 from vico.io.files import write_bytes, write_json
-from vico.io.folders import new_folder
+from vico.io.folders import FolderKind, listed_in, new_folder
+from vico.version import __version__
 from vico.world.city import City
 from vico.world.city_world import CityWorld
 from vico.world.exports.geojson import write_geojson
@@ -19,6 +20,10 @@ from vico.world.exports.usd import write_usd
 from vico.world.world import World
 
 Writer = Callable[..., dict[str, int]]
+
+#: Lists what an export wrote.
+EXPORT_MANIFEST = "export.json"
+EXPORT_FOLDER = FolderKind("export", EXPORT_MANIFEST, listed_in(EXPORT_MANIFEST))
 
 
 def _write_xodr(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
@@ -120,8 +125,10 @@ def export_city(city: City, to: str, out: Path, *, rooms: bool = False, force: b
 def _export_folder(to: str, out: Path, *, force: bool) -> Iterator[Path]:
     if to not in FORMATS:
         raise InputError(f"export: no format {to!r}; there are {', '.join(FORMATS)}")
-    with new_folder(Path(out), force=force) as folder:
+    with new_folder(Path(out), force=force, kind=EXPORT_FOLDER) as folder:
         yield folder
+        files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+        write_json(folder / EXPORT_MANIFEST, {"format": to, "producer": f"vico {__version__}", "files": files})
 
 
 def _write_credits(world: World, folder: Path) -> None:

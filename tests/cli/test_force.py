@@ -1,0 +1,109 @@
+"""`--force` replaces what the same verb made, and nothing else."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from command_line import vico
+from vico.challenges.tables.files import EVALUATION_FOLDER
+from vico.cli.demo import EVENING
+from vico.community.folder import COMMUNITY_FOLDER
+from vico.datasets.folder import DATASET_FOLDER
+from vico.errors import OutputExistsError
+from vico.io.folders import FolderKind
+from vico.sim.recording.schema import RUN_FOLDER
+from vico.world.exports import EXPORT_FOLDER
+from vico.world.stored import WORLD_FOLDER
+
+Words = list[object]
+
+
+@pytest.fixture
+def verbs(corner_path: Path, helsinki_people: Path, helsinki_path: Path, tmp_path: Path) -> dict[str, Words]:
+    """A command for every verb that makes a folder, without its output."""
+    table = tmp_path / "places.csv"
+    table.write_text("name,lat,lon\nhere,60.17,24.94\n")
+    return {
+        "world build": ["world", "build", "--radius", 60, "--lat", 60.169, "--lon", 24.9435],
+        "community build": ["community", "build", helsinki_path, "--residents", 2],
+        "community day": ["community", "day", helsinki_people, "--day", "monday"],
+        "run": [
+            "run",
+            helsinki_path,
+            helsinki_people,
+            "--steps",
+            1,
+            "--observe",
+            "none",
+            "--cars",
+            0,
+            "--pedestrians",
+            0,
+            "--robots",
+            "none",
+        ],
+        "export": ["export", corner_path, "--to", "geojson"],
+        "dataset build": ["dataset", "build", "--runs", corner_path, "--to", "webdataset"],
+        "eval": ["eval", "commute", "--worlds", corner_path, "--method", "rule"],
+    }
+
+
+@pytest.mark.parametrize(
+    "name", ["world build", "community build", "community day", "run", "export", "dataset build", "eval"]
+)
+def test_a_folder_of_ones_own_survives_force(
+    name: str, verbs: dict[str, Words], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    thesis = tmp_path / "thesis"
+    thesis.mkdir()
+    (thesis / "chapter.tex").write_text("years of work")
+    assert vico(*verbs[name], "--out", thesis, "--force") == 2
+    assert "chapter.tex" in capsys.readouterr().err
+    assert (thesis / "chapter.tex").read_text() == "years of work"
+
+
+def test_a_run_is_replaced_but_not_with_what_else_lies_in_it(
+    verbs: dict[str, Words], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert vico(*verbs["run"], "--out", out) == 0
+    assert vico(*verbs["run"], "--out", out, "--force") == 0
+    (out / "notes.txt").write_text("look at step 3")
+    capsys.readouterr()
+    assert vico(*verbs["run"], "--out", out, "--force") == 2
+    assert "holds 'notes.txt', which no run does" in capsys.readouterr().err
+    assert (out / "notes.txt").exists()
+
+
+def test_an_export_is_replaced_and_a_world_is_not_by_an_export(
+    verbs: dict[str, Words], corner_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "export"
+    assert vico(*verbs["export"], "--out", out) == 0
+    assert vico(*verbs["export"], "--out", out, "--force") == 0
+    world = shutil.copytree(corner_path, tmp_path / "world")
+    assert vico(*verbs["export"], "--out", world, "--force") == 2
+    assert (world / "world.json").exists()
+
+
+@pytest.mark.parametrize(
+    "kind", [WORLD_FOLDER, COMMUNITY_FOLDER, RUN_FOLDER, EVENING, DATASET_FOLDER, EXPORT_FOLDER, EVALUATION_FOLDER]
+)
+def test_every_kind_takes_an_empty_folder_and_no_file(kind: FolderKind, tmp_path: Path) -> None:
+    kind.require(tmp_path)
+    (tmp_path / "letter").write_text("dear")
+    with pytest.raises(OutputExistsError, match="letter"):
+        kind.require(tmp_path)
+    with pytest.raises(OutputExistsError, match="is no folder"):
+        kind.require(tmp_path / "letter")
+
+
+def test_folders_as_they_are_made_are_of_their_kinds(
+    corner_path: Path, helsinki_people: Path, helsinki_run: tuple[Path, dict[str, object]]
+) -> None:
+    WORLD_FOLDER.require(corner_path)
+    COMMUNITY_FOLDER.require(helsinki_people)
+    RUN_FOLDER.require(helsinki_run[0])
