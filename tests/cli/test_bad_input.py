@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from command_line import vico
+from vico.community import read_community
 from vico.worldgen.packaged import packaged_extract
 
 EMPTY_MAP = """<?xml version="1.0"?>
@@ -327,3 +328,15 @@ def test_a_language_model_that_is_not_named_is_said_before_anything_is_built(
     said = refused(capsys, "world", "build", *HERE, "--radius", 60, "--layout-llm", "--out", tmp_path / "w")
     assert "set VICO_LLM_BASE_URL" in said
     assert contents(tmp_path) == []
+
+
+def test_a_run_on_another_day_than_its_communitys_says_so(
+    helsinki_path: Path, helsinki_people: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    day = read_community(helsinki_people).date
+    words = ["run", helsinki_path, helsinki_people, "--steps", 1, "--observe", "none", "--robots", "none"]
+    words += ["--cars", 0, "--pedestrians", 0]
+    assert vico(*words, "--out", tmp_path / "own") == 0
+    assert "schedules are of" not in capsys.readouterr().err
+    assert vico(*words, "--date", "2026-12-24", "--out", tmp_path / "other") == 0
+    assert f"its schedules are of {day:%A} {day}; the run is on 2026-12-24" in capsys.readouterr().err

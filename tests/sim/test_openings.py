@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import toy_city
-from vico.sim.config import SimConfig
+from vico.sim.config import NO_DAY, SimConfig
 from vico.sim.simulation import Simulation
 from vico.world.world import World
 
@@ -51,3 +52,11 @@ def test_who_is_in_at_closing_time_is_told() -> None:
     for _ in range(6):
         sim.step({})
     assert sim.observe()[1]["assistant_0"]["closed_now"] == [toy_city.SHOP]
+
+
+def test_a_run_is_on_the_communitys_day_unless_it_is_told_another() -> None:
+    world, people = toy_city.world(), toy_city.community()
+    bare = SimConfig(observe=(), transit=False)
+    assert Simulation(world, people, bare).config.date == people.date.isoformat()
+    assert Simulation(world, people, replace(bare, date="2026-12-24")).config.date == "2026-12-24"
+    assert Simulation(world, None, bare).config.date == NO_DAY.isoformat()

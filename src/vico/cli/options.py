@@ -257,7 +257,7 @@ class RunOptions:
     start
         Time of day, HH:MM or HH:MM:SS.
     date
-        Of the first day, YYYY-MM-DD.
+        Of the first day, YYYY-MM-DD; the community's day unless given.
     utc_offset
         Hours that clocks are ahead of UTC there; without it, as the time zone of 15 degrees the world lies in.
     weather
@@ -346,7 +346,7 @@ class RunOptions:
     out: Path | None = None
     resume: Path | None = None
     start: str = "08:00"
-    date: str = "2026-06-21"
+    date: str | None = None
     utc_offset: float | None = None
     weather: str = "fair"
     events: str = "none"

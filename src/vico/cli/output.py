@@ -91,7 +91,7 @@ def check_output(out: Path, *inputs: Path, force: bool, kind: FolderKind | None 
     InputError
         If nothing can be written there; or if `force` would delete an input, the current folder or the home folder.
     """
-    check_replaceable(out, force=force, kind=kind)
+    check_replaceable(out, force=force)
     ground = out.absolute().parent
     while not ground.exists() and ground != ground.parent:
         ground = ground.parent
@@ -103,6 +103,7 @@ def check_output(out: Path, *inputs: Path, force: bool, kind: FolderKind | None 
     for kept in (*inputs, Path.cwd(), Path.home()):
         if kept.resolve().is_relative_to(folder):
             raise InputError(f"--out {out}: holds {kept}, which --force would delete; choose another folder")
+    check_replaceable(out, force=force, kind=kind)
 
 
 def print_json(content: Any) -> None:

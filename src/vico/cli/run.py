@@ -206,6 +206,12 @@ class Job:
             periods={} if played is None else {played.agent: PERIOD},
         )
         people = read_community(community, place)
+        if options.date is not None and config.on_day(None).date != people.date.isoformat():
+            print(
+                f"{community}: its schedules are of {people.weekday} {people.date}; the run is on {options.date}, as "
+                "--date says",
+                file=sys.stderr,
+            )
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
         return cls(options, out, place, people, config, sources, found, talk, played)
 

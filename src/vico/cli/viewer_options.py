@@ -33,7 +33,7 @@ class LiveOptions:
     start
         Time of day, HH:MM or HH:MM:SS.
     date
-        Of the first day, YYYY-MM-DD.
+        Of the first day, YYYY-MM-DD; the community's day unless given.
     weather
         A kind of weather, "changing", or a weather file (.json).
     events
@@ -63,7 +63,7 @@ class LiveOptions:
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     assistants: int = 0
     start: str = "08:00"
-    date: str = "2026-06-21"
+    date: str | None = None
     weather: str = "fair"
     events: str = "none"
     steps: int = 86_400
@@ -108,7 +108,7 @@ class PlayOptions:
     start
         Time of day, HH:MM or HH:MM:SS.
     date
-        Of the first day, YYYY-MM-DD.
+        Of the first day, YYYY-MM-DD; the community's day unless given.
     weather
         A kind of weather, "changing", or a weather file (.json).
     seconds
@@ -133,7 +133,7 @@ class PlayOptions:
     out: Path | None = None
     robots: CommaSeparated = "none"
     start: str = "08:00"
-    date: str = "2026-06-21"
+    date: str | None = None
     weather: str = "fair"
     seconds: int = 36_000
     cars: int = 30

@@ -43,7 +43,7 @@ class EnvOptions(TypedDict, total=False):
     worn: Mapping[str, str]
     quality: str | Mapping[str, bool]
     renderer: str
-    date: str
+    date: str | None
     utc_offset: float | None
     weather: str | Mapping[str, Any]
     events: str | Mapping[str, Any]

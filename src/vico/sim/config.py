@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from datetime import date as Date
 from typing import Any
 
 from vico.clock import DAY
@@ -13,6 +14,9 @@ from vico.render.quality import RenderQuality
 from vico.render.sensors.batch import RENDERERS, USUAL_OUTPUTS, checked_outputs
 from vico.render.sensors.lens import Lens
 from vico.sim.traffic.junction_rule import JunctionRule
+
+#: The day of runs whose world is without a community: midsummer, with light from early on.
+NO_DAY = Date(2026, 6, 21)
 
 #: As `vico.sim.physics.factory` has them, which is slow to import.
 PHYSICS_ENGINES = ("mujoco", "genesis")
@@ -74,7 +78,7 @@ class SimSettings:
         Of cities: gigabytes that the scenes of all who look may take, or the least that one takes; others are made anew
         when somebody looks from there again. Decides nothing else.
     date
-        On which the first day is, YYYY-MM-DD.
+        On which the first day is, YYYY-MM-DD; None: the community's day, or `NO_DAY` where nobody has a schedule.
     utc_offset
         Hours that clocks are ahead of UTC there; None: as the time zone of 15 degrees the world lies in.
     weather
@@ -111,7 +115,7 @@ class SimSettings:
     quality: str | Mapping[str, bool] = "plain"
     renderer: str = "cpu"
     memory: float = 2.0
-    date: str = "2026-06-21"
+    date: str | None = None
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
     events: str | Mapping[str, Any] = "none"
@@ -133,6 +137,10 @@ class SimConfig(SimSettings):
 
     start: int = 8 * 3600
     observe: tuple[str, ...] | None = None
+
+    def on_day(self, day: Date | None) -> SimConfig:
+        """Return the configuration with a date: its own, else a community's day, else `NO_DAY`."""
+        return self if self.date is not None else replace(self, date=(day or NO_DAY).isoformat())
 
     def __post_init__(self) -> None:
         for name in ("seed", "assistants", "cars", "cyclists", "pedestrians", "residents"):

@@ -14,7 +14,7 @@ from vico.sim.appointments import Appointment
 from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
-from vico.sim.config import SimConfig
+from vico.sim.config import NO_DAY, SimConfig
 from vico.sim.environment import Agenda, Environment, Sky
 from vico.sim.events import Events
 from vico.sim.holding import habit_of, take_umbrella
@@ -60,7 +60,7 @@ def initial_state(
     state.lines = Lines.of(len(people))
     if config.opening_hours:
         origin = base.world.manifest.origin
-        opened = day or date.fromisoformat(config.date)
+        opened = day or state.environment.sky.first_day
         state.openings = OpeningHours(base.world.places, opened, (origin.lat, origin.lon), residents, days)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
@@ -87,7 +87,7 @@ def initial_state(
 
 def _environment(base: SimulationBase, config: SimConfig) -> Environment:
     origin = base.world.manifest.origin
-    sky = Sky.over(origin.lat, origin.lon, config.date, config.utc_offset)
+    sky = Sky.over(origin.lat, origin.lon, config.date or NO_DAY.isoformat(), config.utc_offset)
     second = float(config.start)
     agenda = Agenda(base.event_sites, config.events, seed=config.seed, second=second)
     return Environment(sky, config.weather, seed=config.seed, second=second, agenda=agenda)

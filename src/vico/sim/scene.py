@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from datetime import date
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -116,7 +115,7 @@ class SceneRenderer:
 
     def _attach(self, sim: RenderedSimulation) -> None:
         self._sim, part = sim, self._part
-        self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date), part)
+        self._room_lamps = RoomLamps(sim.world, sim.state.environment.sky.first_day, part)
         self._window_lights = WindowLights(sim.world, sim.residents, self._room_lamps, part)
         self._lit: tuple[float, ...] = ()
         self.wait()

@@ -129,12 +129,12 @@ class Simulation:
         self.world = world
         self.defer_pictures = defer_pictures
         self.community = community
-        self.config = config or SimConfig()
+        day = None if community is None else community.date
+        self.config = (config or SimConfig()).on_day(day)
         self.metrics = Metrics()
         self.residents = list(community.residents)[: self.config.residents] if community is not None else []
         days = self.base.days(community)[: len(self.residents)] if community is not None else []
-        date = None if community is None else community.date
-        self.state = initial_state(self.base, self.residents, days, self.config, date)
+        self.state = initial_state(self.base, self.residents, days, self.config, day)
         self._dressed_for = self.state.environment.weather
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
