@@ -340,3 +340,8 @@ def test_a_run_on_another_day_than_its_communitys_says_so(
     assert "schedules are of" not in capsys.readouterr().err
     assert vico(*words, "--date", "2026-12-24", "--out", tmp_path / "other") == 0
     assert f"its schedules are of {day:%A} {day}; the run is on 2026-12-24" in capsys.readouterr().err
+
+
+def test_a_world_built_without_heights_says_that_it_is_flat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert vico("world", "build", "--radius", 60, "--lat", 60.169, "--lon", 24.9435, "--out", tmp_path / "w") == 0
+    assert "the ground is flat: no source tells its heights" in capsys.readouterr().err

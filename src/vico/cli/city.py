@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from itertools import chain
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from vico.cli.output import check_output, print_export, print_json, print_table,
 from vico.errors import InputError
 from vico.world.city import read_city
 from vico.world.city_world import CityWorld
+from vico.world.model import FLAT_GROUND
 
 
 def build(options: CityBuildOptions) -> int:
@@ -38,6 +40,8 @@ def build(options: CityBuildOptions) -> int:
     with progress_bars() as report:
         city = build_city(request, workers=options.workers or os.cpu_count() or 1, ray=options.ray, progress=report)
     info(options.out, json=options.json)
+    if not options.dem:
+        print(f"{options.out}: {FLAT_GROUND}", file=sys.stderr)
     return 1 if city.manifest.failed else 0
 
 

@@ -15,6 +15,7 @@ from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
+from vico.world.model import FLAT_GROUND
 from vico.world.stored import WORLD_FOLDER, stage_seconds
 from vico.world.world import World
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
@@ -54,7 +55,10 @@ def build(
         )
     if options.author is not None:
         print(f"language model: {options.author.model.budget.spent}", file=sys.stderr)
-    return info(out, json=json)
+    code = info(out, json=json)
+    if read_world(out).manifest.is_flat:
+        print(f"{out}: {FLAT_GROUND}", file=sys.stderr)
+    return code
 
 
 def build_as_asked(options: WorldBuildOptions) -> int:
@@ -180,6 +184,7 @@ def build_table(
     else:
         for o in outcomes:
             what = o.reason or f"{o.buildings} buildings, {o.places} places, {o.seconds:.1f} s"
+            what += "; flat, no --dem" if o.flat else ""
             print(f"{o.name}: {o.state}: {what}")
     return 1 if failed else 0
 

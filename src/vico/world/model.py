@@ -79,6 +79,10 @@ TRIED = "tried"
 """Among a stage's counts, where it left something out: of how many objects it was to make something."""
 
 
+#: What a build says where no source told the heights of its ground.
+FLAT_GROUND = "the ground is flat: no source tells its heights; give an elevation model (GeoTIFF, .hgt) with --dem"
+
+
 class Dropped(Record):
     """Something the input had and the world has not, with the reason."""
 
@@ -120,6 +124,11 @@ class Manifest(Record):
     counts: dict[str, int]
     places_by_type: dict[str, int]
     files: dict[str, str]
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether no source told the heights of the ground."""
+        return any(stage.counts.get("flat", 0) > 0 for stage in self.stages if stage.name == "terrain")
 
 
 class BuildingSources(Record):

@@ -54,6 +54,7 @@ class Outcome:
     places: int = 0
     seconds: float = 0.0
     reason: str = ""
+    flat: bool = False
 
 
 Locate = Callable[[float, float, float], Path]
@@ -241,7 +242,8 @@ def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Ou
             counts, seconds = world.manifest.counts, sum(stage_seconds(world).values())
     except (VicoError, OSError) as error:
         return Outcome(row.name, "failed", reason=str(error))
-    return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2))
+    flat = world.manifest.is_flat
+    return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2), flat=flat)
 
 
 def _kept(row: PlaceRow, store: Store) -> Outcome:

@@ -16,7 +16,7 @@ from vico.world.heights import HeightField
 from vico.world.lane_reader import read_lanes
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
-from vico.world.model import Building, Dropped, Entrance, Manifest, Origin, Place, Room, Source
+from vico.world.model import FLAT_GROUND, Building, Dropped, Entrance, Manifest, Origin, Place, Room, Source
 from vico.world.objects import Objects, write_objects
 from vico.world.records import write_record, write_records, write_terrain
 from vico.world.street_model import ParkingSpot, Road, Roads
@@ -108,7 +108,8 @@ class WorldWriter:
     def terrain(self, height: HeightField, *, flat: bool) -> None:
         """Write the graded ground; `flat` says that nothing told its heights."""
         write_terrain(self.folder / "terrain.npz", height)
-        self._stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(flat)})
+        told = [Dropped(id="terrain", reason=FLAT_GROUND)] if flat else []
+        self._stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(flat)}, told)
 
     def streets(self, roads: Roads, network: RoadNetwork) -> LaneGraph:
         """Write the road database and the lane-level network, and return the network's lanes."""
