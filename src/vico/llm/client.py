@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -18,13 +18,17 @@ from vico.llm.endpoint import Endpoint
 from vico.llm.messages import Message, checked, tokens_of, user
 from vico.llm.prompts import data_block
 from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
-from vico.llm.replies import Check, instruction, plain, read, response_format
+from vico.llm.replies import Check, instruction, plain, read, response_format, said_in
 from vico.llm.transport import Connection, RequestError, post
 
 T = TypeVar("T", bound=BaseModel)
 
 _REFUSED = (400, 415, 422, 501)  # may be meant for a part of the request that we can do without
+_FAILED = 500  # may be meant for a schema
+# Parts of a request that can be left out, the likeliest to be refused first.
+_PARTS = ("response_format", "seed", "temperature", "max_tokens")
 _MOST_QUOTED = 20_000  # characters of a bad reply that are shown to the model again
+_THOUGHT_TOO_LONG = "the reply is empty: the model thought up to its limit; think less, or allow more tokens"
 _CUT = "the reply breaks off because it is too long: say it with fewer words and numbers"
 
 
@@ -155,7 +159,7 @@ class LanguageModel:
         """Ask for a record.
 
         The record's JSON Schema goes along as ``response_format``; a server that refuses it gets the schema in words,
-        and the first fitting JSON object in its reply is taken. A reply that is no such record goes back with what is
+        and the last fitting JSON object in its reply is taken. A reply that is no such record goes back with what is
         wrong, field by field.
 
         Parameters
@@ -207,7 +211,9 @@ class LanguageModel:
                 if self._cache is not None and self._replay is None:
                     self._cache.keep(self._cache.place(self.endpoint, self._whole(said, reply)), answer.text)
                 return Reply(found.value, used, attempt)
-            findings = [_CUT, *found.findings] if answer.finish == "length" else found.findings
+            findings = found.findings
+            if answer.finish == "length":
+                findings = [_CUT if answer.text.strip() else _THOUGHT_TOO_LONG, *findings]
             turns = [*said, *self._repair(answer.text, findings, reply)]
         more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
         what = f"no usable reply in {rounds + 1}; the last: {findings[0]}{more}"
@@ -284,8 +290,8 @@ class LanguageModel:
                 answer = self._read_answer(self._sent(request), tokens_of(turns))
                 break
             except RequestError as error:
-                part = self._to_leave_out(error, request, reply)
-                if part is None or part in tried:
+                part = self._to_leave_out(error, request, reply, tried)
+                if part is None:
                     self._forget(tried)
                     raise error.for_people(self.endpoint) from None
                 tried.add(part)
@@ -303,26 +309,44 @@ class LanguageModel:
         with self._lock:
             self._refused -= tried
 
-    def _to_leave_out(self, error: RequestError, request: Mapping[str, Any], reply: type[BaseModel]) -> str | None:
-        """Which part of a refused request to do without, or None."""
-        if error.status not in _REFUSED or error.parameter.startswith("messages"):
+    def _to_leave_out(
+        self, error: RequestError, request: Mapping[str, Any], reply: type[BaseModel], tried: Collection[str]
+    ) -> str | None:
+        """Which part of a refused request to do without, that was not tried yet, or None."""
+        if error.status == _FAILED:  # llama.cpp and others fail at a schema that they can't enforce
+            return part if "response_format" in request and (part := self._part(reply)) not in tried else None
+        if error.status not in _REFUSED:
             return None
-        for name in ("temperature", "seed", "max_tokens"):
-            if name in request and (error.parameter == name or f"'{name}'" in str(error)):
-                return name
-        return self._part(reply) if "response_format" in request else None
+        if error.parameter.startswith("messages"):
+            return None
+        named = [name for name in _PARTS if error.names(name) and name in request]
+        # Where nothing is named, it is guessed: schemas are refused most often.
+        for name in (*named, *(() if named else _PARTS)):
+            part = self._part(reply) if name == "response_format" else name
+            if name in request and part not in tried:
+                return part
+        return None
 
     def _sent(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to a request that is sent as often as it takes."""
         how = self.connection
+        failed = 0
+
+        def send() -> dict[str, Any]:
+            nonlocal failed
+            try:
+                return (how.transport or post)(self.endpoint, request, how.timeout)
+            except RequestError as error:
+                if error.status == _FAILED and "response_format" in request:
+                    # It may be the schema: then no waiting helps. Without such a word it is tried twice.
+                    failed += 1
+                    error.transient = failed < 2 and not error.names("response_format")
+                raise
+
         try:
-            return with_retries(
-                lambda: (how.transport or post)(self.endpoint, request, how.timeout),
-                backoff=Backoff(how.retries),
-                sleep=how.sleep,
-            )
+            return with_retries(send, backoff=Backoff(how.retries), sleep=how.sleep)
         except RequestError as error:
-            if not error.transient and error.status in _REFUSED:
+            if error.status in (*_REFUSED, _FAILED):
                 raise
             raise error.for_people(self.endpoint) from None
 
@@ -331,14 +355,14 @@ class LanguageModel:
         choices = content.get("choices")
         choice = choices[0] if isinstance(choices, list) and choices else None
         message = choice.get("message") if isinstance(choice, dict) else None
+        if isinstance(choice, dict) and message is None and isinstance(choice.get("text"), str):
+            message = {"content": choice["text"]}  # the older protocol of plain completions
         if not isinstance(choice, dict) or not isinstance(message, dict):
             raise RequestError("its answer is no chat completion: is VICO_LLM_BASE_URL the address up to /v1?")
-        text = message.get("content")
-        if isinstance(text, list):  # parts, as some servers send them
-            text = "".join(str(p.get("text", "")) for p in text if isinstance(p, dict) and p.get("type") == "text")
-        text = text.encode("utf-8", "replace").decode() if isinstance(text, str) else ""  # lone surrogates
         finish = str(choice.get("finish_reason") or "")
-        refusal = plain(str(message.get("refusal") or ("filtered" if finish == "content_filter" else "")))
+        text = said_in(message, finish)
+        refused = message.get("refusal") if not text.strip() else None
+        refusal = plain(str(refused or ("filtered" if finish == "content_filter" else "")))
         counted = content.get("usage")
         counted = counted if isinstance(counted, dict) else {}
         usage = Usage(

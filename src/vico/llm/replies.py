@@ -5,12 +5,15 @@ A reply is untrusted input: it is parsed as JSON, checked strictly, and nothing 
 
 from __future__ import annotations
 
+import difflib
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
+
+from vico.llm.thoughts import ends_in_an_object, without_thoughts
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -21,6 +24,11 @@ MOST_CHARACTERS = 1 << 20
 _MOST_FINDINGS = 12
 _MOST_OBJECTS = 20
 _MOST_BRACES = 200
+_MOST_MENDINGS = 3
+_NUMERAL = re.compile(r"[-+]?\d{1,15}(?:\.\d{1,15})?")
+# Fields of a call of a tool, in the forms that models write as text.
+_ARGUMENTS = frozenset({"arguments", "parameters", "input"})
+_CALL = _ARGUMENTS | {"name", "type", "id", "function", "tool_name"}
 # Keywords that services with enforced schemas refuse, or that only describe; the records are checked in full anyway.
 _LEFT_OUT = ("title", "default", "examples", "minLength", "maxLength", "uniqueItems", "discriminator")
 
@@ -80,36 +88,171 @@ def instruction(reply: type[BaseModel]) -> str:
     return f"Reply with one JSON object and nothing else. It has to keep to this JSON Schema:\n{schema}"
 
 
+def said_in(message: Mapping[str, Any], finish: str) -> str:
+    """Return what a message of the protocol says, wherever its server puts that.
+
+    Parameters
+    ----------
+    message
+        Of a choice. Its content is text or parts; a server that was given a schema may answer by calling a tool, and
+        one that parses thoughts may put the whole answer among them.
+    finish
+        Why the model stopped: what was cut off among the thoughts is no answer.
+    """
+    content = message.get("content")
+    if isinstance(content, list):
+        content = "".join(str(part.get("text", "")) for part in content if _is_said(part))
+    if isinstance(content, dict):
+        content = json.dumps(content)
+    said = content if isinstance(content, str) else ""
+    if not said.strip():
+        calls = message.get("tool_calls")
+        call = calls[-1] if isinstance(calls, list) and calls else {"function": message.get("function_call")}
+        function = call.get("function") if isinstance(call, dict) else None
+        arguments = function.get("arguments") if isinstance(function, dict) else None
+        said = (
+            json.dumps(arguments) if isinstance(arguments, dict) else arguments if isinstance(arguments, str) else said
+        )
+    if not said.strip() and finish != "length":
+        thoughts = message.get("reasoning_content") or message.get("reasoning")
+        if isinstance(thoughts, str) and ends_in_an_object(thoughts):
+            said = thoughts
+    return said.encode("utf-8", "replace").decode()  # lone surrogates
+
+
+def _is_said(part: Any) -> bool:
+    """Whether a part of a content is what is said: not a thought, a picture or a call."""
+    return isinstance(part, dict) and part.get("type", "text") in ("text", "output_text") and not part.get("thought")
+
+
 def read(text: str, reply: type[T], check: Check[T] | None) -> Read[T]:
     """Read a record out of a reply, whatever is said around it.
+
+    What is marked as thought is cut. Numbers that are written as text, fields that the record does not have, and an
+    envelope of one field around it are taken where the meaning is plain.
 
     Returns
     -------
     Read
-        The first JSON object that is such a record; else what is wrong with the largest there is, at most twelve
-        findings, each with the path of the field.
+        The last JSON object that is such a record, if `check` accepts it; else what is wrong with it, or with the
+        largest there is: at most twelve findings, each with the path of the field.
     """
     if len(text) > MOST_CHARACTERS:
         return Read(None, [f"the reply has {len(text):,} characters; at most {MOST_CHARACTERS:,} are read"])
-    said = text.rpartition("</think>")[2]
+    whole = text.strip()
+    # A reply that is an object and nothing else has no thoughts around it, whatever words are in it.
+    said = text if whole.startswith("{") and _is_json(whole) else without_thoughts(text)
     objects, broken = _objects(said)
     findings: list[str] = []
     worst = -1
-    for content in objects:
-        try:
-            value = reply.model_validate_json(content, strict=True)
-        except ValidationError as error:
-            wrong = [_finding(one) for one in error.errors(include_url=False, include_input=False)]
-        else:
+    for content in reversed(objects):
+        value, wrong = _record(content, reply)
+        if value is not None:
             wrong = list(check(value)) if check is not None else []
-            if not wrong:
-                return Read(value, [])
+            # An object that comes before the answer is a draft: it is not taken where the answer is refused.
+            return Read(None, [plain(one) for one in wrong[:_MOST_FINDINGS]]) if wrong else Read(value, [])
         if len(content) > worst:
             worst, findings = len(content), wrong
     if broken is not None and 2 * worst < len(said):
         # What could be read are parts of the broken object, and their faults would lead astray.
         findings = [broken]
-    return Read(None, [plain(one) for one in findings[:_MOST_FINDINGS]] or ["the reply holds no JSON object"])
+    nothing = "the reply holds no JSON object" if said.strip() or not whole else "the reply is thought and no answer"
+    return Read(None, [plain(one) for one in findings[:_MOST_FINDINGS]] or [nothing])
+
+
+def _is_json(text: str) -> bool:
+    try:
+        json.loads(text)
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def _record(content: str, reply: type[T]) -> tuple[T | None, list[str]]:
+    """Return the record that an object is, or holds as its only matter; and what is wrong with the object itself."""
+    value, wrong = _plainly(content, reply)
+    if value is not None:
+        return value, []
+    inner = _enveloped(json.loads(content))
+    if inner is not None:
+        value, _ = _plainly(inner, reply)
+    return value, wrong
+
+
+def _enveloped(content: dict[str, Any]) -> str | None:
+    """Return what an envelope holds: ``{"answer": {...}}``, or a call with its arguments; None if it is none."""
+    if content.keys() <= _CALL and (content.keys() & _ARGUMENTS):
+        inner = next(content[key] for key in ("arguments", "parameters", "input") if key in content)
+    elif len(content) == 1:
+        (inner,) = content.values()
+    else:
+        return None
+    if isinstance(inner, list) and len(inner) == 1:
+        (inner,) = inner
+    if isinstance(inner, str):
+        return inner if inner.lstrip().startswith("{") and _is_json(inner) else None
+    return json.dumps(inner) if isinstance(inner, dict) else None
+
+
+def _plainly(content: str, reply: type[T]) -> tuple[T | None, list[str]]:
+    """Validate an object strictly, then with what is plainly meant instead of what is wrong."""
+    findings: list[str] | None = None
+    for _ in range(_MOST_MENDINGS):
+        try:
+            return reply.model_validate_json(content, strict=True), []
+        except ValidationError as error:
+            errors = error.errors(include_url=False)
+        if findings is None:
+            findings = [_finding(one) for one in errors]
+        try:
+            changed = json.loads(content)
+        except (ValueError, RecursionError):
+            break
+        missing = {str(one["loc"][-1]) for one in errors if one["type"] == "missing" and one["loc"]}
+        if missing or not all(_mended(changed, one, reply) for one in errors):
+            break
+        content = json.dumps(changed, ensure_ascii=False)
+    return None, findings or []
+
+
+def _mended(content: Any, error: Any, reply: type[BaseModel]) -> bool:
+    """Put what is plainly meant in place of a field that is wrong; whether that could be done."""
+    *way, last = error["loc"] or (None,)
+    holder = content
+    for step in way:
+        try:
+            holder = holder[step]
+        except (KeyError, IndexError, TypeError):
+            return False  # a name of a union's member, which is no part of the content
+    try:
+        value = holder[last]
+    except (KeyError, IndexError, TypeError):
+        return False
+    if error["type"] == "extra_forbidden" and isinstance(holder, dict):
+        # A name that is nearly a field's own may be meant as that: it is asked for again.
+        known = [*reply.model_fields, *(name for name in _field_names(reply))]
+        if difflib.get_close_matches(str(last), known, n=1, cutoff=0.75):
+            return False
+        del holder[last]
+        return True
+    number = _NUMERAL.fullmatch(value.strip()) if isinstance(value, str) else None
+    if error["type"] in ("int_type", "float_type") and number is not None:
+        holder[last] = float(value) if "." in value else int(value)
+        return True
+    if error["type"] in ("int_type", "int_from_float") and isinstance(value, float) and value.is_integer():
+        holder[last] = int(value)
+        return True
+    if error["type"] == "bool_type" and isinstance(value, str) and value.strip().lower() in ("true", "false"):
+        holder[last] = value.strip().lower() == "true"
+        return True
+    return False
+
+
+def _field_names(reply: type[BaseModel]) -> list[str]:
+    """Names of all fields in a record and the records in it, as its schema has them."""
+    schema = schema_of(reply)
+    parts = [schema, *schema.get("$defs", {}).values()]
+    return [name for part in parts for name in part.get("properties", {})]
 
 
 def _finding(error: Any) -> str:

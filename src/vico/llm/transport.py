@@ -57,13 +57,30 @@ class RequestError(HttpError):
 
     parameter = ""
 
+    def names(self, part: str) -> bool:
+        """Whether the server's words name a part of the request, in whatever way."""
+        words = f"{self.parameter} {self}".lower()
+        also = {"response_format": r"|json_?schema|grammar|guided|structured.?output|json_object|json.?mode"}
+        return re.search(rf"(?<![a-z]){part}(?![a-z]){also.get(part, '')}", words) is not None
+
     def for_people(self, endpoint: Endpoint) -> SourceError:
         """Return the same as an error for a person, free of the key."""
         tries = f" (tried {self.tries} times)" if self.tries > 1 else ""
+        if self.transient and self.retry_after is not None and self.retry_after > 1.0:
+            tries += f"; it asks to wait {_duration(self.retry_after)}"
         words = f"language model at {endpoint.base}: {self}{tries}"
         made = SourceError(words.replace(endpoint.key, "***") if len(endpoint.key) > 3 else words)
         made.status = self.status
         return made
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in the largest unit that it is two of, or a whole one."""
+    for unit, length in (("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= length:
+            count = seconds / length
+            return f"{count:.3g} {unit[:-1] if round(count, 2) == 1.0 else unit}"
+    return f"{seconds:.0f} seconds"
 
 
 def post(endpoint: Endpoint, body: dict[str, Any], timeout: float) -> dict[str, Any]:
@@ -156,10 +173,17 @@ def _told(page: str) -> tuple[str, str, str]:
         found = json.loads(page)
     except (ValueError, RecursionError):
         found = None
+    if isinstance(found, list) and found:  # a large provider's gateway puts the error in a list
+        found = found[0]
     error = found.get("error", found) if isinstance(found, dict) else None
     if isinstance(error, dict):
-        message = error.get("message") or error.get("detail") or ""
+        message = error.get("message") or error.get("detail") or error.get("msg") or ""
         code, parameter = str(error.get("code") or error.get("type") or ""), str(error.get("param") or "")
+        if isinstance(message, list):  # FastAPI: where, and what is wrong there
+            rows = [row for row in message if isinstance(row, dict)]
+            ways = [".".join(str(part) for part in row.get("loc", ()) if part != "body") for row in rows]
+            parameter = parameter or (ways[0] if ways else "")
+            message = "; ".join(f"{way}: {row.get('msg', '')}" for way, row in zip(ways, rows, strict=True))
     else:
         message, code, parameter = error if isinstance(error, str) else re.sub(r"<[^>]*>", " ", page), "", ""
     words = " ".join("".join(c if c.isprintable() else " " for c in str(message)).split())

@@ -1,0 +1,227 @@
+"""Replies and refusals in the shapes that servers of each family send: recorded, with names and ids changed."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from pydantic import BaseModel, ConfigDict
+
+from http_server import Answer
+from llm_server import Script, model_server
+from vico.errors import SourceError
+from vico.llm import Connection, Endpoint, LanguageModel, Sampling, user
+
+
+class Person(BaseModel):
+    """What is asked for."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str
+    age: int
+
+
+GOOD = '{"name": "Anna", "age": 41}'
+ANNA = Person(name="Anna", age=41)
+
+
+def completion(message: dict[str, Any], finish: str = "stop", **more: Any) -> dict[str, Any]:
+    choice = {"index": 0, "message": {"role": "assistant", **message}, "finish_reason": finish}
+    return {"id": "chatcmpl-1", "object": "chat.completion", "created": 1, "model": "m", "choices": [choice], **more}
+
+
+def answered(content: Any, status: int = 200) -> Answer:
+    return Answer(status, json.dumps(content).encode(), {"Content-Type": "application/json"})
+
+
+class Picky(Script):
+    """A server that refuses a part of requests in its own words."""
+
+    def __init__(self, part: str, refusal: Answer, answer: Answer) -> None:
+        super().__init__(answer)
+        self.part, self.refusal = part, refusal
+
+    def __call__(self, request: Any) -> Answer:
+        """Answer as such a server would."""
+        answer = super().__call__(request)
+        return self.refusal if self.part in self.asked[-1] else answer
+
+
+def model(base: str) -> LanguageModel:
+    sampling = Sampling(seed=0, temperature=0.0, max_tokens=200)
+    sent = Connection(timeout=5.0, retries=2, sleep=lambda seconds: None)
+    return LanguageModel(Endpoint(base, "m"), sampling=sampling, connection=sent)
+
+
+USAGE = {"prompt_tokens": 10, "completion_tokens": 20, "total_tokens": 30}
+
+
+@pytest.mark.parametrize(
+    ("family", "content"),
+    [
+        (
+            "OpenAI",
+            completion({"content": GOOD, "refusal": None, "annotations": []}, usage=USAGE, service_tier="default"),
+        ),
+        ("Azure", completion({"content": GOOD}, usage=USAGE, prompt_filter_results=[{"prompt_index": 0}])),
+        ("vLLM", completion({"content": GOOD, "reasoning_content": "She is 30? No.", "tool_calls": []}, usage=USAGE)),
+        ("vLLM, all among the thoughts", completion({"content": None, "reasoning_content": GOOD}, usage=USAGE)),
+        (
+            "llama.cpp",
+            completion({"content": f"<think>\n\n</think>\n\n{GOOD}"}, timings={"predicted_per_second": 30.1}),
+        ),
+        (
+            "Ollama",
+            completion(
+                {"content": f"```json\n{GOOD}\n```", "reasoning": "Anna it is."}, system_fingerprint="fp_ollama"
+            ),
+        ),
+        ("Gemini", completion({"content": f"```json\n{GOOD}\n```"}, usage=USAGE)),
+        ("Mistral", completion({"content": [{"type": "thinking", "thinking": []}, {"type": "text", "text": GOOD}]})),
+    ],
+)
+def test_a_reply_of_each_family_is_read(family: str, content: dict[str, Any]) -> None:
+    with model_server(Script(answered(content))) as (base, script):
+        assert model(base).ask([user("Who?")], Person).value == ANNA
+    assert len(script.asked) == 1, family
+
+
+@pytest.mark.parametrize(
+    ("family", "part", "status", "page"),
+    [
+        (
+            "OpenAI",
+            "temperature",
+            400,
+            {
+                "error": {
+                    "message": "Unsupported value: 'temperature' does not support 0 with this "
+                    "model. Only the default (1) value is supported.",
+                    "type": "invalid_request_error",
+                    "param": "temperature",
+                    "code": "unsupported_value",
+                }
+            },
+        ),
+        (
+            "OpenAI",
+            "max_tokens",
+            400,
+            {
+                "error": {
+                    "message": "Unsupported parameter: 'max_tokens' is not supported with this "
+                    "model. Use 'max_completion_tokens' instead.",
+                    "type": "invalid_request_error",
+                    "param": "max_tokens",
+                    "code": "unsupported_parameter",
+                }
+            },
+        ),
+        (
+            "Azure",
+            "response_format",
+            400,
+            {
+                "error": {
+                    "message": "Invalid parameter: 'response_format' of type 'json_schema' "
+                    "is not supported with this model.",
+                    "type": "invalid_request_error",
+                    "param": "response_format",
+                    "code": None,
+                }
+            },
+        ),
+        (
+            "Azure AI",
+            "seed",
+            422,
+            {
+                "error": {
+                    "code": "Invalid input",
+                    "status": 422,
+                    "message": "invalid input error",
+                    "details": {"loc": ["body", "seed"], "input": "value_error"},
+                }
+            },
+        ),
+        (
+            "vLLM",
+            "response_format",
+            400,
+            {
+                "object": "error",
+                "message": "The provided JSON schema contains features not supported by xgrammar.",
+                "type": "BadRequestError",
+                "param": None,
+                "code": 400,
+            },
+        ),
+        (
+            "vLLM before 0.6",
+            "response_format",
+            422,
+            {
+                "detail": [
+                    {
+                        "type": "extra_forbidden",
+                        "loc": ["body", "response_format", "json_schema"],
+                        "msg": "Extra inputs are not permitted",
+                    }
+                ]
+            },
+        ),
+        (
+            "llama.cpp",
+            "response_format",
+            500,
+            {"error": {"code": 500, "message": "failed to parse grammar", "type": "server_error"}},
+        ),
+        (
+            "llama.cpp",
+            "response_format",
+            400,
+            {"error": {"code": 400, "message": "Unrecognized schema: true", "type": "invalid_request_error"}},
+        ),
+        (
+            "Ollama",
+            "response_format",
+            500,
+            {"error": {"message": "invalid JSON schema in format", "type": "api_error"}},
+        ),
+        ("Ollama", "response_format", 500, {"error": {"message": "something went wrong", "type": "api_error"}}),
+        (
+            "Gemini",
+            "seed",
+            400,
+            [
+                {
+                    "error": {
+                        "code": 400,
+                        "message": 'Invalid JSON payload received. Unknown name "seed": Cannot find field.',
+                        "status": "INVALID_ARGUMENT",
+                    }
+                }
+            ],
+        ),
+        ("a gateway", "seed", 400, {"message": "`seed` is not permitted"}),
+        ("a gateway", "temperature", 400, {"detail": "Bad Request"}),
+    ],
+)
+def test_what_a_family_refuses_is_left_out_and_not_sent_again(family: str, part: str, status: int, page: Any) -> None:
+    server = Picky(part, answered(page, status), answered(completion({"content": GOOD})))
+    with model_server(server) as (base, _):
+        asker = model(base)
+        assert asker.ask([user("Who?")], Person).value == ANNA, family
+        asked = len(server.asked)
+        assert asker.ask([user("Who else?")], Person).value == ANNA
+    assert len(server.asked) == asked + 1
+    if part == "max_tokens":
+        assert server.asked[-1]["max_completion_tokens"] == 200
+
+
+def test_a_wait_of_an_hour_is_named() -> None:
+    busy = Answer(429, b'{"error": {"message": "daily limit"}}', {"Retry-After": "3600"})
+    with model_server(Script(busy)) as (base, _), pytest.raises(SourceError, match="it asks to wait 1 hour"):
+        model(base).ask([user("Who?")], Person)
