@@ -42,7 +42,7 @@ ANNA = Person(name="Anna", age=41)
         f"{GOOD}\n<think>was {DRAFT} better?</think>",
         f"<|channel|>analysis<|message|>{DRAFT}<|end|><|start|>assistant<|channel|>final<|message|>{GOOD}<|return|>",
         f"<|channel|>analysis<|message|>{DRAFT}<|end|><|channel|>final <|constrain|>json<|message|>{GOOD}",
-        f"<|channel|>analysis<|message|>{DRAFT}<|end|><|channel|>commentary to=functions.reply<|message|>{GOOD}<|call|>",
+        f"<|channel|>analysis<|message|>{DRAFT}<|end|><|channel|>commentary to=functions.reply<|message|>{GOOD}",
         f"analysisWe take {DRAFT}?assistantfinal{GOOD}",
         f"Here is my thought process: {DRAFT}\n\nHere is my response: {GOOD}",
         f"Draft: {DRAFT}\nFinal: {GOOD}",
