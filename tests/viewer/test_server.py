@@ -23,7 +23,9 @@ pytest.importorskip("starlette", reason="the extra 'viewer' is not installed: pi
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from vico.errors import InputError
 from vico.runner.control import Control
+from vico.viewer.server.gate import Gate
 from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.frames import NEWEST, OF_RANGE
@@ -104,7 +106,7 @@ def test_the_address_gives_a_cookie_that_no_script_and_no_other_site_can_use(url
     address = address_of(url)
     status, _, headers = answer(url, f"/?token={address.token}", headers={})
     assert status == 303
-    assert headers["location"] == "/"
+    assert headers["location"] == "./"
     cookie = headers["set-cookie"]
     assert cookie.startswith(f"vico_{address.port}={address.token};")
     assert "HttpOnly" in cookie
@@ -114,14 +116,61 @@ def test_the_address_gives_a_cookie_that_no_script_and_no_other_site_can_use(url
 
 def test_a_foreign_host_or_origin_is_refused_with_the_token_too(url: str) -> None:
     token = {"Authorization": f"Bearer {address_of(url).token}"}
-    for headers in ({"Host": "evil.example"}, {"Host": "127.0.0.1"}, {"Host": "127.0.0.1:1"}):
+    for headers in ({"Host": "evil.example"}, {"Host": "localhost.evil.example:80"}, {"Host": "0.0.0.0:1"}):
         status, body, _ = answer(url, "/api/run", headers=token | headers)
         assert status == 403
-        assert b"127.0.0.1" in body
+        assert b"--allow-host" in body
     port = address_of(url).port
-    for origin in ("http://evil.example", "null", f"https://127.0.0.1:{port}", "http://127.0.0.1:1"):
+    for origin in ("http://evil.example", "null", f"https://localhost:{port}", "http://127.0.0.1:1"):
         assert answer(url, "/api/run", headers=token | {"Origin": origin})[0] == 403
     assert answer(url, "/api/run", headers=token | {"Origin": f"http://localhost:{port}"})[0] == 200
+
+
+def test_the_page_is_reached_through_a_forwarded_port(url: str) -> None:
+    token = {"Authorization": f"Bearer {address_of(url).token}"}
+    for host in ("localhost:9000", "127.0.0.1", "LOCALHOST:8123", "[::1]:8123"):
+        assert answer(url, "/api/run", headers={"Host": host})[0] == 403  # the token is asked for
+        own = {"Host": host, "Origin": f"http://{host}"}
+        assert answer(url, "/api/run", headers=token | own)[0] == 200
+        assert answer(url, "/api/run", headers=token | own | {"Origin": "http://localhost:9001"})[0] == 403
+
+
+def test_a_named_host_is_let_in_and_no_other() -> None:
+    hub = Gate(nothing, port=8123, token="t", hosts=("Hub.Example.org", "name-8123.app.github.dev"))
+    for host, origin, status in (
+        ("hub.example.org", "https://hub.example.org", 200),
+        ("localhost:8123", "https://name-8123.app.github.dev", 200),
+        ("hub.example.org:8443", "https://evil.example", 403),
+        ("evil.example", "https://evil.example", 403),
+    ):
+        headers = {"host": host, "origin": origin, "authorization": "Bearer t"}
+        assert asyncio.run(first_message(hub, headers))["status"] == status
+    answered = asyncio.run(first_message(hub, {"host": "hub.example.org", "authorization": "Bearer t"}))
+    assert b"wss://hub.example.org" in dict(answered["headers"])[b"content-security-policy"]
+
+
+@pytest.mark.parametrize("name", ["https://hub.example.org", "*", "*.example.org", "", "a b"])
+def test_what_is_no_name_of_a_host_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match="--allow-host"):
+        Gate(nothing, port=1, token="t", hosts=(name,))
+
+
+async def nothing(scope: Any, receive: Any, send: Any) -> None:
+    """An application that answers everything with nothing."""
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b""})
+
+
+async def first_message(gate: Gate, headers: dict[str, str]) -> dict[str, Any]:
+    scope = {"type": "http", "method": "GET", "path": "/api/run", "query_string": b""}
+    pairs = [(name.encode(), value.encode()) for name, value in headers.items()]
+    sent: list[Any] = []
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    await gate(scope | {"headers": pairs}, None, send)
+    return dict(sent[0])
 
 
 def test_a_websocket_of_another_site_is_refused_before_it_opens(url: str) -> None:

@@ -79,7 +79,9 @@ def _by_hand(categories: Sequence[str] | None, setting: Setting, options: Assist
     if options.common.ray is not None:
         raise InputError("eval: --method human is played at this machine; leave out --ray")
     require_server()
-    theatre.AT_THE_PAGE.open(city=city_of, announce=told, port=options.port, waits=options.waits)
+    theatre.AT_THE_PAGE.open(
+        city=city_of, announce=told, port=options.port, waits=options.waits, hosts=options.allow_host
+    )
     common = replace(options.common, workers=1, record=True)
     return judge(theatre.CHALLENGE, categories, setting, common)
 

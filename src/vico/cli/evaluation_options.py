@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from vico.cli.options import RayAddress, Words
+from vico.cli.options import Hosts, RayAddress, Words
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,8 @@ class AssistantOptions:
         How many of the six subtasks of a task are asked for: the first ones.
     port
         With --method human: where the page is that one plays at; 0 takes a free one.
+    allow_host
+        With --method human: a name, beside this machine's own, under which a proxy or a forwarded port shows the page.
     waits
         With --method human: seconds that an episode waits for a person who has not come, or has left; it counts as not
         played then.
@@ -115,6 +117,7 @@ class AssistantOptions:
     steps: int = 1500
     subtasks: int = 6
     port: int = 0
+    allow_host: Hosts = ()
     waits: float = 600.0
 
 

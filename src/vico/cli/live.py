@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vico.viewer.play import PlayedAgent
 
 #: Options of a run that decide how it is shown, and nothing in it.
-LIVE = ("live", "speed", "paused", "port")
+LIVE = ("live", "speed", "paused", "port", "allow_host")
 
 
 @contextmanager
@@ -42,7 +42,9 @@ def live_viewer(
     assert control is not None
     from vico.viewer.live import LiveViewer
 
-    with LiveViewer(control, world, city=city_of(world), player=player, port=options.port) as viewer:
+    with LiveViewer(
+        control, world, city=city_of(world), player=player, port=options.port, hosts=options.allow_host
+    ) as viewer:
         viewer.announce = told
         yield viewer
 

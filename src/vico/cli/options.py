@@ -18,6 +18,7 @@ CommaSeparated = Annotated[str, tyro.conf.arg(metavar="A,B,...")]
 #: Of a Ray cluster; a bare ``--ray`` becomes ``--ray auto``.
 RayAddress = Annotated[str | None, tyro.conf.arg(metavar="[ADDRESS]")]
 # Several values after one option, or after the same one several times: nobody expects the last alone to count.
+Hosts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME")]
 Words = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="WORLD...")]
 Files = Annotated[tuple[tuple[Path, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE...")]
 _RAY_ADDRESS = re.compile(r"auto|local|ray://.+|[^/\s]+:\d+")
@@ -335,6 +336,9 @@ class RunOptions:
         With --live: wait before the first step until somebody lets it go on.
     port
         With --live: where the page is, on this machine alone; 0 takes a free one.
+    allow_host
+        With --live: a name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be
+        given several times.
     force
         Replace what this verb made there before; refused if the folder holds anything else.
     json
@@ -383,6 +387,7 @@ class RunOptions:
     speed: float = 0.0
     paused: bool = False
     port: int = 0
+    allow_host: Hosts = ()
     force: bool = False
     json: bool = False
 

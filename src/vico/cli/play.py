@@ -81,6 +81,11 @@ def _task(options: PlayOptions, category: Literal["carry", "delivery", "search"]
         force=options.out is None,
     )
     asked = AssistantOptions(
-        common, category=category, advanced=options.advanced, port=options.port, waits=options.waits
+        common,
+        category=category,
+        advanced=options.advanced,
+        port=options.port,
+        waits=options.waits,
+        allow_host=options.allow_host,
     )
     return assistant(asked)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 from vico.cli.live import city_of, told, wait_for_interrupt
@@ -10,7 +11,7 @@ from vico.cli.output import print_json
 from vico.viewer.server import require_server
 
 
-def view(path: Path, *, world: Path | None, port: int, browser: bool, json: bool) -> int:
+def view(path: Path, *, world: Path | None, port: int, hosts: Sequence[str] = (), browser: bool, json: bool) -> int:
     """Show a run until Ctrl+C.
 
     Parameters
@@ -21,6 +22,8 @@ def view(path: Path, *, world: Path | None, port: int, browser: bool, json: bool
         The world it ran in, if it is no longer where it was.
     port
         To listen on; 0 takes the one it was shown on before, or a free one.
+    hosts
+        Names of hosts, beside this machine's own, under which the page is shown.
     browser
         Open it there.
     json
@@ -36,7 +39,9 @@ def view(path: Path, *, world: Path | None, port: int, browser: bool, json: bool
     run = source.tables.run
     assert run is not None
     city = None if source.world is None else city_of(source.world)
-    with ViewerServer(ViewerState(source, RecordedViews(run).view, city=city), port=port, keep=path) as server:
+    with ViewerServer(
+        ViewerState(source, RecordedViews(run).view, city=city), port=port, keep=path, hosts=hosts
+    ) as server:
         if json:
             print_json({"url": server.url})
         else:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import tyro
 from tyro.conf import Positional
 
-from vico.cli.options import CommaSeparated, RunOptions
+from vico.cli.options import CommaSeparated, Hosts, RunOptions
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,9 @@ class LiveOptions:
         What was done to an earlier run (its interventions.jsonl), to be done again.
     port
         Where the page is, on this machine alone; 0 takes a free one.
+    allow_host
+        A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
+        times.
     seed
         Decides everything that is left to chance.
     """
@@ -75,6 +78,7 @@ class LiveOptions:
     paused: bool = False
     interventions: Path | None = None
     port: int = 0
+    allow_host: Hosts = ()
     seed: int = 0
 
     def run_options(self) -> RunOptions:
@@ -119,6 +123,9 @@ class PlayOptions:
         What whom you play sees is rendered and recorded, which a demonstration needs.
     port
         Where the page is, on this machine alone; 0 takes a free one.
+    allow_host
+        A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
+        times.
     waits
         With a task: seconds that it waits for you at its page.
     seed
@@ -141,12 +148,25 @@ class PlayOptions:
     pedestrians: int = 30
     view: Literal["recorded", "none"] = "recorded"
     port: int = 0
+    allow_host: Hosts = ()
     waits: float = 600.0
     seed: int = 0
 
     def run_options(self, played: str, steps: int) -> RunOptions:
         """Return the same as options of a run."""
-        names = ("world", "community", "robots", "start", "date", "weather", "cars", "cyclists", "pedestrians", "port")
+        names = (
+            "world",
+            "community",
+            "robots",
+            "start",
+            "date",
+            "weather",
+            "cars",
+            "cyclists",
+            "pedestrians",
+            "port",
+            "allow_host",
+        )
         given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "seed")}
         given["assistants"] = int(played.removeprefix("assistant_")) + 1 if played.startswith("assistant_") else 0
         given |= {"observe": played if self.view == "recorded" else "none", "states_every": steps // self.seconds * 300}

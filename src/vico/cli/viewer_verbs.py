@@ -8,13 +8,19 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
+from vico.cli.options import Hosts
 from vico.cli.viewer_options import LiveOptions, PlayOptions
 
 _FLAT = tyro.conf.arg(name="")
 
 
 def view(
-    path: Positional[Path], world: Path | None = None, port: int = 0, browser: bool = False, json: bool = False
+    path: Positional[Path],
+    world: Path | None = None,
+    port: int = 0,
+    allow_host: Hosts = (),
+    browser: bool = False,
+    json: bool = False,
 ) -> int:
     """Show a recorded run in a browser on this machine; also one that is still being written.
 
@@ -26,12 +32,14 @@ def view(
         path: Run folder.
         world: The world it ran in, if it is no longer where it was.
         port: Where the page is; 0 takes the one it was shown on before, or a free one.
+        allow_host: A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be
+            given several times.
         browser: Open it in the browser.
         json: Print the address as JSON.
     """
     from vico.cli import view as verb
 
-    return verb.view(path, world=world, port=port, browser=browser, json=json)
+    return verb.view(path, world=world, port=port, hosts=allow_host, browser=browser, json=json)
 
 
 def live(options: Annotated[LiveOptions, _FLAT]) -> int:

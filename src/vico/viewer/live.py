@@ -40,6 +40,8 @@ class LiveViewer(Hook):
         Who is played by a person at the page; None for nobody.
     port
         To listen on; 0 takes the one that the run was shown on before, or a free one.
+    hosts
+        Names of hosts, beside this machine's own, under which the page is shown.
     """
 
     def __init__(
@@ -50,9 +52,11 @@ class LiveViewer(Hook):
         city: Path | None = None,
         player: PlayedAgent | None = None,
         port: int = 0,
+        hosts: Sequence[str] = (),
     ) -> None:
         self.control = control
         self._world, self._city, self._player, self._port = world, city, player, port
+        self._hosts = hosts
         self._server: ViewerServer | None = None
         self._recorder: Recorder | None = None
         self._tables = LiveTables(control.out)
@@ -88,7 +92,7 @@ class LiveViewer(Hook):
         source.plans = lambda names: self._plans(agents, names)
         if self._server is None:
             state = ViewerState(source, self.view, city=self._city, hands=self.control, player=self._player)
-            self._server = ViewerServer(state, port=self._port, keep=recorder.out).__enter__()
+            self._server = ViewerServer(state, port=self._port, keep=recorder.out, hosts=self._hosts).__enter__()
             self.announce(self.url)
         else:
             self._server.change_source(source)

@@ -48,6 +48,7 @@ class BrowserTheatre:
         announce: Callable[[str], None],
         port: int = 0,
         waits: float = WAITS,
+        hosts: Sequence[str] = (),
     ) -> None:
         """Say where the pages of the coming episodes are.
 
@@ -61,7 +62,10 @@ class BrowserTheatre:
             To listen on; 0 takes a free one.
         waits
             Seconds that an episode waits for the person.
+        hosts
+            Names of hosts, beside this machine's own, under which the page is shown.
         """
+        self._hosts = hosts
         self._city, self._announce, self._port, self._waits = city, announce, port, waits
 
     def agent(self, name: str) -> Agent:
@@ -82,7 +86,9 @@ class BrowserTheatre:
         performance = BrowserPerformance(control, waits=self._waits)
         player = PlayedAgent(name, human, present=performance.present)
         player.task = lambda second: dict(task(second))
-        with LiveViewer(control, world, city=self._city(world), player=player, port=self._port) as viewer:
+        with LiveViewer(
+            control, world, city=self._city(world), player=player, port=self._port, hosts=self._hosts
+        ) as viewer:
             viewer.announce = self._announce
             viewer.show(recorder, agents)
             performance.hooks = [viewer, performance]

@@ -28,7 +28,7 @@ export class Charts {
 
   /** @param {number} time */
   async update(time) {
-    const found = await getJson(`/api/metrics?first=0&last=${this.source.last}&points=300`).catch(() => null);
+    const found = await getJson(`api/metrics?first=0&last=${this.source.last}&points=300`).catch(() => null);
     if (!found) return;
     this.note.textContent =
       found.speed !== undefined && found.speed !== null ? `${found.speed.toFixed(1)} simulated seconds a second` : "Counts since the start of the run.";

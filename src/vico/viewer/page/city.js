@@ -70,7 +70,7 @@ export class City {
    */
   async open({ manifest, picture }) {
     this.manifest = manifest;
-    const outlook = await bytes("/city/outlook.bin");
+    const outlook = await bytes("city/outlook.bin");
     const pictures = this.manifest.arrays.map(() => ({ value: pictureArray({ width: 1, height: 1 }, 1) }));
     this.pictures = pictures;
     const all = () => [false, true].flatMap((both) => pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, false, both)));
@@ -119,7 +119,7 @@ export class City {
 
   /** @param {ArrayBuffer} outlook */
   async _shapes(outlook) {
-    const shapes = await bytes("/city/models.bin");
+    const shapes = await bytes("city/models.bin");
     for (const [name, entry] of Object.entries(this.manifest.models)) this._addModel(name, entry, shapes);
     this.robotShapes = shapes;
     this.instances = new Instances(this.scene, this, this.reach);
@@ -154,8 +154,8 @@ export class City {
   }
 
   async _textures() {
-    const buffer = await bytes("/city/textures.bin");
-    const worker = new Worker("/page/textures_worker.js", { type: "module" });
+    const buffer = await bytes("city/textures.bin");
+    const worker = new Worker(new URL("./textures_worker.js", import.meta.url), { type: "module" });
     let left = this.manifest.arrays.length;
     worker.onmessage = ({ data }) => {
       if (data.layers) {
@@ -205,7 +205,7 @@ export class City {
   async _load(tile) {
     tile.loading = true;
     try {
-      const buffer = await bytes(`/city/${tile.entry.file}`);
+      const buffer = await bytes(`city/${tile.entry.file}`);
       const group = new THREE.Group();
       for (const entry of tile.entry.near) {
         group.add(new THREE.Mesh(meshGeometry(buffer, entry), this.materials[materialOf(entry, this.pictures.length)]));
@@ -238,7 +238,7 @@ export class City {
   async showRoom(room) {
     if (!this.rooms && room >= 0 && this.textured) {
       this.rooms = {};
-      const [index, shapes] = await Promise.all([getJson("/city/rooms.json"), bytes("/city/furniture.bin")]);
+      const [index, shapes] = await Promise.all([getJson("city/rooms.json"), bytes("city/furniture.bin")]);
       this.rooms = index;
       for (const [name, entry] of Object.entries(index.furniture)) {
         if (!this.models.has(name)) this._addModel(name, { low: [0, 0, 0], high: [1, 1, 1], .../** @type {any} */ (entry) }, shapes);
@@ -250,7 +250,7 @@ export class City {
     if (wanted < 0 || this._roomFiles.has(wanted)) return;
     this._roomFiles.set(wanted, null);
     const entry = this.rooms.files[wanted];
-    const buffer = await bytes(`/city/${entry.file}`);
+    const buffer = await bytes(`city/${entry.file}`);
     const group = new THREE.Group();
     for (const mesh of entry.near) group.add(new THREE.Mesh(meshGeometry(buffer, mesh), this.insideMaterials[materialOf(mesh, this.pictures.length)]));
     const furniture = new Instances(group, this, { near: 45, far: 0 }, this.insideMaterials);

@@ -6,7 +6,7 @@ import { getJson } from "./source.js";
 
 /** @returns {Promise<CityBase>} */
 export async function loadCityBase() {
-  const [manifest, answer] = await Promise.all([getJson("/city/manifest.json"), fetch("/city/ground.jpg")]);
+  const [manifest, answer] = await Promise.all([getJson("city/manifest.json"), fetch("city/ground.jpg")]);
   if (!answer.ok) throw new Error("the picture of the ground is missing");
   const bitmap = await createImageBitmap(await answer.blob());
   const picture = document.createElement("canvas");

@@ -378,7 +378,7 @@ class Page {
   }
 
   async _play() {
-    const play = await import("/page/play.js").catch(() => null);
+    const play = await import("./play.js").catch(() => null);
     if (play) play.start(window.vico);
     else toast("This server lets nobody play.", true);
   }
@@ -404,7 +404,7 @@ const page = new Page();
   get keys() { return page.keys; },
   get ui() { return { keys: page.keys, toast, layer: byId("play-layer") }; },
   select: (/** @type {number} */ entity) => page.select(entity),
-  stills: () => import("/page/stills.js"),
+  stills: () => import("./stills.js"),
 };
 page.open().catch((error) => {
   console.error(error);

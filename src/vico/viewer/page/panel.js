@@ -204,7 +204,7 @@ export class Panel {
     this._asked = step;
     const { name } = this.agent;
     const entity = this.entity;
-    const found = await getJson(`/api/moment?step=${step}&agent=${encodeURIComponent(name)}`).catch(() => null);
+    const found = await getJson(`api/moment?step=${step}&agent=${encodeURIComponent(name)}`).catch(() => null);
     const now = found?.agents?.[name];
     if (!now || entity !== this.entity) return;
     this._now(now, body);

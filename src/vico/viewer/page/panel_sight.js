@@ -13,7 +13,7 @@ export async function showSight(panel, name, step) {
   const { entity, lens } = panel;
   const { picture, pictureNote, names } = panel.parts;
   const live = panel.source.live && step >= panel.source.last - 1 ? "" : `&step=${step}`;
-  const answer = await fetch(`/api/view?agent=${encodeURIComponent(name)}${live}&output=${lens}`).catch(() => null);
+  const answer = await fetch(`api/view?agent=${encodeURIComponent(name)}${live}&output=${lens}`).catch(() => null);
   if (entity !== panel.entity || picture !== panel.parts.picture) return;
   if (!answer?.ok) {
     picture.hidden = true;
@@ -32,7 +32,7 @@ export async function showSight(panel, name, step) {
     names.replaceChildren();
     return;
   }
-  const found = await getJson(`/api/view?agent=${encodeURIComponent(name)}${live}&output=names`).catch(() => ({ names: [] }));
+  const found = await getJson(`api/view?agent=${encodeURIComponent(name)}${live}&output=names`).catch(() => ({ names: [] }));
   if (picture !== panel.parts.picture) return;
   names.replaceChildren(
     ...found.names.slice(0, 14).map((/** @type {any} */ n) => el("li", {}, el("i", { style: `background: rgb(${n.colour.join(",")})` }), el("span", { text: n.name }), el("small", { text: n.kind }))),

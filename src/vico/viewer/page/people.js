@@ -150,7 +150,7 @@ export class People {
     this.known.set(entity, {});
     this.fetching++;
     try {
-      const file = new PersonFile(await bytes(`/api/person/${entity}.bin`));
+      const file = new PersonFile(await bytes(`api/person/${entity}.bin`));
       this.known.set(entity, this._person(entity, file));
       this.arrived++;
     } catch {

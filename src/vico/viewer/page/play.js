@@ -59,7 +59,7 @@ class Play {
   _build() {
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.href = "/page/play.css";
+    link.href = "page/play.css";
     document.head.append(link);
     this.layer = this.vico.ui.layer;
     this.hints = el("ul.play-hints", { "aria-label": "What can be done here" });

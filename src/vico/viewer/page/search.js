@@ -32,7 +32,7 @@ export class Search {
     }
     await new Promise((resolve) => setTimeout(resolve, 120));
     if (round !== this._round) return;
-    const found = await getJson(`/api/search?q=${encodeURIComponent(text)}&limit=12`).catch(() => ({ hits: [] }));
+    const found = await getJson(`api/search?q=${encodeURIComponent(text)}&limit=12`).catch(() => ({ hits: [] }));
     if (round !== this._round) return;
     this.field.setAttribute("aria-expanded", "true");
     this.list.replaceChildren(

@@ -26,7 +26,7 @@ export class Signals {
 
   /** Ask for them: the server may have to look at all streets first. */
   async load() {
-    const told = await getJson("/api/signals").catch(() => null);
+    const told = await getJson("api/signals").catch(() => null);
     this.known = true;
     if (!told) return;
     this.cycles = told.cycles;

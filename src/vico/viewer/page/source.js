@@ -37,14 +37,14 @@ export class Source extends EventTarget {
 
   /** Ask anew what run this is. */
   async reload() {
-    this.run = await getJson("/api/run");
+    this.run = await getJson("api/run");
     // A recording is shown without its world as well.
     this.run.world ??= { name: "world not found", places: [], rooms: [] };
     await this.loadCast();
   }
 
   async loadCast() {
-    const { cast } = await getJson("/api/cast");
+    const { cast } = await getJson("api/cast");
     this.takeCast(cast);
   }
 
@@ -100,7 +100,7 @@ export class Source extends EventTarget {
     this._fetching.add(chunk);
     const first = chunk * CHUNK;
     const last = Math.min(first + CHUNK - 1, this.last);
-    fetch(`/api/frames?first=${first}&last=${last}`)
+    fetch(`api/frames?first=${first}&last=${last}`)
       .then(async (answer) => {
         if (!answer.ok) throw new Error(await answer.text());
         for (const frame of decodeFrames(await answer.arrayBuffer())) this._keep(frame);
@@ -123,8 +123,10 @@ export class Source extends EventTarget {
   }
 
   _connect() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const socket = new WebSocket(`${scheme}://${location.host}/stream`);
+    // Beside the page, wherever a forwarded port or a proxy has put that.
+    const address = new URL("stream", document.baseURI);
+    address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     socket.onopen = () => {

@@ -9,9 +9,9 @@ export let THREE = null;
  */
 export async function loadThree() {
   try {
-    const answer = await fetch("/three/index.js", { method: "HEAD" });
+    const answer = await fetch("three/index.js", { method: "HEAD" });
     if (!answer.ok) return false;
-    ({ THREE } = await import("/three/index.js"));
+    ({ THREE } = await import("../three/index.js"));
     THREE.Object3D.DEFAULT_UP.set(0, 0, 1);
     THREE.ColorManagement.enabled = false;
     return true;

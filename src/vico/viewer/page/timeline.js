@@ -69,7 +69,7 @@ export class Timeline {
     this.events = [];
     // As many as a page can show; the newest of a long run come by themselves.
     for (let k = 0; k < 20; k++) {
-      const found = await getJson(`/api/events?first=${first}&last=${this.source.last}&limit=1000`).catch(() => null);
+      const found = await getJson(`api/events?first=${first}&last=${this.source.last}&limit=1000`).catch(() => null);
       if (!found) return;
       this._take(found.events);
       if (!found.more || !found.events.length) return;

@@ -1,12 +1,19 @@
-"""Who is let in: this machine's own pages and programs that have the token. Everybody else gets a sentence."""
+"""Who is let in: this machine's own pages and programs that have the token. Everybody else gets a sentence.
+
+A page of elsewhere could give its name the address of this machine (DNS rebinding), so requests are answered under the
+names of this machine alone, and under those that its user lets in. The port may be another one: it can be forwarded.
+"""
 
 from __future__ import annotations
 
+import re
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
+
+from vico.errors import InputError
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -15,6 +22,9 @@ Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 _METHODS = ("GET", "HEAD")
+# This machine's own names.
+_OWN_NAMES = frozenset({"127.0.0.1", "localhost", "[::1]"})
+_HOST = re.compile(r"[a-z0-9]([a-z0-9.-]{0,250}[a-z0-9])?|\[[0-9a-f:.]{2,45}\]")
 
 
 class Gate:
@@ -28,12 +38,14 @@ class Gate:
         That the server listens on.
     token
         Whoever knows it may ask.
+    hosts
+        Names, beside those of this machine, under which the server is reached: of a proxy or a forwarded port.
     """
 
-    def __init__(self, app: App, *, port: int, token: str) -> None:
+    def __init__(self, app: App, *, port: int, token: str, hosts: Sequence[str] = ()) -> None:
         self._app, self._port, self._token = app, port, token
-        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
-        self._headers = _security_headers(port)
+        self._let_in = frozenset(checked_host(host) for host in hosts)
+        self._headers = _security_headers(sorted({f"127.0.0.1:{port}", f"localhost:{port}", *self._let_in}))
 
     @property
     def cookie(self) -> str:
@@ -60,16 +72,27 @@ class Gate:
 
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> str:
         """Return why a request is refused whatever it knows; "" if it is not."""
-        if headers.get("host", "") not in self._hosts:
-            return f"this server answers to 127.0.0.1:{self._port} and localhost:{self._port} alone"
+        host = headers.get("host", "").lower()
+        if _name_of(host) not in _OWN_NAMES | self._let_in:
+            return (
+                "this server answers to 127.0.0.1, localhost and [::1] alone; to be reached as "
+                f"{_name_of(host) or 'another name'}, it has to be started with --allow-host {_name_of(host) or 'NAME'}"
+            )
         origin = headers.get("origin")
-        if origin is not None and origin not in {f"http://{host}" for host in self._hosts}:
+        if origin is not None and not self._is_own(origin.lower(), host):
             return "pages of other origins are not answered"
         if scope["type"] == "websocket" and origin is None and "authorization" not in headers:
             return "a WebSocket needs an Origin, or the token in an Authorization header"
         if scope["type"] == "http" and scope["method"] not in _METHODS:
             return f"{scope['method']} is not known; there are {' and '.join(_METHODS)}"
         return ""
+
+    def _is_own(self, origin: str, host: str) -> bool:
+        """Whether an origin is of the page that this server gave: under the request's host, or a name let in."""
+        scheme, _, theirs = origin.partition("://")
+        if scheme == "http" and theirs in {f"127.0.0.1:{self._port}", f"localhost:{self._port}"}:
+            return True
+        return scheme in ("http", "https") and (theirs == host or _name_of(theirs) in self._let_in)
 
     def _knows_token(self, headers: dict[str, str]) -> bool:
         kind, _, given = headers.get("authorization", "").partition(" ")
@@ -92,7 +115,8 @@ class Gate:
             )
             return
         cookie = f"{self.cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-        more = [(b"location", b"/"), (b"set-cookie", cookie.encode())]
+        # Relative: a proxy may have put the page below a path of its own.
+        more = [(b"location", b"./"), (b"set-cookie", cookie.encode())]
         await _answer(send, 303, "", [*self._headers, *more])
 
     def _guarded(self, scope: Scope, send: Send) -> Send:
@@ -109,16 +133,42 @@ class Gate:
         return guarded
 
 
+def checked_host(text: str) -> str:
+    """Return the name of a host that is to be let in, in lower case and without a port.
+
+    Raises
+    ------
+    InputError
+        If it is none: an address of a page, or a pattern.
+    """
+    said = text.strip().lower()
+    name = _name_of(said)
+    if not _HOST.fullmatch(name) or not re.fullmatch(r"(:\d+)?", said[len(name) :]):
+        raise InputError(
+            f"--allow-host {text!r}: give the name of a host, such as hub.example.org, without http:// or *"
+        )
+    return name
+
+
+def _name_of(host: str) -> str:
+    """Return a host without its port: ``localhost:9000``, ``[::1]:8123``."""
+    if host.startswith("["):
+        return host.partition("]")[0] + "]"
+    return host.partition(":")[0]
+
+
 def _given_token(scope: Scope) -> str:
     return parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
 
 
-def _security_headers(port: int) -> list[tuple[bytes, bytes]]:
+def _security_headers(hosts: Sequence[str]) -> list[tuple[bytes, bytes]]:
+    # Not every browser takes 'self' for a WebSocket's address, too.
+    sockets = " ".join(f"ws://{host} wss://{host}" for host in hosts)
     policy = {
         "default-src": "'self'",
         "img-src": "'self' blob: data:",
         "style-src": "'self' 'unsafe-inline'",
-        "connect-src": f"'self' blob: ws://127.0.0.1:{port} ws://localhost:{port}",
+        "connect-src": f"'self' blob: {sockets}",
         "worker-src": "'self' blob:",
         "object-src": "'none'",
         "base-uri": "'none'",

@@ -8,7 +8,7 @@ import os
 import secrets
 import socket
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -59,14 +59,20 @@ class ViewerServer:
     keep
         Folder that keeps port and token, so that an open page finds the server again after a restart; None keeps
         nothing.
+    hosts
+        Names of hosts, beside this machine's own, under which a proxy or a forwarded port shows the page.
 
     Raises
     ------
+    InputError
+        If one of them is no name.
     OutputError
         If the port is taken.
     """
 
-    def __init__(self, state: ViewerState, *, port: int = 0, keep: Path | None = None) -> None:
+    def __init__(
+        self, state: ViewerState, *, port: int = 0, keep: Path | None = None, hosts: Sequence[str] = ()
+    ) -> None:
         self.state, self.hub = state, Hub(state)
         known = None if keep is None else known_address(keep)
         token = known.token if known is not None else secrets.token_urlsafe(24)
@@ -76,7 +82,7 @@ class ViewerServer:
             _keep(keep, self.address)
         self._server = uvicorn.Server(
             uvicorn.Config(
-                application(state, self.hub, self.address),
+                application(state, self.hub, self.address, hosts),
                 ws="websockets-sansio",
                 ws_max_size=LONGEST_MESSAGE,
                 ws_per_message_deflate=False,
@@ -131,7 +137,7 @@ class ViewerServer:
             self._failure = error
 
 
-def application(state: ViewerState, hub: Hub, address: Address) -> ASGIApp:
+def application(state: ViewerState, hub: Hub, address: Address, hosts: Sequence[str] = ()) -> ASGIApp:
     """Return the server as an ASGI application, behind its gate."""
 
     @contextlib.asynccontextmanager
@@ -144,7 +150,7 @@ def application(state: ViewerState, hub: Hub, address: Address) -> ASGIApp:
 
     stream = WebSocketRoute("/stream", Stream(hub).serve)
     app: Any = Starlette(routes=[*routes(state), stream], lifespan=lifespan)
-    gate: Any = Gate(app, port=address.port, token=address.token)
+    gate: Any = Gate(app, port=address.port, token=address.token, hosts=hosts)
     return gate
 
 
