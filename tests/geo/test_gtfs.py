@@ -117,13 +117,111 @@ def test_a_feed_of_elsewhere_is_empty(tmp_path: Path) -> None:
     assert (feed.stops, feed.patterns, feed.day) == ((), (), "")
 
 
+def test_stops_of_elsewhere_are_told_with_where_they_lie(tmp_path: Path) -> None:
+    path = tmp_path / "feed.zip"
+    path.write_bytes(feed_bytes(TABLES))
+    what, why = read_gtfs(path, LocalFrame(-33.0, 151.0), HALF).broken[-1]
+    assert what == "stops.txt"
+    assert "none of its 4 stops lies in the window: they lie at latitudes 49.4101..49.5100" in why
+    assert "exchanged" not in why
+
+
+def test_exchanged_latitudes_and_longitudes_are_told(tmp_path: Path) -> None:
+    turned = TABLES["stops.txt"].replace("stop_lat,stop_lon", "stop_lon,stop_lat")
+    assert (
+        "look exchanged: the other way round 3 would be" in read(tmp_path, TABLES | {"stops.txt": turned}).broken[-1][1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("separator", "encoding", "said"),
+    [
+        (";", "utf-8", "separated by semicolons"),
+        ("\t", "utf-8", "separated by tabs"),
+        (",", "utf-16", "in UTF-16"),
+        (",", "utf-16-le", "in UTF-16"),
+    ],
+)
+def test_other_separators_and_encodings_are_read_and_told(
+    tmp_path: Path, separator: str, encoding: str, said: str
+) -> None:
+    tables = {name: text.replace(",", separator).encode(encoding) for name, text in TABLES.items()}
+    feed = read(tmp_path, tables)
+    assert feed.patterns == read(tmp_path, TABLES).patterns
+    assert said in dict(feed.broken)["stops.txt"]
+
+
+def test_windows_letters_are_read_and_told(tmp_path: Path) -> None:
+    named = TABLES["stops.txt"].replace(",A,", ",Schloßstraße,").encode("cp1252")
+    feed = read(tmp_path, TABLES | {"stops.txt": named})
+    assert "Schloßstraße" in {stop.name for stop in feed.stops}
+    assert "in Windows-1252" in dict(feed.broken)["stops.txt"]
+
+
+def test_decimal_commas_are_read(tmp_path: Path) -> None:
+    table = TABLES["stops.txt"].replace(",", ";").replace("49.", "49,").replace("8.7", "8,7")
+    assert read(tmp_path, TABLES | {"stops.txt": table}).stops == read(tmp_path, TABLES).stops
+
+
+def test_upper_case_names_of_columns_and_tables_blank_lines_and_blanks_are_no_trouble(tmp_path: Path) -> None:
+    tables: dict[str, Any] = {}
+    for name, text in TABLES.items():
+        header, *rows = text.splitlines()
+        cells = [" , ".join(row.split(",")) for row in rows]
+        tables[name.upper().replace(".TXT", ".txt")] = "\n".join(["", header.upper(), "", *cells, " , ,", ""])
+    assert read(tmp_path, tables).patterns == read(tmp_path, TABLES).patterns
+
+
+def test_agencies_without_a_name_are_no_trouble(tmp_path: Path) -> None:
+    assert read(tmp_path, TABLES | {"agency.txt": "agency_id,agency_url\n1,x\n"}).attribution == "feed.zip"
+
+
+def test_times_that_are_none_are_named(tmp_path: Path) -> None:
+    table = TABLES["stop_times.txt"].replace("two, 6:00:00, 6:00:00", "two,six,six")
+    faults = dict(read(tmp_path, TABLES | {"stop_times.txt": table}).broken)
+    assert faults["trip two"] == "its time 'six' is none (8:00 or 08:00:00 would be); left out"
+
+
+def test_a_calendar_that_ended_before_the_map_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "feed.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in TABLES.items():
+            archive.writestr(zipfile.ZipInfo(name, (2024, 1, 1, 0, 0, 0)), content)
+    assert "calendar" not in dict(read_gtfs(path, FRAME, HALF).broken)
+    told = dict(read_gtfs(path, FRAME, HALF, as_of=date(2026, 3, 1)).broken)["calendar"]
+    assert "ended on 2024-01-13, 2 years before 2026-03-01" in told
+
+
+def test_a_calendar_that_ended_before_the_feed_was_packed_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "feed.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in TABLES.items():
+            archive.writestr(zipfile.ZipInfo(name, (2024, 2, 1, 0, 0, 0)), content)
+    assert "19 days before 2024-02-01" in dict(read_gtfs(path, FRAME, HALF).broken)["calendar"]
+
+
+def test_a_folder_is_told_to_be_zipped(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a folder; zip the tables in it"):
+        read_gtfs(tmp_path, FRAME, HALF)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("8:00", 28800), ("08:00:00.000", 28800), (" 8:05 ", 29100), ("12:30:00 AM", 1800), ("1:00 pm", 46800),
+     ("25:10", 90600), ("13:00 PM", None), ("8.00", None), ("", None)],
+)  # fmt: skip
+def test_times_as_typed(text: str, seconds: int | None) -> None:
+    assert seconds_of(text) == seconds
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"stops.txt": None}, "has no stops.txt"),
         ({"calendar.txt": None, "calendar_dates.txt": None}, "neither calendar.txt nor calendar_dates.txt"),
         ({"trips.txt": "route_id,service_id\n"}, "trips.txt has no column trip_id"),
-        ({"stops.txt": b"stop_id,stop_name,stop_lat,stop_lon\na,\xff\xfe,1,2\n"}, "stops.txt is not UTF-8"),
+        ({"stops.txt": b"\xff\xfes"}, "stops.txt: is no UTF-16 text"),
+        ({"stops.txt": None, "feed.zip": b"PK"}, "holds feed.zip; unpack it"),
         ({"stops.txt": "stop_id\n" + "a" * 70_000}, "a line of more than"),
     ],
 )

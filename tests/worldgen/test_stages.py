@@ -16,8 +16,8 @@ from vico.world.folder import read_world
 from vico.world.world import World
 from vico.worldgen import laying, recipe, shaping
 from vico.worldgen.ground.terrain import flat_terrain
-from vico.worldgen.many import read_place_table
 from vico.worldgen.pipeline import build_world, rebuild_world
+from vico.worldgen.place_tables import read_place_table
 from vico.worldgen.request import BuildOptions
 from vico.worldgen.stages import Stages
 
@@ -160,7 +160,7 @@ def test_many_places_are_built_side_by_side_and_a_bad_one_stops_nobody(
 
 def test_a_table_names_layouts_and_things_beside_it(tmp_path: Path) -> None:
     (tmp_path / "places.csv").write_text("name,lat,lon,layouts,things\na,1,2,plans,installed\nb,3,4,,\n")
-    first, second = read_place_table(tmp_path / "places.csv")
+    first, second = read_place_table(tmp_path / "places.csv").rows
     assert (first.layouts, first.things) == (str(tmp_path / "plans"), "installed")
     assert (second.layouts, second.things) == ("", "")
 
@@ -171,10 +171,11 @@ def test_a_table_names_layouts_and_things_beside_it(tmp_path: Path) -> None:
         ("", "lacks name, lat, lon"),
         ("name,lat,lon\n", "holds no place"),
         ("name,lat,lon\n../x,1,2\n", "can't be a folder's name"),
-        ("name,lat,lon\na,one,2\n", "could not convert"),
+        ("name,lat,lon\na,one,2\n", "latitude 'one' is no number of degrees"),
         ("name,lat,lon\na,91,2\n", "not on Earth"),
-        ("name,lat,lon\na,1,2\na,3,4\n", "named twice"),
-        ("name,lat,lon,colour\na,1,2,red\n", "unknown columns colour"),
+        ("name,lat,lon\na,100,20\n", "latitude and longitude look exchanged"),
+        ("name,lat,lon\na,52,1000,11,6000\n", "decimal commas must be quoted"),
+        ("name,lat,lon,raduis\na,1,2,60\n", "did you mean radius"),
         ("name,lat,lon,things\na,1,2,gold\n", "give procedural or installed"),
     ],
 )

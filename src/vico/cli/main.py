@@ -100,7 +100,8 @@ def world_build_many(
     """Build a table of places side by side.
 
     The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,layouts,things,
-    buildings,precedence,seed.
+    buildings,precedence,seed. Semicolons, tabs, decimal commas and columns such as City or Longitude are read too; a
+    row that can't be read is told with its line.
     Worlds that are there are kept, those that fail are told at the end (exit 1) and do not stop the others.
 
     Example: vico world build-many places.csv --out worlds --workers 4
@@ -121,8 +122,8 @@ def world_build_many(
     """
     from vico.cli import world as verb
 
-    rows = verb.rows_of_table(table, extracts=extracts, only=only)
-    return verb.build_table(rows, out=out, workers=workers or os.cpu_count() or 1, ray=ray, force=force, json=json)
+    places = verb.rows_of_table(table, extracts=extracts, only=only)
+    return verb.build_table(places, out=out, workers=workers or os.cpu_count() or 1, ray=ray, force=force, json=json)
 
 
 @world.command(name="info")

@@ -19,9 +19,9 @@ from vico.world.model import FLAT_GROUND
 from vico.world.stored import WORLD_FOLDER, stage_seconds
 from vico.world.world import World
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
-from vico.worldgen.many import PlaceRow
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
+from vico.worldgen.place_tables import PlaceTable, read_place_table
 from vico.worldgen.request import BuildOptions
 from vico.worldgen.sources import Sources
 
@@ -134,28 +134,28 @@ def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None
     return info(path, json=json)
 
 
-def rows_of_table(table: Path, *, extracts: Path | None, only: str) -> list[PlaceRow]:
+def rows_of_table(table: Path, *, extracts: Path | None, only: str) -> PlaceTable:
     """Return the places of a table, which is a file, or of a list that is known by name."""
-    from vico.worldgen.many import read_place_table
     from vico.worldgen.place_lists import place_lists, rows_of
 
     names = {name.strip() for name in only.split(",") if name.strip()}
     lists = place_lists()
     if not table.exists() and str(table) in lists:
-        return rows_of(lists[str(table)], extracts=extracts, only=names)
+        return PlaceTable(tuple(rows_of(lists[str(table)], extracts=extracts, only=names)))
     if not table.exists() and table.suffix == "":
         raise MissingFileError(f"{table}: no such file, and no list of that name; there are {', '.join(lists)}")
     if extracts is not None:
         raise InputError("build-many: --extracts is for lists known by name; a table names its files itself")
-    rows = read_place_table(table)
-    unknown = sorted(names - {row.name for row in rows})
+    read = read_place_table(table)
+    unknown = sorted(names - {row.name for row in read.rows} - {row.name for row in read.bad})
     if unknown:
         raise InputError(f"build-many: {table} has no place {unknown[0]!r}")
-    return [row for row in rows if not names or row.name in names]
+    rows = tuple(row for row in read.rows if not names or row.name in names)
+    return replace(read, rows=rows, bad=tuple(row for row in read.bad if not names or row.name in names))
 
 
 def build_table(
-    rows: Sequence[PlaceRow],
+    table: PlaceTable,
     *,
     out: str,
     workers: int,
@@ -163,10 +163,13 @@ def build_table(
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Build places; 1 if any failed."""
+    """Build places; 1 if any failed, or a row of the table could not be read."""
     from vico.io.stores import store_at
-    from vico.worldgen.many import build_many
+    from vico.worldgen.many import Outcome, build_many
 
+    rows = table.rows
+    for note in table.notes:
+        print(note, file=sys.stderr)
     with progress_bars() as report:
         report("places", 0, len(rows))
         outcomes = build_many(
@@ -178,6 +181,7 @@ def build_table(
             ray=ray,
             finished=lambda _, done, total: report("places", done, total),
         )
+    outcomes += [Outcome(row.name, "failed", reason=row.reason) for row in table.bad]
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
     if json:
         print_json({"ok": not failed, "places": [asdict(outcome) for outcome in outcomes]})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 
 from vico.errors import EmptyInputError, InputError
@@ -160,7 +161,7 @@ def gather(
     feeds = []
     if sources.gtfs:
         with stages.timed("timetables"):
-            feeds = [read_gtfs(path, frame, half) for path in sources.gtfs]
+            feeds = [read_gtfs(path, frame, half, as_of=_day_of(data)) for path in sources.gtfs]
         for path, feed in zip(sources.gtfs, feeds, strict=True):
             stages.given(feed, f"{feed.sha256} {where}")
             credits.append(
@@ -183,6 +184,11 @@ def gather(
         with stages.timed("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
+
+
+def _day_of(data: OsmData) -> date | None:
+    """Return the day that a map is of, if it says."""
+    return None if data.timestamp is None else date.fromisoformat(data.timestamp[:10])
 
 
 def _heights(

@@ -1,15 +1,14 @@
-"""Many worlds side by side: a table of places, a task each for processes of this machine or a Ray cluster."""
+"""Many worlds side by side: a task each for processes of this machine or a Ray cluster."""
 
 from __future__ import annotations
 
-import csv
 import importlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vico.errors import MissingFileError, SchemaError, VicoError
+from vico.errors import VicoError
 from vico.io.stores import FolderStore, Store, store_at
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.jobs.shared import check_seen, seen_by_all
@@ -17,31 +16,8 @@ from vico.world.folder import read_world
 from vico.world.remote import fetch_manifest
 from vico.world.stored import stage_seconds
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.sources import SERVICES, Sources
-
-_MOST_BYTES = 16 << 20
-_THINGS = ("", "procedural", "installed")
-
-
-@dataclass(frozen=True)
-class PlaceRow:
-    """A world to build; a row of the table. Several files in a cell are separated by ``;``."""
-
-    name: str
-    lat: float
-    lon: float
-    osm: str = ""
-    radius: float = 400.0
-    dem: str = ""
-    tiles: str = ""
-    gtfs: str = ""
-    places: str = ""
-    photos: str = ""
-    layouts: str = ""
-    things: str = ""
-    buildings: str = ""
-    precedence: str = ""
-    seed: int = 0
+from vico.worldgen.place_tables import PlaceRow
+from vico.worldgen.sources import Sources
 
 
 @dataclass(frozen=True)
@@ -60,81 +36,6 @@ class Outcome:
 Locate = Callable[[float, float, float], Path]
 #: Called with each outcome as it comes, how many there are by now, and how many there will be.
 Finished = Callable[[Outcome, int, int], None]
-
-
-def read_place_table(path: Path) -> list[PlaceRow]:
-    """Read a table of places, CSV with a header: ``name,lat,lon`` and any other field of `PlaceRow`.
-
-    File names are taken relative to the table's folder.
-
-    Raises
-    ------
-    MissingFileError, SchemaError
-        If it is not there or a row can't be read; the message gives the line.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise MissingFileError(f"{path}: no such file; give a CSV table with columns name, lat, lon")
-    if path.stat().st_size > _MOST_BYTES:
-        raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MB; split the table")
-    known = {f.name: f.type for f in fields(PlaceRow)}
-    rows: list[PlaceRow] = []
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            columns = [c.strip() for c in reader.fieldnames or []]
-            missing = [c for c in ("name", "lat", "lon") if c not in columns]
-            unknown = [c for c in columns if c not in known]
-            if missing or unknown:
-                what = f"lacks {', '.join(missing)}" if missing else f"has unknown columns {', '.join(unknown)}"
-                raise SchemaError(f"{path}: the header {what}; columns are {', '.join(known)}")
-            for content in reader:
-                rows.append(_row(content, path, reader.line_num))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise SchemaError(f"{path}: not a CSV table in UTF-8 ({error})") from None
-    doubled = sorted({row.name for row in rows if [r.name for r in rows].count(row.name) > 1})
-    if doubled:
-        raise SchemaError(f"{path}: {', '.join(doubled)} named twice; every world needs a folder of its own")
-    if not rows:
-        raise SchemaError(f"{path}: holds no place; add rows below the header")
-    return rows
-
-
-def _row(content: dict[str, str], path: Path, line: int) -> PlaceRow:
-    text = {key.strip(): (value or "").strip() for key, value in content.items() if key is not None}
-    name = text["name"]
-    if not name or name in (".", "..") or any(c in name for c in "/\\\0"):
-        raise SchemaError(f"{path}:{line}: name {name!r} can't be a folder's name")
-    try:
-        row = PlaceRow(
-            name,
-            float(text["lat"]),
-            float(text["lon"]),
-            osm=_beside(text.get("osm", ""), path),
-            radius=float(text.get("radius") or PlaceRow.radius),
-            dem=_beside(text.get("dem", ""), path),
-            tiles=_beside(text.get("tiles", ""), path),
-            gtfs=_beside(text.get("gtfs", ""), path),
-            places=_beside(text.get("places", ""), path),
-            photos=_beside(text.get("photos", ""), path),
-            layouts=_beside(text.get("layouts", ""), path),
-            things=text.get("things", ""),
-            buildings=_beside(text.get("buildings", ""), path),
-            precedence=_beside(text.get("precedence", ""), path),
-            seed=int(text.get("seed") or PlaceRow.seed),
-        )
-    except ValueError as error:
-        raise SchemaError(f"{path}:{line}: {name}: {error}") from None
-    if row.things not in _THINGS:
-        raise SchemaError(f"{path}:{line}: {name}: things {row.things!r}; give procedural or installed, or nothing")
-    if not (-90 <= row.lat <= 90 and -180 <= row.lon <= 180):
-        raise SchemaError(f"{path}:{line}: {name}: {row.lat}, {row.lon} is not on Earth")
-    return row
-
-
-def _beside(text: str, table: Path) -> str:
-    parts = [part.strip() for part in text.split(";") if part.strip()]
-    return ";".join(part if "://" in part or part in SERVICES else str(table.parent / part) for part in parts)
 
 
 def build_many(

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from vico.errors import InputError, MissingFileError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
-from vico.worldgen.many import PlaceRow
+from vico.worldgen.place_tables import PlaceRow
 
 _ROOM = "worlds"
 _GUIDE = "docs/places35.md"

@@ -17,11 +17,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.gtfs.feed import Feed, GtfsRoute, GtfsStop, Pattern
 from vico.geo.gtfs.tables import FeedTables
+from vico.io.delimited import decimal
 from vico.io.files import sha256_of
 
 _MOST_STOPS = 400  # calls of one trip
@@ -29,13 +31,15 @@ _MOST_REPEATS = 2_000  # departures that one row of frequencies.txt may stand fo
 _MOST_DAYS = 3_660
 _MOST_BROKEN = 200
 _WEEK = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
-_TIME = re.compile(r"\s*(\d{1,3}):([0-5]\d):([0-5]\d)\s*")
-_DATE = re.compile(r"(\d{4})(\d\d)(\d\d)")
+_TIME = re.compile(r"\s*(\d{1,3}):([0-5]?\d)(?::([0-5]?\d)(?:\.\d*)?)?\s*([ap])?\.?(?:m\.?)?\s*", re.IGNORECASE)
+_DATE = re.compile(r"(\d{4})(-?)(\d\d)\2(\d\d)")
 _COLOUR = re.compile(r"[0-9a-fA-F]{6}")
 _TRAMS = {0, 5, 12, *range(900, 907)}
 
 
-def read_gtfs(path: Path, frame: LocalFrame, half: float, *, day: date | None = None) -> Feed:
+def read_gtfs(
+    path: Path, frame: LocalFrame, half: float, *, day: date | None = None, as_of: date | None = None
+) -> Feed:
     """Read the bus routes of a zipped GTFS feed that stop in a window.
 
     Parameters
@@ -48,6 +52,9 @@ def read_gtfs(path: Path, frame: LocalFrame, half: float, *, day: date | None = 
         Half side of the window, metres.
     day
         Day of service; the weekday with the most trips in the window where not given (the first of several).
+    as_of
+        When the world is of, as its map says: a calendar that ended before then, or before the feed was packed, is told
+        of in `Feed.broken`.
 
     Returns
     -------
@@ -64,11 +71,13 @@ def read_gtfs(path: Path, frame: LocalFrame, half: float, *, day: date | None = 
         If nothing in the window runs on `day`.
     """
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; zip the tables in it, and give the zip")
     if not path.is_file():
         raise MissingFileError(f"{path}: no such file; give a zipped GTFS feed")
     try:
         with zipfile.ZipFile(path) as archive:
-            return _Reader(path, archive, frame, half).read(day)
+            return _Reader(path, archive, frame, half).read(day, as_of)
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError, ValueError) as error:
         if isinstance(error, SchemaError | InputError):
             raise
@@ -88,21 +97,31 @@ def kind_of(route_type: str) -> str | None:
 
 
 def seconds_of(text: str) -> int | None:
-    """Return a time (``25:10:00`` is ten past one the next day) as seconds of the service day, None if it is none."""
+    """Return a time (``25:10:00`` is ten past one the next day) as seconds of the service day, None if it is none.
+
+    Seconds may be left out (``8:00``); a spreadsheet's ``8:00:00 PM`` is read too.
+    """
     match = _TIME.fullmatch(text)
-    return None if match is None else int(match[1]) * 3600 + int(match[2]) * 60 + int(match[3])
+    if match is None:
+        return None
+    hours = int(match[1])
+    if match[4] is not None:
+        if not 1 <= hours <= 12:
+            return None
+        hours = hours % 12 + (12 if match[4] in "pP" else 0)
+    return hours * 3600 + int(match[2]) * 60 + int(match[3] or 0)
 
 
 def _date_of(text: str) -> date | None:
-    match = _DATE.fullmatch(text.strip())
+    match = _DATE.fullmatch(text)
     try:
-        return None if match is None else date(int(match[1]), int(match[2]), int(match[3]))
+        return None if match is None else date(int(match[1]), int(match[3]), int(match[4]))
     except ValueError:
         return None
 
 
 # stop_sequence, stop id, arrival, departure (None where not given)
-Call = tuple[int, str, int | None, int | None]
+Call = tuple[float, str, int | None, int | None]
 
 
 @dataclass
@@ -114,6 +133,7 @@ class _Trip:
     direction: str
     shape: str
     calls: list[Call] = field(default_factory=list)
+    unread: str = ""  # the first time that is none
 
 
 class _Reader:
@@ -123,7 +143,7 @@ class _Reader:
         self._rows = self._tables.rows
         self.broken: list[tuple[str, str]] = []
 
-    def read(self, day: date | None) -> Feed:
+    def read(self, day: date | None, as_of: date | None) -> Feed:
         self._tables.need("stops.txt", "routes.txt", "trips.txt", "stop_times.txt")
         if "calendar.txt" not in self._tables.members and "calendar_dates.txt" not in self._tables.members:
             raise SchemaError(f"{self.path}: has neither calendar.txt nor calendar_dates.txt; a GTFS feed has one")
@@ -133,6 +153,7 @@ class _Reader:
         trips = self._calling(self._trips(routes), stops) if stops else {}
         served = {trip.route for trip in trips.values()}
         chosen = self._day(trips, day)
+        self._tell_of_calendar(chosen, as_of)
         patterns: list[Pattern] = []
         if chosen is not None:
             running = self._running(trips, chosen)
@@ -147,7 +168,7 @@ class _Reader:
             routes=tuple(routes[k] for k in sorted(served)),
             patterns=tuple(patterns),
             attribution=self._attribution(agencies, {routes[k].agency for k in served}),
-            broken=tuple(self.broken),
+            broken=(*sorted(self._tables.told.items()), *self.broken)[:_MOST_BROKEN],
         )
 
     def _fault(self, what: str, why: str) -> None:
@@ -155,50 +176,70 @@ class _Reader:
             self.broken.append((what, why))
 
     def _agencies(self) -> dict[str, str]:
-        return {key.strip(): name.strip() for name, key in self._rows("agency.txt", ["agency_name"], ["agency_id"])}
+        return {key: name for name, key in self._rows("agency.txt", [], ["agency_name", "agency_id"]) if name}
 
     def _stops(self) -> tuple[dict[str, tuple[float, float]], dict[str, str]]:
         """Places and names of the stops in the window."""
         keys: list[str] = []
         names: list[str] = []
         degrees: list[tuple[float, float]] = []
-        for key, name, lat, lon, kind in self._rows("stops.txt", ["stop_id"], ["stop_name", "stop_lat", "stop_lon",
-                                                                                "location_type"]):  # fmt: skip
-            if kind.strip() not in ("", "0"):
+        wanted = ["stop_name", "stop_lat", "stop_lon", "location_type"]
+        for key, name, lat, lon, kind in self._rows("stops.txt", ["stop_id"], wanted):
+            if kind not in ("", "0"):
                 continue
-            try:
-                y, x = float(lat), float(lon)
-            except ValueError:
-                y = x = np.nan
-            if not (abs(y) <= 90.0 and abs(x) <= 180.0):
-                self._fault(f"stop {key[:60]}", f"no place on Earth ({lat[:20]}, {lon[:20]})")
+            y, x = decimal(lat), decimal(lon)
+            if y is None or x is None or not (abs(y) <= 90.0 and abs(x) <= 180.0):
+                exchanged = y is not None and x is not None and abs(x) <= 90.0 < abs(y) <= 180.0
+                why = "; latitude and longitude look exchanged" if exchanged else ""
+                self._fault(f"stop {key[:60]}", f"no place on Earth ({lat[:20]}, {lon[:20]}){why}")
                 continue
             keys.append(key)
-            names.append(name.strip())
+            names.append(name)
             degrees.append((y, x))
         if not keys:
             return {}, {}
-        south, north = self.frame.bbox(self.half)[1::2]
         table = np.array(degrees)
-        # Far away the projection has no bounds: only stops of these latitudes are asked about.
+        inside, xy = self._in_window(table)
+        if not len(inside):
+            self._tell_of_elsewhere(table)
+        chosen = {keys[i]: (round(float(x), 3), round(float(y), 3)) for i, (x, y) in zip(inside, xy, strict=True)}
+        return chosen, {keys[i]: names[i] for i in inside}
+
+    def _in_window(self, table: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return which places, degrees, lie in the window, and where in it, metres."""
+        south, north = self.frame.bbox(self.half)[1::2]
+        # Far away the projection has no bounds: only places of these latitudes are asked about.
         near = np.flatnonzero((table[:, 0] >= south) & (table[:, 0] <= north))
         xy = self.frame.to_enu(table[near, 0], table[near, 1]).reshape(-1, 2)
         inside = np.isfinite(xy).all(axis=1) & (np.abs(xy).max(axis=1, initial=0.0) <= self.half)
-        chosen = {keys[i]: (round(float(x), 3), round(float(y), 3)) for i, (x, y) in zip(near[inside], xy[inside],
-                                                                                         strict=True)}  # fmt: skip
-        return chosen, {keys[i]: names[i] for i in near[inside]}
+        return near[inside], xy[inside]
+
+    def _tell_of_elsewhere(self, table: NDArray[np.float64]) -> None:
+        """Say where the stops lie, as none is in the window; and whether they would be, the other way round."""
+        (south, west), (north, east) = table.min(axis=0), table.max(axis=0)
+        turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
+        why = (
+            "; latitude and longitude look exchanged: the other way round {0} would be; mend its stop_lat and stop_lon"
+        )
+        count = len(self._in_window(turned)[0]) if len(turned) else 0
+        self._fault(
+            "stops.txt",
+            f"none of its {len(table):,} stops lies in the window: they lie at latitudes {south:.4f}..{north:.4f} and "
+            f"longitudes {west:.4f}..{east:.4f}{why.format(f'{count:,}') if count else ''}",
+        )
 
     def _routes(self, agencies: dict[str, str]) -> dict[str, GtfsRoute]:
         only = next(iter(agencies.values())) if len(agencies) == 1 else ""
         routes = {}
         wanted = ["route_short_name", "route_long_name", "route_color", "agency_id"]
         for key, kind, short, long, colour, agency in self._rows("routes.txt", ["route_id", "route_type"], wanted):
-            what = kind_of(kind.strip())
+            what = kind_of(kind)
             if what is None:
+                if not kind.isdecimal():
+                    self._fault(f"route {key[:60]}", f"route_type {kind[:20]!r} is no number; left out")
                 continue
-            name = short.strip() or long.strip() or key
-            shade = f"#{colour.strip().lower()}" if _COLOUR.fullmatch(colour.strip()) else ""
-            routes[key] = GtfsRoute(key, name, long.strip(), what, shade, agencies.get(agency.strip(), only))
+            shade = f"#{colour.removeprefix('#').lower()}" if _COLOUR.fullmatch(colour.removeprefix("#")) else ""
+            routes[key] = GtfsRoute(key, short or long or key, long, what, shade, agencies.get(agency, only))
         return routes
 
     def _trips(self, routes: Collection[str]) -> dict[str, _Trip]:
@@ -206,7 +247,7 @@ class _Reader:
         rows = self._rows("trips.txt", ["route_id", "trip_id", "service_id"], ["direction_id", "shape_id"])
         for route, key, service, direction, shape in rows:
             if route in routes:
-                trips[key] = _Trip(route, service, direction.strip(), shape.strip())
+                trips[key] = _Trip(route, service, direction, shape)
         return trips
 
     def _calling(self, trips: dict[str, _Trip], stops: Collection[str]) -> dict[str, _Trip]:
@@ -221,15 +262,16 @@ class _Reader:
         ):
             if key not in near:
                 continue
-            try:
-                order = int(place)
-            except ValueError:
+            order = decimal(place)
+            if order is None:
                 self._fault(f"trip {key[:60]}", f"stop_sequence {place[:20]!r} is no number; the call is left out")
                 continue
-            calls = trips[key].calls
-            if len(calls) < _MOST_STOPS:
+            trip = trips[key]
+            if len(trip.calls) < _MOST_STOPS:
                 came, left = seconds_of(arrival), seconds_of(departure)
-                calls.append((order, stop, came if came is not None else left, left if left is not None else came))
+                if came is None and left is None and not trip.unread:
+                    trip.unread = arrival or departure
+                trip.calls.append((order, stop, came if came is not None else left, left if left is not None else came))
         kept = {}
         for key in sorted(near):
             trips[key].calls.sort(key=lambda call: call[0])
@@ -250,16 +292,22 @@ class _Reader:
                 continue
             start, end = _date_of(first), _date_of(last)
             if start is None or end is None:
-                self._fault(f"service {key[:60]}", f"dates {first[:12]!r}, {last[:12]!r} are none; left out")
+                self._fault(
+                    f"service {key[:60]}", f"dates {first[:12]!r}, {last[:12]!r} are none (20260131 would be); left out"
+                )
                 continue
             for k in range(min((end - start).days + 1, _MOST_DAYS)):
-                if week[(start.weekday() + k) % 7].strip() == "1":
+                if week[(start.weekday() + k) % 7] == "1":
                     days[key].add(start + timedelta(days=k))
         for key, text, what in self._rows("calendar_dates.txt", ["service_id", "date", "exception_type"]):
-            when = _date_of(text) if key in wanted else None
-            if when is not None and what.strip() == "1":
+            if key not in wanted:
+                continue
+            when = _date_of(text)
+            if when is None:
+                self._fault(f"service {key[:60]}", f"date {text[:12]!r} is none (20260131 would be); left out")
+            elif what == "1":
                 days[key].add(when)
-            elif when is not None and what.strip() == "2":
+            elif what == "2":
                 days[key].discard(when)
         return days
 
@@ -278,6 +326,21 @@ class _Reader:
         weekdays = [when for when in load if when.weekday() < 5 and load[when]] or [w for w in load if load[w]]
         return min(weekdays, key=lambda when: (-load[when], when)) if weekdays else None
 
+    def _tell_of_calendar(self, chosen: date | None, as_of: date | None) -> None:
+        """Say that the timetable is an old one, where it ended before the map's day or the day the feed was packed."""
+        if chosen is None:
+            return
+        ended = max(day for days in self._days.values() for day in days)
+        now = max(self._tables.packed, as_of or date.min)
+        if ended < now:
+            years = (now - ended).days // 365
+            ago = f"{years} year{'s' * (years > 1)}" if years else f"{(now - ended).days} days"
+            self._fault(
+                "calendar",
+                f"its services here ended on {ended}, {ago} before {now}, when the map or the feed was made; the "
+                f"timetable of {chosen} is taken; download a newer feed to have today's",
+            )
+
     def _running(self, trips: dict[str, _Trip], day: date) -> dict[str, _Trip]:
         """Trips of the day; those of frequencies.txt once for each departure."""
         running = {key: trip for key, trip in trips.items() if day in self._days.get(trip.service, ())}
@@ -288,7 +351,7 @@ class _Reader:
             if trip is None:
                 continue
             start, end = seconds_of(first), seconds_of(last)
-            step = int(gap) if gap.strip().isdecimal() and len(gap.strip()) < 7 else 0
+            step = int(gap) if gap.isdecimal() and len(gap) < 7 else 0
             if start is None or end is None or step < 1 or (end - start) / step > _MOST_REPEATS:
                 self._fault(
                     f"trip {key[:60]}", f"frequency {first[:9]}-{last[:9]} every {gap[:9]} s makes no timetable"
@@ -336,16 +399,15 @@ class _Reader:
 
     def _shapes(self, wanted: Collection[str]) -> dict[str, tuple[tuple[float, float], ...]]:
         """Lines of shapes near the window."""
-        rows: dict[str, list[tuple[int, float, float]]] = defaultdict(list)
+        rows: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
         if not wanted:
             return {}
         for key, lat, lon, order in self._rows(
             "shapes.txt", ["shape_id", "shape_pt_lat", "shape_pt_lon", "shape_pt_sequence"]
         ):
             if key in wanted:
-                try:
-                    y, x, n = float(lat), float(lon), int(order)
-                except ValueError:
+                y, x, n = decimal(lat), decimal(lon), decimal(order)
+                if y is None or x is None or n is None:
                     continue
                 if abs(y - self.frame.lat) < 1.0 and abs((x - self.frame.lon + 180.0) % 360.0 - 180.0) <= 90.0:
                     rows[key].append((n, y, x))
@@ -359,8 +421,8 @@ class _Reader:
 
     def _attribution(self, agencies: dict[str, str], served: Collection[str]) -> str:
         """Who made it: the publisher of feed_info.txt and attributions.txt, else the agencies that serve the window."""
-        named = [name.strip() for (name,) in self._rows("feed_info.txt", ["feed_publisher_name"])]
-        named += [name.strip() for (name,) in self._rows("attributions.txt", ["organization_name"])]
+        named = [name for (name,) in self._rows("feed_info.txt", [], ["feed_publisher_name"])]
+        named += [name for (name,) in self._rows("attributions.txt", [], ["organization_name"])]
         named = [name for name in named if name] or sorted(name for name in served if name)
         named = named or list(agencies.values())
         return ", ".join(dict.fromkeys(name[:200] for name in named[:12])) or self.path.name
@@ -373,6 +435,8 @@ def _timed(trip: _Trip) -> str | None:
         return "calls at fewer than two stops; left out"
     known = [k for k, call in enumerate(calls) if call[2] is not None]
     if not known or known[0] != 0 or known[-1] != len(calls) - 1:
+        if trip.unread:
+            return f"its time {trip.unread[:20]!r} is none (8:00 or 08:00:00 would be); left out"
         return "has no time at its first or last stop; left out"
     for a, b in pairwise(known):
         start, end = calls[a][3] or 0, calls[b][2] or 0

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import zipfile
 from collections.abc import Iterator, Sequence
+from datetime import date
 from pathlib import Path
 
 from vico.errors import SchemaError
+from vico.io.delimited import DelimitedText
 
 _MOST_BYTES = 4 << 30  # unpacked, of one table
 _MOST_RATIO = 400  # unpacked to packed; timetables pack 10 to 40 to 1
-_MOST_LINE = 1 << 16
+_DEEPEST = 3  # folders of the zip, and the table in them
 
 
 class _Bounded(io.RawIOBase):
@@ -33,23 +34,38 @@ class _Bounded(io.RawIOBase):
         return len(data)
 
 
+def _day_of(info: zipfile.ZipInfo) -> date:
+    try:
+        return date(*info.date_time[:3])
+    except ValueError:
+        return date.min  # some zips state no date
+
+
 class FeedTables:
     """The tables of an open feed.
 
     Attributes
     ----------
     members
-        What there is, by file name.
+        What there is, by file name in lower case.
+    packed
+        When the newest table was written, as the zip says.
+    told
+        Table and how it is read, of those that are written otherwise than the format asks for.
     """
 
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
         self.path, self._archive = path, archive
         self.members: dict[str, zipfile.ZipInfo] = {}
-        for info in archive.infolist():
-            parts = info.filename.replace("\\", "/").split("/")
-            # Some feeds lie in a folder of their zip.
-            if len(parts) <= 2 and parts[-1].endswith(".txt"):
-                self.members.setdefault(parts[-1], info)
+        self.told: dict[str, str] = {}
+        named = [(info.filename.replace("\\", "/").split("/"), info) for info in archive.infolist()]
+        # Some feeds lie in a folder of their zip; the tables nearest to its top count.
+        for parts, info in sorted(named, key=lambda entry: len(entry[0])):
+            name = parts[-1].lower()
+            if len(parts) <= _DEEPEST and name.endswith(".txt") and not name.startswith("."):
+                self.members.setdefault(name, info)
+        self.packed = max(map(_day_of, self.members.values()), default=date.min)
+        self._zips = [info.filename for _, info in named if info.filename.lower().endswith(".zip")]
 
     def need(self, *names: str) -> None:
         """Refuse a feed that lacks a table.
@@ -61,13 +77,9 @@ class FeedTables:
         """
         for name in names:
             if name not in self.members:
+                if self._zips:
+                    raise SchemaError(f"{self.path}: holds {self._zips[0]}; unpack it, and give that")
                 raise SchemaError(f"{self.path}: has no {name}, which every GTFS feed has; download it again")
-
-    def _lines(self, text: io.TextIOWrapper, name: str) -> Iterator[str]:
-        while line := text.readline(_MOST_LINE):
-            if len(line) >= _MOST_LINE:
-                raise SchemaError(f"{self.path}: {name} has a line of more than {_MOST_LINE:,} characters")
-            yield line.replace("\0", "")
 
     def rows(self, name: str, needed: Sequence[str], wanted: Sequence[str] = ()) -> Iterator[list[str]]:
         """Yield the named columns of a table, row by row; empty texts for optional columns that it lacks.
@@ -75,7 +87,7 @@ class FeedTables:
         Raises
         ------
         SchemaError
-            If it lacks a needed column, is no CSV in UTF-8, or unpacks to an absurd size.
+            If it lacks a needed column, is no table, or unpacks to an absurd size.
         """
         if name not in self.members:
             return
@@ -83,24 +95,30 @@ class FeedTables:
         most = min(_MOST_BYTES, max(info.compress_size, 1 << 14) * _MOST_RATIO)
         if info.file_size > most:
             raise SchemaError(f"{self.path}: {name} unpacks to an absurd size; this is no timetable")
+        what = f"{self.path}: {name}"
         with self._archive.open(info) as stream:
-            raw = io.BufferedReader(_Bounded(stream, most, f"{self.path}: {name}"), 1 << 16)  # type: ignore[arg-type]
-            text = io.TextIOWrapper(raw, encoding="utf-8-sig", newline="")
-            table = csv.reader(self._lines(text, name))
-            try:
-                header = [column.strip() for column in next(table, [])]
-                missing = [column for column in needed if column not in header]
-                if missing:
-                    raise SchemaError(f"{self.path}: {name} has no column {missing[0]}; the feed can't be used")
-                at = [header.index(column) if column in header else -1 for column in (*needed, *wanted)]
-                last = max(at)
-                for row in table:
-                    if len(row) > last:
-                        yield [row[k] if k >= 0 else "" for k in at]
-                    elif row:
-                        row = row + [""] * (last + 1 - len(row))
-                        yield [row[k] if k >= 0 else "" for k in at]
-            except UnicodeDecodeError as error:
-                raise SchemaError(f"{self.path}: {name} is not UTF-8 ({error.reason}); save it as UTF-8") from None
-            except csv.Error as error:
-                raise SchemaError(f"{self.path}: {name}, line {table.line_num}: {error}; mend the table") from None
+            raw = io.BufferedReader(_Bounded(stream, most, what), 1 << 16)  # type: ignore[arg-type]
+            table = DelimitedText(raw, what, dict.fromkeys((*needed, *wanted), ()))
+            header = table.header
+            missing = [column for column in needed if column not in header]
+            if missing:
+                found = ", ".join(column[:40] for column in header[:12]) or "none"
+                raise SchemaError(
+                    f"{what} has no column {missing[0]} (separated by {table.separator}, its columns are {found}); the "
+                    "feed can't be used"
+                )
+            at = [header.index(column) if column in header else -1 for column in (*needed, *wanted)]
+            last = max(at)
+            for row in table:
+                if len(row) <= last:
+                    row = row + [""] * (last + 1 - len(row))
+                yield [row[k] if k >= 0 else "" for k in at]
+            self._tell(name, table)
+
+    def _tell(self, name: str, table: DelimitedText) -> None:
+        """Note how a table is written that is not written as the format asks for."""
+        encoding = "Windows-1252" if table.foreign else table.encoding
+        said = [f"separated by {table.separator}"] if table.separator != "commas" else []
+        said += [f"in {encoding}"] if encoding != "UTF-8" else []
+        if said:
+            self.told[name] = f"is {' and '.join(said)}, where the format asks for commas and UTF-8; read all the same"

@@ -1,0 +1,211 @@
+"""A table of places to build, as people and spreadsheets write it."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from vico.errors import MissingFileError, SchemaError
+from vico.io.delimited import DelimitedText, decimal, table_of
+from vico.worldgen.sources import SERVICES
+
+_MOST_BYTES = 16 << 20
+_LONGEST_NAME = 200  # bytes; file systems take 255, and a temporary folder's name is longer
+_THINGS = ("", "procedural", "installed")
+_FILES = ("osm", "dem", "tiles", "gtfs", "places", "photos", "layouts", "buildings", "precedence")
+# Other names that tables have for columns, those that count first in front.
+_SPELLINGS: dict[str, tuple[str, ...]] = {
+    "name": ("place", "city", "town", "title", "label", "site", "location", "id"),
+    "lat": ("latitude", "lat deg", "y"),
+    "lon": ("longitude", "long", "lng", "lon deg", "x"),
+    "osm": ("map", "extract", "osm file", "pbf"),
+    "radius": ("radius m", "half"),
+    "dem": ("elevation",),
+}
+# 52.1, 52,1°, N 52.1, 52°06'00.0"N
+_ANGLE = re.compile(
+    r"""([NSEW])?\s*([+-]?\d[\d.,]*)\s*°?(?:\s*(\d[\d.,]*)\s*['′’])?(?:\s*(\d[\d.,]*)\s*(?:"|″|”|''))?\s*([NSEW])?""",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class PlaceRow:
+    """A world to build; a row of the table. Several files in a cell are separated by ``;``."""
+
+    name: str
+    lat: float
+    lon: float
+    osm: str = ""
+    radius: float = 400.0
+    dem: str = ""
+    tiles: str = ""
+    gtfs: str = ""
+    places: str = ""
+    photos: str = ""
+    layouts: str = ""
+    things: str = ""
+    buildings: str = ""
+    precedence: str = ""
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class BadRow:
+    """A row that can't be read: its name, or its line where it has none, and the reason, which gives the line."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class PlaceTable:
+    """What a table of places holds.
+
+    Attributes
+    ----------
+    rows
+        The places, in the order of the table.
+    bad
+        Rows that can't be read.
+    notes
+        What was read otherwise than it is written in the guide, or not at all, a sentence each.
+    """
+
+    rows: tuple[PlaceRow, ...]
+    bad: tuple[BadRow, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_place_table(path: Path) -> PlaceTable:
+    """Read a table of places with a header: ``name,lat,lon`` and any other field of `PlaceRow`.
+
+    Usual names of columns (``City``, ``Latitude``, ``lng``), semicolons or tabs, decimal commas, degrees and minutes,
+    and other encodings than UTF-8 are read too; empty rows are passed over. File names are taken relative to the
+    table's folder.
+
+    Raises
+    ------
+    MissingFileError
+        If it is not there.
+    SchemaError
+        If it is no table, lacks a column, or no row of it can be read; the message gives the line.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise MissingFileError(f"{path}: no such file; give a CSV table with columns name, lat, lon")
+    if path.stat().st_size > _MOST_BYTES:
+        raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MB; split the table")
+    with path.open("rb") as file:
+        if file.read(4) in (b"PK\3\4", b"\xd0\xcf\x11\xe0"):
+            raise SchemaError(f"{path}: is a spreadsheet's own file; save it as CSV")
+    known = [f.name for f in fields(PlaceRow)]
+    table = table_of(path, {name: _SPELLINGS.get(name, ()) for name in known})
+    notes = _checked_header(table, path, known)
+    rows: dict[str, tuple[int, PlaceRow]] = {}
+    bad: list[BadRow] = []
+    for cells in table:
+        name, line = dict(zip(table.header, cells, strict=False)).get("name", ""), table.line
+        try:
+            if any(cells[len(table.header) :]):
+                raise ValueError(
+                    f"has {len(cells)} cells under {len(table.header)} columns; numbers with decimal commas must be "
+                    "quoted in a table that commas separate"
+                )
+            row = _row(dict(zip(table.header, cells, strict=False)), path)
+            if name in rows:
+                raise ValueError(f"named as line {rows[name][0]} is; every world needs a folder of its own")
+            rows[name] = line, row
+        except ValueError as error:
+            bad.append(BadRow(name or f"line {line}", f"{path}:{line}: {f'{name}: ' if name else ''}{error}"))
+    if not rows:
+        raise SchemaError(bad[0].reason if bad else f"{path}: holds no place; add rows below the header")
+    if table.foreign or table.encoding != "UTF-8":
+        notes.append(f"{path}: read as {'Windows-1252' if table.foreign else table.encoding}, as it is no UTF-8")
+    return PlaceTable(tuple(row for _, row in rows.values()), tuple(bad), tuple(notes))
+
+
+def _checked_header(table: DelimitedText, path: Path, known: list[str]) -> list[str]:
+    """Return notes on how a table is written; refuse one that lacks a column, or has one that looks misspelt."""
+    header = [column for column in table.header if column]
+    found = f"separated by {table.separator}, it has {', '.join(header[:20]) or 'none'}"
+    missing = [column for column in ("name", "lat", "lon") if column not in header]
+    if missing:
+        raise SchemaError(f"{path}: the header lacks {', '.join(missing)} ({found}); columns are {', '.join(known)}")
+    unknown = [column for column in header if column not in known]
+    for column in unknown:
+        if near := difflib.get_close_matches(column.casefold(), known, n=1, cutoff=0.75):
+            raise SchemaError(f"{path}: the header has a column {column}; did you mean {near[0]}?")
+    notes = []
+    if unknown:
+        are = "column is" if len(unknown) == 1 else "columns are"
+        notes.append(f"{path}: {', '.join(unknown)}: no such {are} known; passed over")
+    return notes
+
+
+def _row(text: Mapping[str, str], path: Path) -> PlaceRow:
+    """Return a row of the table.
+
+    Raises
+    ------
+    ValueError
+        If a cell is not as it should be.
+    """
+    name = text.get("name", "")
+    if not name or name in (".", "..") or any(c in "/\\" or not c.isprintable() for c in name):
+        raise ValueError(f"name {name!r} can't be a folder's name")
+    if len(name.encode()) > _LONGEST_NAME:
+        raise ValueError(f"a name of {len(name.encode())} bytes is too long for a folder's name")
+    lat, lon = _degrees(text.get("lat", ""), "latitude", "NS"), _degrees(text.get("lon", ""), "longitude", "EW")
+    if not (-90 <= lat <= 90 and -180 <= lon <= 180):
+        exchanged = "; latitude and longitude look exchanged" if abs(lon) <= 90 < abs(lat) <= 180 else ""
+        raise ValueError(f"{lat:g}, {lon:g} is not on Earth{exchanged}; give degrees, latitude -90..90 first")
+    things = text.get("things", "")
+    if things not in _THINGS:
+        raise ValueError(f"things {things!r}; give procedural or installed, or nothing")
+    return PlaceRow(
+        name,
+        lat,
+        lon,
+        radius=_number(text.get("radius", ""), "radius", PlaceRow.radius),
+        things=things,
+        seed=_seed(text.get("seed", "")),
+        **{column: _beside(text.get(column, ""), path) for column in _FILES},
+    )
+
+
+def _degrees(text: str, what: str, letters: str) -> float:
+    """Return an angle, degrees; the second of `letters` (south, west for longitudes) counts down."""
+    match = _ANGLE.fullmatch(text)
+    parts = [] if match is None else [decimal(part) for part in match.group(2, 3, 4) if part is not None]
+    if match is None or None in parts:
+        raise ValueError(f"{what} {text[:40]!r} is no number of degrees")
+    letter = (match[1] or match[5] or "").upper()
+    if letter and letter not in letters:
+        raise ValueError(f"{what} {text[:40]!r} is none; latitude and longitude look exchanged")
+    value = sum(abs(part or 0.0) / 60.0**k for k, part in enumerate(parts))
+    return -value if match[2].startswith("-") or (letter and letter in "SW") else value
+
+
+def _number(text: str, what: str, otherwise: float) -> float:
+    if not text:
+        return otherwise
+    value = decimal(text.removesuffix("m"))
+    if value is None or value <= 0.0:
+        raise ValueError(f"{what} {text[:40]!r} is no positive number of metres")
+    return value
+
+
+def _seed(text: str) -> int:
+    value = decimal(text) if text else float(PlaceRow.seed)
+    if value is None or value != round(value):
+        raise ValueError(f"seed {text[:40]!r} is no whole number")
+    return round(value)
+
+
+def _beside(text: str, table: Path) -> str:
+    parts = [part.strip() for part in text.split(";") if part.strip()]
+    return ";".join(part if "://" in part or part in SERVICES else str(table.parent / part) for part in parts)
