@@ -64,6 +64,17 @@ def test_voids_are_filled_from_their_neighbours_and_counted(tmp_path: Path) -> N
     assert len(samples.points) == len(read_elevation(whole, FRAME, 300).points)
 
 
+def test_a_spike_is_left_out_filled_and_told(tmp_path: Path) -> None:
+    heights = slope()
+    heights[30, 30] = 8850.0
+    path = write_geotiff(tmp_path / "a.tif", heights, west=7.485, north=43.515, step=0.0005)
+    samples = read_elevation(path, FRAME, 300.0)
+    ((name, lat, lon, height),) = samples.outliers
+    assert (name, height, samples.filled) == ("a.tif", 8850.0, 1)
+    assert (lat, lon) == pytest.approx((43.5, 7.5), abs=1e-6)
+    assert samples.points[:, 2].max() < 600.0
+
+
 def test_a_window_that_is_mostly_void_is_refused(tmp_path: Path) -> None:
     heights = slope()
     heights[:, :32] = -9999

@@ -122,14 +122,14 @@ def test_stops_of_elsewhere_are_told_with_where_they_lie(tmp_path: Path) -> None
     path.write_bytes(feed_bytes(TABLES))
     what, why = read_gtfs(path, LocalFrame(-33.0, 151.0), HALF).broken[-1]
     assert what == "stops.txt"
-    assert "none of its 4 stops lies in the window: they lie at latitudes 49.4101..49.5100" in why
+    assert "none of its 4 stops lies in the window; they lie at latitudes 49.4101..49.5100" in why
     assert "exchanged" not in why
 
 
 def test_exchanged_latitudes_and_longitudes_are_told(tmp_path: Path) -> None:
     turned = TABLES["stops.txt"].replace("stop_lat,stop_lon", "stop_lon,stop_lat")
     assert (
-        "look exchanged: the other way round 3 would be" in read(tmp_path, TABLES | {"stops.txt": turned}).broken[-1][1]
+        "look exchanged, the other way round 3 would;" in read(tmp_path, TABLES | {"stops.txt": turned}).broken[-1][1]
     )
 
 

@@ -47,6 +47,9 @@ class HeightSamples:
         Share of the window that the files have pixels for.
     beyond
         Where they do not cover all of it: what they cover, and what became of the rest.
+    outliers
+        File, latitude, longitude and metres of each pixel that was left out, as no ground stands so far above or below
+        all around it (a spike, a hole); it is filled as voids are.
     """
 
     points: NDArray[np.float64]
@@ -57,6 +60,7 @@ class HeightSamples:
     files: tuple[tuple[str, str, int], ...] = ()
     covered: float = 1.0
     beyond: str = ""
+    outliers: tuple[tuple[str, float, float, float], ...] = ()
 
 
 def read_elevation(
@@ -129,7 +133,9 @@ def read_elevation(
     total = digests[used[0]] if len(used) == 1 else sha256("".join(digests[path] for path in used).encode()).hexdigest()
     total += "".join(f" {path.name} {crs}" for path, crs in systems if crs)
     name = ", ".join(path.name for path in used)
-    return HeightSamples(points, min(cut.spacing for cut in cuts), name, total, filled, files, covered, beyond)
+    outliers = tuple((cut.path.name, *place) for cut in cuts for place in cut.outliers)
+    spacing = min(cut.spacing for cut in cuts)
+    return HeightSamples(points, spacing, name, total, filled, files, covered, beyond, outliers)
 
 
 def _opened(path: Path, frame: LocalFrame, reach: float, crs: str) -> Raster:

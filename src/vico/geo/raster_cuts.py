@@ -12,6 +12,7 @@ from pyproj import Transformer
 
 from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
+from vico.geo.outliers import without_outliers
 from vico.geo.rasters import Raster
 
 _LOWEST, _HIGHEST = -1000.0, 9000.0  # SRTM's void is -32768, others use -9999; no dry land lies under -430 m
@@ -23,7 +24,17 @@ FINEST = 2.0
 
 @dataclass(frozen=True)
 class RasterCut:
-    """The part of a raster around the window; `xy` are its pixels' centres, metres, shape ``(rows, columns, 2)``."""
+    """The part of a raster around the window.
+
+    Attributes
+    ----------
+    xy
+        Its pixels' centres, metres, shape ``(rows, columns, 2)``.
+    spacing
+        Distance between neighbouring pixels, metres.
+    outliers
+        Latitude, longitude and metres of heights that no ground has, and that were left out.
+    """
 
     path: Path
     raster: Raster
@@ -32,6 +43,7 @@ class RasterCut:
     heights: NDArray[np.float64]
     xy: NDArray[np.float64]
     spacing: float
+    outliers: tuple[tuple[float, float, float], ...] = ()
 
     def _holds(self, pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
         # The outermost pixels reach half a pixel beyond their centres.
@@ -108,6 +120,12 @@ def cut_of(path: Path, raster: Raster, frame: LocalFrame, reach: float) -> Raste
     affine[:, 2] += affine[:, :2] @ np.array([c0, r0])
     xy = _centres(frame, to_raster, affine, heights.shape)
     spacing = _spacing(xy, path)
+    heights, odd = without_outliers(heights, spacing)
+    outliers = tuple(
+        (float(lat), float(lon), height)
+        for row, column, height in odd
+        for lat, lon in [frame.to_geodetic(xy[row, column])]
+    )
     # Finer than the terrain can show, or too many to fit: averaged in blocks.
     step = max(round(FINEST / spacing), math.ceil(math.sqrt(heights.size / _MOST_POINTS)), 1)
     if step > 1 and min(heights.shape) >= 2 * step:
@@ -116,7 +134,7 @@ def cut_of(path: Path, raster: Raster, frame: LocalFrame, reach: float) -> Raste
         affine[:, :2] *= step
         xy = _centres(frame, to_raster, affine, heights.shape)
         spacing = _spacing(xy, path)
-    return RasterCut(path, raster, to_raster, affine, heights, xy, spacing)
+    return RasterCut(path, raster, to_raster, affine, heights, xy, spacing, outliers)
 
 
 def _centres(

@@ -175,7 +175,7 @@ def decimal(text: str) -> float | None:
     return float(stripped.replace(",", ".")) if _NUMBER.fullmatch(stripped) else None
 
 
-def _encoding_of(stream: BinaryIO) -> tuple[str, str, io.BufferedReader]:
+def _encoding_of(stream: BinaryIO) -> tuple[str, str, BinaryIO]:
     """Return a codec, the encoding in words, and the stream from its start."""
     head = stream.read(4096)
     whole = io.BufferedReader(_Rest(head, stream), 1 << 16)

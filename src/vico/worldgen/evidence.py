@@ -40,6 +40,7 @@ from vico.worldgen.stages import Stages
 _TILE_MARGIN = 80.0  # metres: as far as the terrain goes beyond the window, and what hides its border
 _TILE_ERROR = 0.4  # metres: coarser tiles have photos too blurred for walls with texels of 10 cm
 _MOST_PHOTOS = 400
+_SHOWN_OUTLIERS = 3
 
 
 @dataclass(frozen=True)
@@ -131,6 +132,9 @@ def gather(
             {"heights_cover_percent": round(100 * samples.covered)},
             [Dropped(id=samples.name, reason=samples.beyond)],
         )
+    if samples is not None and samples.outliers:
+        told = [Dropped(id=name, reason=reason) for name, reason in _outlying(samples)]
+        stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
     credits = [
         Source(
             kind="map",
@@ -184,6 +188,18 @@ def gather(
         with stages.timed("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
+
+
+def _outlying(samples: HeightSamples) -> list[tuple[str, str]]:
+    """Return each file with heights that no ground has, and a sentence on them."""
+    told = []
+    for name in dict.fromkeys(row[0] for row in samples.outliers):
+        rows = [row for row in samples.outliers if row[0] == name]
+        shown = ", ".join(f"{height:.0f} m at {lat:.5f}, {lon:.5f}" for _, lat, lon, height in rows[:_SHOWN_OUTLIERS])
+        more = f" and {len(rows) - _SHOWN_OUTLIERS} more" if len(rows) > _SHOWN_OUTLIERS else ""
+        what = "1 height stands" if len(rows) == 1 else f"{len(rows)} heights stand"
+        told.append((name, f"{what} far above or below all around, left out and filled in: {shown}{more}"))
+    return told
 
 
 def _day_of(data: OsmData) -> date | None:

@@ -218,14 +218,13 @@ class _Reader:
         """Say where the stops lie, as none is in the window; and whether they would be, the other way round."""
         (south, west), (north, east) = table.min(axis=0), table.max(axis=0)
         turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
-        why = (
-            "; latitude and longitude look exchanged: the other way round {0} would be; mend its stop_lat and stop_lon"
-        )
+        turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
         count = len(self._in_window(turned)[0]) if len(turned) else 0
+        why = f"latitude and longitude look exchanged, the other way round {count:,} would; " if count else ""
         self._fault(
             "stops.txt",
-            f"none of its {len(table):,} stops lies in the window: they lie at latitudes {south:.4f}..{north:.4f} and "
-            f"longitudes {west:.4f}..{east:.4f}{why.format(f'{count:,}') if count else ''}",
+            f"none of its {len(table):,} stops lies in the window; {why}they lie at latitudes {south:.4f}..{north:.4f} "
+            f"and longitudes {west:.4f}..{east:.4f}",
         )
 
     def _routes(self, agencies: dict[str, str]) -> dict[str, GtfsRoute]:
