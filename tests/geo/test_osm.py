@@ -304,13 +304,6 @@ def test_hostile_xml_is_refused(tmp_path: Path, start: str) -> None:
         read_osm(path, LocalFrame(0.0002, 0.0002), 100.0)
 
 
-def test_negative_ids_are_pointed_out(tmp_path: Path) -> None:
-    path = tmp_path / "draft.osm"
-    path.write_text(SQUARE.replace('id="', 'id="-').replace('ref="', 'ref="-'))
-    with pytest.raises(SchemaError, match="renumber"):
-        read_osm(path, LocalFrame(0.0002, 0.0002), 100.0)
-
-
 @pytest.fixture(scope="module")
 def small_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     folder = tmp_path_factory.mktemp("small")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +17,7 @@ from shapely import MultiPolygon, Polygon
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.geo import overlay
 from vico.geo.frame import LocalFrame
+from vico.geo.osm_editing import FIRST_DRAFT, deleted_objects, draft_places, own_id
 from vico.geo.outlines import check_size, is_scribble, mended, simplified
 from vico.geo.overlay import OverlayError
 from vico.geo.overlay import polygons_of as polygons_of
@@ -59,6 +61,7 @@ _LINEAR_VALUES = {
     "power": {"line", "minor_line", "cable"},
     "historic": {"citywalls", "city_wall"},
 }
+_MOST_TOLD = 100  # deleted objects
 _STAMP = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ")
 
 
@@ -241,29 +244,46 @@ class _Reader:
         self.partial: dict[int, int] = {}  # way -> nodes that are missing
         self.drafts = 0
         self.objects = 0
+        self.deleted: frozenset[tuple[str, int]] = frozenset()
+        self.places: dict[int, tuple[float, float]] | None = None  # of nodes with negative ids
 
     def read(self) -> None:
         with osmium.io.Reader(self.path, osmium.osm.NOTHING) as file:
+            if file.header().has_multiple_object_versions:
+                raise SchemaError(
+                    f"{self.path}: holds the history of its objects; cut out a day with: osmium time-filter FILE "
+                    "2026-01-01T00:00:00Z -o DAY.osm.pbf"
+                )
             self.stamp = file.header().get("osmosis_replication_timestamp")
             self.covered = self._box(file.header().box())
+        self.deleted = deleted_objects(Path(self.path))
         wanted: set[int] = set()
         for relation in osmium.FileProcessor(self.path, osmium.osm.RELATION):
             self.objects += 1
+            if relation.deleted or ("r", relation.id) in self.deleted:
+                continue
             self.newest = max(self.newest, relation.timestamp.timestamp())
             tags = dict(relation.tags)
-            members = [(member.type, member.ref, member.role) for member in relation.members]
-            self.relations.append(OsmRelation(relation.id, members, tags))
+            members = [
+                (member.type, own_id(member.ref), member.role)
+                for member in relation.members
+                if (member.type, member.ref) not in self.deleted
+            ]
+            self.drafts += relation.id < 0
+            self.relations.append(OsmRelation(own_id(relation.id), members, tags))
             if tags.get("type") == "multipolygon":
                 wanted.update(ref for kind, ref, _ in members if kind == "w")
         entities = osmium.osm.NODE | osmium.osm.WAY
         untagged = osmium.filter.EmptyTagFilter().enable_for(osmium.osm.NODE)
         for thing in osmium.FileProcessor(self.path, entities).with_locations().with_filter(untagged):
             self.objects += 1
+            if thing.deleted or (self.deleted and (thing.type_str(), thing.id) in self.deleted):
+                continue
             self.newest = max(self.newest, thing.timestamp.timestamp())
             if thing.is_node():
                 self._node(thing)
             else:
-                self._way(thing, thing.id in wanted)
+                self._way(thing, own_id(thing.id) in wanted)
 
     def _box(self, told: osmium.osm.Box) -> tuple[float, float, float, float] | None:
         """Return what a file's header says that it covers, whole metres; None where it says nothing."""
@@ -284,27 +304,45 @@ class _Reader:
         lat, lon = place.lat, place.lon
         east = lon + 360.0 if self.wraps and lon < 0.0 else lon
         if self.west <= east <= self.east and self.south <= lat <= self.north:
-            self.node_rows.append((node.id, lat, lon, dict(node.tags)))
+            self.drafts += node.id < 0
+            self.node_rows.append((own_id(node.id), lat, lon, dict(node.tags)))
 
     def _way(self, way: osmium.osm.Way, wanted: bool) -> None:
         refs: list[int] = []
         lats: list[float] = []
         lons: list[float] = []
+        count = 0
         for node in way.nodes:
+            if self.deleted and ("n", node.ref) in self.deleted:
+                continue
+            count += 1
             place = node.location
-            if place.valid():
-                refs.append(node.ref)
-                lats.append(place.lat)
-                lons.append(place.lon + 360.0 if self.wraps and place.lon < 0.0 else place.lon)
+            if node.ref < 0:
+                lat, lon = self._draft_place(node.ref)
+            elif place.valid():
+                lat, lon = place.lat, place.lon
+            else:
+                continue
+            if math.isfinite(lat):
+                refs.append(own_id(node.ref))
+                lats.append(lat)
+                lons.append(lon + 360.0 if self.wraps and lon < 0.0 else lon)
         if len(refs) < 2:
             self.unlocated += 1
-            self.drafts += any(node.ref < 0 for node in way.nodes)
             return
-        if len(refs) < len(way.nodes):
-            self.partial[way.id] = len(way.nodes) - len(refs)
+        number = own_id(way.id)
+        if len(refs) < count:
+            self.partial[number] = count - len(refs)
         near = max(lats) >= self.south and min(lats) <= self.north and max(lons) >= self.west and min(lons) <= self.east
         if near or wanted:
-            self.way_rows.append((way.id, refs, lats, lons, dict(way.tags), near))
+            self.drafts += way.id < 0
+            self.way_rows.append((number, refs, lats, lons, dict(way.tags), near))
+
+    def _draft_place(self, number: int) -> tuple[float, float]:
+        """Return latitude and longitude of a node with a negative id; NaN where it is not in the file."""
+        if self.places is None:
+            self.places = draft_places(Path(self.path))
+        return self.places.get(number, (math.nan, math.nan))
 
 
 def read_osm(
@@ -354,10 +392,6 @@ def read_osm(
     data = _assembled(reader, half, margin, sha256_of(path))
     window = f"the {2 * half:.0f} m square around {frame.lat}, {frame.lon}"
     if not (data.ways or data.nodes or data.areas):
-        if reader.drafts and not reader.way_rows:
-            raise SchemaError(
-                f"{path}: has negative ids; number it anew with: osmium renumber FILE -o NUMBERED.osm.pbf"
-            )
         if reader.objects and reader.unlocated and not reader.way_rows:
             raise SchemaError(f"{path}: ways come before their nodes; sort it with: osmium sort FILE -o SORTED.osm.pbf")
         raise EmptyInputError(f"{path}: nothing in {window}; check the coordinates, or use another extract")
@@ -377,7 +411,7 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
     shapely.prepare(window)
     ways: list[OsmWay] = []
     areas: list[OsmArea] = []
-    broken: list[tuple[str, str]] = []
+    broken = _of_editor(reader)
     by_id: dict[int, tuple[NDArray[np.float64], Tags]] = {}
     for (way_id, refs, _, _, tags, near), line in zip(reader.way_rows, _lines(reader), strict=True):
         by_id[way_id] = (line, tags)
@@ -405,6 +439,17 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
             relations.append(relation)
     found = OsmData(reader.frame, half, margin, nodes, ways, areas, relations, digest, _newest(reader), broken)
     return replace(found, covered=reader.covered)
+
+
+def _of_editor(reader: _Reader) -> list[tuple[str, str]]:
+    """Say what of a file an editor marked for deletion, and how its drafts are numbered."""
+    told = [(f"{kind}{number}", "deleted in the editor that saved the file") for kind, number in sorted(reader.deleted)]
+    if len(told) > _MOST_TOLD:
+        told = [("map", f"{len(told):,} objects are deleted in the editor that saved the file")]
+    if reader.drafts:
+        ids = FIRST_DRAFT + 1
+        told.append(("map", f"{reader.drafts:,} objects are drafts of an editor (negative ids); -1 is read as {ids}"))
+    return told
 
 
 def _nodes(reader: _Reader) -> list[OsmNode]:

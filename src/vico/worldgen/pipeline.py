@@ -17,6 +17,7 @@ import osmium
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.osm import checked_extract
+from vico.geo.osm_editing import deleted_objects
 from vico.io.files import read_json, write_json
 from vico.io.folders import FolderKind, FolderLock, check_replaceable, folder_errors, new_folder, remove
 from vico.world.folder import read_world
@@ -51,18 +52,21 @@ def extract_centre(path: Path) -> tuple[float, float]:
     checked_extract(path)
     try:
         box = osmium.io.Reader(str(path)).header().box()
-        if not box.valid():
-            box = osmium.osm.Box()
-            for node in osmium.FileProcessor(str(path), osmium.osm.NODE):
-                box.extend(node.location)
+        if box.valid():
+            low, high = box.bottom_left, box.top_right
+            return (low.lat + high.lat) / 2, (low.lon + high.lon) / 2
+        deleted = deleted_objects(path)
+        places = [
+            (node.location.lat, node.location.lon)
+            for node in osmium.FileProcessor(str(path), osmium.osm.NODE)
+            if node.location.valid() and not node.deleted and ("n", node.id) not in deleted
+        ]
     except RuntimeError as error:
         raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
-    if not box.valid():
+    if not places:
         raise SchemaError(f"{path}: holds no points; download it again, or clip it anew")
-    return (
-        (box.bottom_left.lat + box.top_right.lat) / 2,
-        (box.bottom_left.lon + box.top_right.lon) / 2,
-    )
+    lats, lons = zip(*places, strict=True)
+    return (min(lats) + max(lats)) / 2, (min(lons) + max(lons)) / 2
 
 
 def build_world(
