@@ -239,7 +239,7 @@ def test_missing_members_and_nodes_are_named(tmp_path: Path) -> None:
     assert data.broken == [
         ("w13", "1 of its nodes are not in the file"),
         ("r20", "1 of its member ways are not in the file; kept what closes"),
-        ("r21", "multipolygon without a complete ring (cut by the extract)"),
+        ("r21", "1 of its 2 member ways are not in the file, so that no ring closes; left out"),
     ]
     assert [area.id for area in data.areas] == ["w13", "r20"]
 

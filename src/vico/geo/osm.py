@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,13 +12,13 @@ import numpy as np
 import osmium
 import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon
+from shapely import LineString, MultiPolygon, Polygon
 
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
-from vico.geo import overlay
 from vico.geo.frame import LocalFrame
+from vico.geo.multipolygons import GAP, MemberWay, area_of_members, role_meant
 from vico.geo.osm_editing import FIRST_DRAFT, deleted_objects, draft_places, own_id
-from vico.geo.outlines import check_size, is_scribble, mended, simplified
+from vico.geo.outlines import check_size, mended, simplified
 from vico.geo.overlay import OverlayError
 from vico.geo.overlay import polygons_of as polygons_of
 from vico.io.files import sha256_of
@@ -186,25 +186,6 @@ def means_area(tags: Mapping[str, str]) -> bool:
     if (said := tags.get("area")) in ("yes", "no"):
         return said == "yes"
     return any(key in tags and tags[key] not in _LINEAR_VALUES.get(key, ()) for key in _AREA_KEYS)
-
-
-def _multipolygon(outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[np.float64]]) -> Polygon | MultiPolygon:
-    """Assemble rings from member lines, in any order and direction; unclosed rests are left out."""
-
-    def filled(lines: Iterable[NDArray[np.float64]]) -> Polygon | MultiPolygon:
-        pieces = [shapely.LineString(line) for line in lines if len(line) > 1]
-        if not pieces:
-            return Polygon()
-        merged = shapely.line_merge(shapely.MultiLineString(pieces))
-        rings = [part for part in shapely.get_parts(merged) if part.is_ring]
-        # Rings that touch in a node merge into nothing closed: polygonize finds them, at a higher price.
-        if len(rings) < len(shapely.get_parts(merged)):
-            return overlay.union_all(overlay.polygonize([merged]))
-        return overlay.union_all([mended(Polygon(ring))[0] for ring in rings])
-
-    shape = filled(outer)
-    holes = filled(inner)
-    return shape if holes.is_empty else overlay.difference(shape, holes)
 
 
 def checked_extract(path: Path) -> Path:
@@ -418,6 +399,8 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
         if not near or not tags:
             continue
         way = OsmWay(way_id, refs, line, len(refs) > 3 and refs[0] == refs[-1], tags)
+        if not way.closed and _is_building(tags):
+            way = _closed(way, reader, window, broken)
         if way.closed and means_area(tags):
             area = _area_of_way(way, window, reader.partial.get(way_id, 0), broken)
             if area is not None:
@@ -429,16 +412,40 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
     relations: list[OsmRelation] = []
     for relation in reader.relations:
         if relation.tags.get("type") == "multipolygon":
-            area = _area_of(relation, by_id, broken)
-            if area is not None and window.intersects(area.polygon):
-                missing = sum(kind == "w" and ref not in by_id for kind, ref, _ in relation.members)
-                if missing:
-                    broken.append((area.id, f"{missing} of its member ways are not in the file; kept what closes"))
+            area = _area_of(relation, by_id, reader, window, broken)
+            if area is not None:
                 areas.append(_plain(area, broken))
         if any((kind, ref) in kept for kind, ref, _ in relation.members):
             relations.append(relation)
     found = OsmData(reader.frame, half, margin, nodes, ways, areas, relations, digest, _newest(reader), broken)
     return replace(found, covered=reader.covered)
+
+
+def _is_building(tags: Mapping[str, str]) -> bool:
+    return any(tags.get(key, "no") != "no" for key in ("building", "building:part"))
+
+
+def _closed(way: OsmWay, reader: _Reader, window: Polygon, broken: list[tuple[str, str]]) -> OsmWay:
+    """Return a building's outline that is no ring, closed if its ends nearly meet; say so, or why it is no building."""
+    if not np.isfinite(way.line).all() or not window.intersects(LineString(way.line)):
+        return way
+    key = f"w{way.id}"
+    width = float(np.hypot(*(way.line[0] - way.line[-1])))
+    if missing := reader.partial.get(way.id, 0):
+        broken.append(
+            (key, f"{missing} of its nodes are not in the file, so that its outline is not closed; no building")
+        )
+    elif len(way.nodes) < 3 or way.nodes[0] == way.nodes[-1]:
+        broken.append((key, "area without extent"))
+    elif width > GAP:
+        lat, lon = reader.frame.to_geodetic((way.line[0] + way.line[-1]) / 2)
+        where = f"{float(lat):.6f}, {float(lon):.6f}"
+        broken.append((key, f"its outline is not closed in the map: a gap of {width:.1f} m at {where}; no building"))
+    else:
+        broken.append((key, f"its outline is not closed in the map; a gap of {width:.1f} m is closed"))
+        line = np.concatenate([way.line, way.line[:1]])
+        return replace(way, nodes=[*way.nodes, way.nodes[0]], line=line, closed=True)
+    return way
 
 
 def _of_editor(reader: _Reader) -> list[tuple[str, str]]:
@@ -521,31 +528,24 @@ def _plain(area: OsmArea, broken: list[tuple[str, str]]) -> OsmArea:
 
 
 def _area_of(
-    relation: OsmRelation, ways: Mapping[int, tuple[NDArray[np.float64], Tags]], broken: list[tuple[str, str]]
+    relation: OsmRelation,
+    ways: Mapping[int, tuple[NDArray[np.float64], Tags]],
+    reader: _Reader,
+    window: Polygon,
+    broken: list[tuple[str, str]],
 ) -> OsmArea | None:
-    """Return the multipolygon's area; None where it has no meaning as one, or none of its rings is complete."""
-    members = [(ref, role) for kind, ref, role in relation.members if kind == "w" and ref in ways]
-    outer = [ways[ref][0] for ref, role in members if role != "inner"]
-    inner = [ways[ref][0] for ref, role in members if role == "inner"]
+    """Return the multipolygon's area; None where it has no meaning as one, has none, or none in the window."""
+    given = [(ref, role) for kind, ref, role in relation.members if kind == "w"]
+    members = [MemberWay(ref, role, ways[ref][0], ref in reader.partial) for ref, role in given if ref in ways]
     tags = relation.tags
     if not any(key != "type" for key in tags):
         # Old style: the outer way carries the tags.
-        tags = next((ways[ref][1] for ref, role in members if role != "inner" and ways[ref][1]), tags)
-    if not outer or not (means_area({**tags, "area": tags.get("area", "")}) or "highway" in tags):
+        tags = next((ways[m.id][1] for m in members if role_meant(m.role) != "inner" and ways[m.id][1]), tags)
+    if not given or not (means_area({**tags, "area": tags.get("area", "")}) or "highway" in tags):
         return None
-    if not all(np.isfinite(line).all() for line in (*outer, *inner)):
-        broken.append((f"r{relation.id}", "multipolygon with points too far away"))
+    shape, told = area_of_members(members, len(given) - len(members), reader.frame)
+    near = [shape] if shape is not None else [LineString(m.line) for m in members if np.isfinite(m.line).all()]
+    if near and not any(window.intersects(one) for one in near):
         return None
-    if is_scribble(outer) or is_scribble(inner):
-        broken.append((f"r{relation.id}", "its rings cross too often to mean an area; left out"))
-        return None
-    try:
-        shape = _multipolygon(outer, inner)
-    except OverlayError as error:
-        broken.append((f"r{relation.id}", f"its rings can't be made into an area ({error})"))
-        return None
-    parts = polygons_of(shape)
-    if not parts:
-        broken.append((f"r{relation.id}", "multipolygon without a complete ring (cut by the extract)"))
-        return None
-    return OsmArea(f"r{relation.id}", parts[0] if len(parts) == 1 else MultiPolygon(parts), tags)
+    broken.extend((f"r{relation.id}", reason) for reason in told)
+    return None if shape is None else OsmArea(f"r{relation.id}", shape, tags)

@@ -127,7 +127,7 @@ def left_out(stages: Sequence[StageReport]) -> str:
 
 def _mending(reason: str) -> str:
     """Return how to mend what an extract's edge cut; empty for other reasons."""
-    if "not in the file" not in reason and "cut by the extract" not in reason:
+    if "not in the file" not in reason:
         return ""
     return "; to have it whole, clip anew with whole relations (osmium extract -s smart), or take a larger extract"
 
