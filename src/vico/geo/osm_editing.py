@@ -76,7 +76,7 @@ def _unpacked(path: Path) -> BinaryIO:
     name = path.name.lower()
     if name.endswith(".gz"):
         return gzip.open(path)  # type: ignore[return-value]
-    return bz2.open(path) if name.endswith(".bz2") else path.open("rb")
+    return bz2.open(path) if name.endswith(".bz2") else path.open("rb")  # type: ignore[return-value]
 
 
 def _is_marked(file: BinaryIO) -> bool:

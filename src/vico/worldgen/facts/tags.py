@@ -7,6 +7,21 @@ from collections.abc import Mapping
 from vico.geo.quantities import number, quantity
 
 
+def is_underground(tags: Mapping[str, str]) -> bool:
+    """Whether a building lies below the ground, all of it.
+
+    `location`, `tunnel` and `level` say so. `layer` alone does not: it says what is drawn over what, as of a house under
+    a viaduct; beside ``parking=underground`` it does.
+    """
+    if tags.get("location") == "underground" or tags.get("tunnel") == "yes":
+        return True
+    if tags.get("parking") == "underground" and tags.get("layer", "").startswith("-"):
+        return True
+    # All of its levels are below the ground: -1;-2 is, -1;0;1 is not, nor is the range -1-2.
+    highest = number(tags.get("level"))
+    return highest is not None and highest < 0.0
+
+
 def on_the_ground(tags: Mapping[str, str]) -> bool:
     """Whether a way or area lies at ground level outdoors: not in a tunnel, indoors or on a lower layer."""
     if tags.get("tunnel", "no") not in ("no", "building_passage") or tags.get("indoor", "no") != "no":

@@ -29,6 +29,7 @@ from vico.worldgen.facts.outlines.needles import without_needles
 from vico.worldgen.facts.outlines.parts import SMALL_KINDS, part_of
 from vico.worldgen.facts.outlines.plans import BuildingOrigin, BuildingPlan, BuildingPlans, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, shape_named
+from vico.worldgen.facts.tags import is_underground
 
 _TOLERANCE = 0.05  # metres of outline detail that is not seen but costs triangles
 _COVERED = 0.85  # share of an outline that parts must cover for the outline to be dropped
@@ -127,15 +128,11 @@ def _within(osm: OsmData, outlines: list[_Row], parts: list[_Row], dropped: list
 
 def _unwanted(area: OsmArea) -> str | None:
     tags = area.tags
-    layer, height, levels = (
-        quantity(tags, "layer"),
-        quantity(tags, "height"),
-        read(tags.get("building:levels"), Kind.STOREYS).value,
-    )
-    if tags.get("location") in ("underground", "indoor") or tags.get("tunnel") == "yes":
+    height, levels = quantity(tags, "height"), read(tags.get("building:levels"), Kind.STOREYS).value
+    if is_underground(tags):
         return "underground"
-    if layer is not None and layer < 0:
-        return "below ground (layer < 0)"
+    if tags.get("location") == "indoor" or tags.get("indoor", "no") != "no":
+        return "indoors"
     if height is not None and height <= 0.5:
         return "no height above ground"
     if levels is not None and levels <= 0 and (quantity(tags, "building:levels:underground") or 0) > 0:
