@@ -50,13 +50,17 @@ def test_what_is_no_building_here_is_left_out_with_its_reason() -> None:
             (shapely.box(0, 20, 9, 29), {"building": "yes", "location": "underground"}),
             (shapely.box(20, 20, 29, 29), {"building": "yes", "layer": "-1"}),
             (shapely.box(40, 0, 50, 9), {"building": "yes"}),
+            (shapely.box(40, 20, 50, 29), {"building": "yes", "level": "-1"}),
+            (shapely.box(60, 20, 70, 29), {"building": "yes", "indoor": "room"}),
         ]
     )
     assert said["w1"] == "smaller than 2 m2"
     assert "outside" in said["w2"]
     assert said["w3"] == "underground"
-    assert "below ground" in said["w4"]
+    assert "w4" not in said  # layer alone says nothing of the ground
     assert "w5" not in said
+    assert said["w6"] == "underground"
+    assert said["w7"] == "indoors"
 
 
 SPIKED = [
