@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.errors import InputError
 from vico.io.compiled import compiled
+from vico.io.mujoco import mujoco
 from vico.quaternions import matrix_of
 
 #: How a joint is driven, as Genesis counts it: towards a position, towards a speed, by a force.

@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, LIMB, TOUCH, RobotModel
+from vico.io.mujoco import mujoco
 from vico.quaternions import matrix_of
 from vico.sim.physics.genesis_runtime import view
 from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID, ground_grid, robot_spec

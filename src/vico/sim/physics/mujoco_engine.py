@@ -10,11 +10,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
+from vico.io.mujoco import mujoco
 from vico.sim.bodies import Bodies
 from vico.sim.physics.engine import Actuate
 from vico.sim.physics.frames import COARSE, FINE, SOLVER_STEPS

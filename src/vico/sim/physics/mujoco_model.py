@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, BUMPER, LIMB, TOUCH, RobotModel
 from vico.errors import InputError
+from vico.io.mujoco import mujoco
 from vico.sim.physics.frames import COARSE, SOLVER_STEPS
 from vico.sim.physics.records import BALL, BOX, CYLINDER, PARTS, Capacity, StaticScene
 from vico.world.heights import HeightField

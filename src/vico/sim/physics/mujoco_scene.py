@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.io.mujoco import mujoco
 from vico.sim.physics.mujoco_model import SLEEP, SOLID, compiled_model, thruster
 from vico.sim.physics.records import PARTS, Capacity, Chunk, Party, StaticChunks, StaticScene
 from vico.sim.physics.solids import SolidCells

@@ -6,8 +6,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-import mujoco
-
+from vico.io.mujoco import mujoco
 from vico.sim.physics.records import PhysicsError
 
 

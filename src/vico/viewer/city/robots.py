@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from vico.assets.robots import RobotModel, robot_model, robot_names
+from vico.io.mujoco import mujoco
 from vico.viewer.city.models import coarse
 from vico.viewer.city.pack import Blob, packed
 from vico.viewer.city.textures import TextureLayers

@@ -6,9 +6,7 @@ import copy
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
-from mujoco import rollout
 from numpy.typing import NDArray
 
 from vico.challenges.learning.manipulation.draws import Episode
@@ -20,6 +18,7 @@ from vico.challenges.learning.manipulation.scene import Array, Scene, Thing, com
 from vico.challenges.learning.manipulation.tasks import ManipulationTask
 from vico.errors import InputError, SchemaError
 from vico.exact import apply_matrix, product
+from vico.io.mujoco import mujoco, rollout
 from vico.seeds import rng
 
 # Targets this much wider than the jaw when it was fastened to a box let go of it, metres.

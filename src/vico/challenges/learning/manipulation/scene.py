@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import LIMB, TOUCH, MobileManipulator, RobotModel, robot_model
 from vico.challenges.learning.manipulation.options import PHYSICS_STEP
+from vico.io.mujoco import mujoco
 from vico.kinematics.arm import Chain
 
 Array = NDArray[np.float64]
