@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from command_line import vico
-from vico.cli import bench, doctor
+from vico.cli import bench
 from vico.sim.recording import read_run
 from vico.world.folder import read_world
 from vico.worldgen.report import report_page
@@ -130,23 +130,6 @@ def test_output_that_nobody_reads_on_is_no_error(helsinki_path: Path) -> None:
         shell=True, capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     assert (done.stdout, done.stderr) == ("{", "")
-
-
-def test_doctor_finds_what_the_tests_run_on(capsys: pytest.CaptureFixture[str]) -> None:
-    assert vico("doctor", "--json") == 0
-    found = {finding["what"]: finding for finding in printed(capsys)}
-    assert found["renderer"]["ok"]
-    assert found["film encoder"]["ok"]
-    assert found.keys() >= {"Python", "numpy", "mujoco", "memory", "free disk"}
-
-
-def test_doctor_exits_1_and_says_what_to_type(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(doctor, "_BASE", ("numpy", "no-such-package"))
-    assert vico("doctor", "--json") == 1
-    missing = [finding for finding in printed(capsys) if not finding["ok"] and finding["needed"]]
-    assert [(f["what"], f["mend"]) for f in missing] == [("no-such-package", "pip install virtual-community")]
 
 
 def test_bench_says_where_benchmarks_are_to_be_had(

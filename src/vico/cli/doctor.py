@@ -1,11 +1,17 @@
-"""`vico doctor`: what this machine has, what is missing, and the command that mends it."""
+"""`vico doctor`: what this machine has, what is missing, and the command that mends it.
+
+It answers in seconds: nothing is compiled, unless everything is to be tried (`--thorough`).
+"""
 
 from __future__ import annotations
 
 import importlib.metadata
+import json as json_files
 import os
 import platform
+import re
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -17,19 +23,26 @@ from rich.table import Table
 
 from vico.cli.output import print_json
 
-_BASE = (
-    "numpy",
-    "numba",
-    "scipy",
-    "shapely",
-    "osmium",
-    "pyproj",
-    "manifold3d",
-    "mujoco",
-    "pyarrow",
-    "av",
-    "pettingzoo",
-)
+# Package -> what of it is imported, where that is called otherwise. MuJoCo is imported as we do it.
+_MODULES = {
+    "mujoco": "vico.io.mujoco",
+    "mapbox-earcut": "mapbox_earcut",
+    "Pillow": "PIL.Image",
+    "pyarrow": "pyarrow.parquet",
+    "scipy": "scipy.spatial",
+    "eclipse-sumo": "sumo",
+}
+# What a process of its own is told to do: import modules and say after each how it went. One that crashes says nothing.
+_IMPORT = """
+import importlib, json, sys
+for name in sys.argv[1:]:
+    try:
+        importlib.import_module(name)
+        wrong = ""
+    except BaseException as error:
+        wrong = f"{type(error).__name__}: {error}"
+    print(json.dumps([name, wrong]), flush=True)
+"""
 
 
 @dataclass(frozen=True)
@@ -44,15 +57,64 @@ class Diagnosis:
 
 
 def _python() -> Diagnosis:
-    ok = (3, 11) <= sys.version_info[:2] < (3, 14)
-    return Diagnosis("Python", ok, True, platform.python_version(), "install Python 3.11, 3.12 or 3.13")
+    ok = (3, 11) <= sys.version_info[:2] < (3, 15)
+    return Diagnosis("Python", ok, True, platform.python_version(), "install Python 3.11, 3.12, 3.13 or 3.14")
 
 
-def _package(name: str, *, needed: bool, mend: str) -> Diagnosis:
+def _packages() -> list[Diagnosis]:
+    """Look for the packages of the default install, and import each: what is installed may not load."""
     try:
-        return Diagnosis(name, True, needed, importlib.metadata.version(name))
+        told = importlib.metadata.requires("virtual-community") or []
     except importlib.metadata.PackageNotFoundError:
-        return Diagnosis(name, False, needed, "not installed", mend)
+        return [Diagnosis("virtual-community", False, True, "not installed", "pip install -e . in the checkout")]
+    base = [one.partition(";")[0].strip() for one in told if "extra ==" not in one]
+    requirements = {re.split(r"[\[<>=!~ ]", one)[0]: one for one in base}
+    versions: dict[str, str] = {}
+    for name in requirements:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    wrong = _not_importable([_module(name) for name in versions])
+    found = []
+    for name, requirement in requirements.items():
+        if name not in versions:
+            found.append(Diagnosis(name, False, True, "not installed", f"pip install '{requirement}'"))
+        elif why := wrong.get(_module(name)):
+            mend = f"pip install --force-reinstall --no-deps {name}=={versions[name]}"
+            found.append(Diagnosis(name, False, True, f"{versions[name]} cannot be imported: {why}", mend))
+        else:
+            found.append(Diagnosis(name, True, True, versions[name]))
+    return found
+
+
+def _module(package: str) -> str:
+    return _MODULES.get(package, package.lower())
+
+
+def _not_importable(modules: list[str]) -> dict[str, str]:
+    """Import modules in another process; return those that fail, with why."""
+    wrong: dict[str, str] = {}
+    waiting = modules
+    while waiting:
+        done = subprocess.run(
+            [sys.executable, "-c", _IMPORT, *waiting], capture_output=True, text=True, errors="replace", check=False
+        )
+        told = [json_files.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]
+        wrong |= {name: " ".join(why.split())[:200] for name, why in told if why}
+        waiting = waiting[len(told) :]
+        if waiting:  # the process ended with this one
+            wrong[waiting[0]] = f"importing it ends Python (exit status {done.returncode})"
+            waiting = waiting[1:]
+    return wrong
+
+
+def _netconvert() -> Diagnosis:
+    mend = "pip install 'virtual-community[worldgen]' to build worlds"
+    try:
+        return Diagnosis("eclipse-sumo", True, False, importlib.metadata.version("eclipse-sumo"))
+    except importlib.metadata.PackageNotFoundError:
+        return Diagnosis("eclipse-sumo", False, False, "not installed", mend)
 
 
 def _memory() -> Diagnosis:
@@ -61,8 +123,31 @@ def _memory() -> Diagnosis:
 
 
 def _disk() -> Diagnosis:
-    free = shutil.disk_usage(Path.cwd()).free / 1e9
+    try:
+        free = shutil.disk_usage(Path.cwd()).free / 1e9
+    except OSError as error:
+        return Diagnosis("free disk", False, True, f"this folder: {error.strerror}", "go to a folder that is there")
     return Diagnosis("free disk", free >= 1, True, f"{free:.1f} GB", "free 1 GB")
+
+
+def _compiled_code() -> Diagnosis:
+    """Say whether compiled code is kept, and can be."""
+    from vico.io.compiled import compiled_folder
+
+    folder = compiled_folder()
+    try:
+        kept = sum(1 for file in folder.glob("*/*.nbc"))
+        there = next(place for place in (folder, *folder.parents) if place.exists())
+    except OSError as error:
+        mend = "name another folder with VICO_CACHE"
+        return Diagnosis("compiled code", False, False, f"{folder}: {error.strerror}", mend)
+    if not os.access(there, os.W_OK):
+        mend = (
+            f"make {there} writable, or name another folder with VICO_CACHE; every start compiles anew what is missing"
+        )
+        return Diagnosis("compiled code", False, False, f"{kept} functions in {folder}, none can be added", mend)
+    mend = "vico warm-up; else the first run compiles for minutes"
+    return Diagnosis("compiled code", kept > 0, False, f"{kept} functions in {folder}", mend)
 
 
 def _film() -> Diagnosis:
@@ -93,20 +178,38 @@ def _frame() -> Diagnosis:
     return Diagnosis("renderer", seen > 0, True, f"a box covers {seen} pixels", "report this as a bug, with this table")
 
 
-def findings() -> list[Diagnosis]:
-    """Look at everything; nothing is changed."""
-    pip = "pip install virtual-community"
-    found = [_python(), *(_package(name, needed=True, mend=pip) for name in _BASE)]
-    found.append(
-        _package("eclipse-sumo", needed=False, mend="pip install 'virtual-community[worldgen]' to build worlds")
+def _physics() -> Diagnosis:
+    """Let a ball fall in MuJoCo."""
+    from vico.io.mujoco import mujoco
+
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
     )
-    checks: list[Callable[[], Diagnosis]] = [_memory, _disk, _frame, _film]
+    data = mujoco.MjData(model)
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+    fallen = -float(data.qpos[2])
+    return Diagnosis("physics", 0.1 < fallen < 10.0, True, f"a ball fell {fallen:.2f} m", "report this as a bug")
+
+
+def findings(*, thorough: bool = False) -> list[Diagnosis]:
+    """Look at everything; nothing is changed.
+
+    Parameters
+    ----------
+    thorough
+        Also draw, write a film and simulate. The first time that compiles for a minute or more.
+    """
+    found = [_python(), *_packages(), _netconvert()]
+    checks: list[Callable[[], Diagnosis]] = [_memory, _disk]
+    if all(one.ok or not one.needed for one in found):  # what follows needs the packages
+        checks += [_compiled_code, *((_frame, _film, _physics) if thorough else ())]
     return found + [check() for check in checks]
 
 
-def doctor(*, json: bool = False) -> int:
+def doctor(*, thorough: bool = False, json: bool = False) -> int:
     """Print the findings; 1 if something needed is missing."""
-    found = findings()
+    found = findings(thorough=thorough)
     if json:
         print_json([asdict(finding) for finding in found])
     else:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import errno
 import gc
+import io
 import logging
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NoReturn
 
 import tyro
 from tyro.conf import Positional
@@ -336,15 +337,16 @@ def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, 
 
 
 @app.command(name="doctor")
-def doctor(json: bool = False) -> int:
+def doctor(thorough: bool = False, json: bool = False) -> int:
     """Say whether this machine has what vico needs, and what is missing. Exit 1 if something needed is missing.
 
     Args:
+        thorough: Try it all, too: draw, write a film, simulate. Where nothing is compiled yet that takes minutes.
         json: Print JSON.
     """
     from vico.cli import doctor as verb
 
-    return verb.doctor(json=json)
+    return verb.doctor(thorough=thorough, json=json)
 
 
 @app.command(name="bench")
@@ -419,37 +421,59 @@ def _configure_logging(given: list[str]) -> list[str]:
     return given if level is None else given[1:]
 
 
+def _replace_what_cannot_be_shown() -> None:
+    """Let a terminal of seven bits show what it can of a name, where Python would end the program."""
+    for stream, errors in ((sys.stdout, "replace"), (sys.stderr, "backslashreplace")):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors=errors)
+
+
+def _leave(code: int, sentence: str = "") -> NoReturn:
+    """Say why, and end with this exit code when all that was printed is out."""
+    try:
+        if sentence:
+            print(f"vico: {sentence}", file=sys.stderr)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read the output, `head` for one, has had enough; nothing may be flushed into the closed pipe.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = code or 141
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"vico: stdout: {reason_of(error)}", file=sys.stderr)
+        code = 2
+    sys.exit(code)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; a sentence for whatever goes wrong, never a traceback."""
     gc.set_threshold(20_000, 20, 20)  # what is imported is never garbage: imports alone take a seventh less
+    _replace_what_cannot_be_shown()
     given = _configure_logging(sys.argv[1:] if arguments is None else arguments)
-    if given == ["--version"]:
-        print(__version__)
-        return
     try:
+        if given == ["--version"]:
+            print(__version__)
+            _leave(0)
         code = app.cli(
             prog="vico",
             description="An open world for humans, robots and society.",
             args=with_ray_address(given),
             config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes),
         )
+    except SystemExit as end:  # help was asked for, options were refused, or rich found the pipe closed
+        _leave(141 if isinstance(end.__context__, BrokenPipeError) else end.code if isinstance(end.code, int) else 0)
     except VicoError as error:
-        print(f"vico: {error}", file=sys.stderr)
-        sys.exit(2)
+        _leave(2, str(error))
     except BrokenPipeError:
-        # Whoever read the output, `head` for one, has had enough; nothing may be flushed into the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(141)
+        _leave(141)
     except OSError as error:
-        print(f"vico: {_sentence(error)}", file=sys.stderr)
-        sys.exit(2)
+        _leave(2, _sentence(error))
     except KeyboardInterrupt:
-        print("vico: stopped; what was finished is on disk", file=sys.stderr)
-        sys.exit(130)
+        _leave(130, "stopped; what was finished is on disk")
     except Exception as error:  # whatever: who runs a command is not who mends the program
-        print(f"vico: {_fault(error)}", file=sys.stderr)
-        sys.exit(2)
-    sys.exit(code)
+        _leave(2, _fault(error))
+    _leave(code)
 
 
 if __name__ == "__main__":

@@ -100,15 +100,20 @@ def check_output(out: Path, *inputs: Path, force: bool, kind: FolderKind | None 
     if not os.access(ground, os.W_OK | os.X_OK):
         raise InputError(f"--out {out}: {ground} cannot be written to; choose another folder")
     folder = out.resolve()
-    for kept in (*inputs, Path.cwd(), Path.home()):
+    for kept in (*inputs, Path.cwd(), Path(os.path.expanduser("~"))):  # "~" itself where there is no home
         if kept.resolve().is_relative_to(folder):
             raise InputError(f"--out {out}: holds {kept}, which --force would delete; choose another folder")
     check_replaceable(out, force=force, kind=kind)
 
 
 def print_json(content: Any) -> None:
-    """Print one JSON document on stdout."""
-    print(json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False, default=str))
+    """Print one JSON document on stdout; letters that it cannot show are escaped, so that names are whole."""
+    text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False, default=str)
+    try:
+        text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")
+    except UnicodeEncodeError:
+        text = json.dumps(content, indent=1, sort_keys=True, default=str)
+    print(text)
 
 
 def print_table(title: str, rows: Mapping[str, Any]) -> None:

@@ -7,12 +7,17 @@ from pathlib import Path
 
 import platformdirs
 
+_NO_HOME = Path("/nonexistent")  # as the system's own users have it that have none
+
 
 def cache_folder() -> Path:
     """Return the user's cache folder of this project: ``$VICO_CACHE``, else the platform's usual place.
 
-    It may not exist yet.
+    It may not exist yet, nor can it be made for a user without a home: then nothing is kept.
     """
     if chosen := os.environ.get("VICO_CACHE"):
-        return Path(chosen).expanduser()
-    return platformdirs.user_cache_path("vico", appauthor=False)
+        return Path(os.path.expanduser(chosen))
+    try:
+        return platformdirs.user_cache_path("vico", appauthor=False)
+    except RuntimeError:  # neither HOME nor an entry among the users
+        return _NO_HOME / ".cache" / "vico"
