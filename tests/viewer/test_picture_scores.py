@@ -66,7 +66,7 @@ def tiny_network(path: Path) -> None:
 
 
 def test_pictures_go_through_a_network_of_ones_own(tmp_path: Path) -> None:
-    pytest.importorskip("onnxruntime", reason="needs pip install 'vico[scores]'")
+    pytest.importorskip("onnxruntime", reason="needs pip install 'virtual-community[scores]'")
     for name, level in (("a", 90), ("b", 96), ("c", 200)):
         (tmp_path / name).mkdir()
         for k in range(10):

@@ -243,8 +243,8 @@ def _file_system(url: str) -> tuple[Any, str]:
         # What others write meanwhile must be seen: no listing is kept.
         files, root = fsspec.url_to_fs(url, use_listings_cache=False, skip_instance_cache=True)
     except ImportError as error:
-        what = "'virtual-community[s3]'" if protocol == "s3" else f"the package that fsspec wants for it ({error})"
-        raise MissingExtraError(f"{url}: {protocol}:// needs more: pip install {what}") from None
+        mend = "pip install 'virtual-community[s3]'" if protocol == "s3" else "install what fsspec names"
+        raise MissingExtraError(f"{url}: {protocol}:// needs more ({error}): {mend}") from None
     except ValueError as error:
         raise InputError(f"{url}: {error}; give s3://BUCKET/PREFIX, or a folder") from None
     if not url.partition("://")[2].strip("/"):

