@@ -9,8 +9,8 @@ DEV := worldgen,viewer,photos,usd,s3,docs,dev
 .PHONY: demo test check docs wheel bench clean
 
 .venv/bin/python:
-	@$(PYTHON) -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 14)))' \
-	  || { echo "virtual-community needs Python 3.11 to 3.13; say which: make demo PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 15)))' \
+	  || { echo "virtual-community needs Python 3.11 to 3.14; say which: make demo PYTHON=python3.12"; exit 1; }
 	$(PYTHON) -m venv .venv
 
 # $(call install,EXTRAS): pip would make byte code of all, in one process, and none of what is in src. UNUSED: never imported.
