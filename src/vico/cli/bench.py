@@ -10,6 +10,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from vico.cli import community, world
+from vico.cli.machine_speed import speed_table
 from vico.cli.options import CommunityBuildOptions
 from vico.cli.output import print_json
 from vico.errors import MissingFileError, VicoError
@@ -28,6 +29,8 @@ class BenchmarkError(VicoError, RuntimeError):
 
 def bench(what: str, *, table: Path | None = None, json: bool = False, options: tuple[str, ...] = ()) -> int:
     """Measure one thing in a process of its own; print the markdown it reports, or its tables as JSON.
+
+    Beside it stands how fast this machine is, and that of the README's figures.
 
     Parameters
     ----------
@@ -61,13 +64,15 @@ def bench(what: str, *, table: Path | None = None, json: bool = False, options: 
         if done.returncode or not report.exists():
             raise BenchmarkError(f"bench {what}: stopped with exit status {done.returncode}; what it said is above")
         text = report.read_text(encoding="utf-8")
+    speeds = speed_table()
     if table is not None:
         table.parent.mkdir(parents=True, exist_ok=True)
         table.write_text(text, encoding="utf-8")
     if json:
-        print_json({"benchmark": what, "tables": tables_of(text)})
+        (measured,) = tables_of(speeds)
+        print_json({"benchmark": what, "tables": tables_of(text), "machine": measured["rows"]})
     else:
-        print(text)
+        print(f"{text}\n{speeds}")
     return 0
 
 
