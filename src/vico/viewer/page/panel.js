@@ -265,7 +265,7 @@ export class Panel {
     const names = this.agent.joints ?? [];
     const rows = (now.joints ?? []).map((/** @type {number} */ angle, /** @type {number} */ k) => {
       const turned = Math.atan2(Math.sin(angle), Math.cos(angle));
-      return el("tr", {}, el("td", { text: names[k] ?? `joint ${k}` }), el("td", { text: angle.toFixed(2) }), el("td", {}, el("meter", { min: -3.15, max: 3.15, value: turned.toFixed(3), "aria-label": names[k] ?? `joint ${k}` })));
+      return el("tr", {}, el("td", { text: names[k] ?? `joint ${k}` }), el("td", { text: turned.toFixed(2) }), el("td", {}, el("meter", { min: -3.15, max: 3.15, value: turned.toFixed(3), "aria-label": names[k] ?? `joint ${k}` })));
     });
     const contacts = (now.contacts ?? []).map((/** @type {any} */ c) => c.with ?? c);
     this.parts.joints.replaceChildren(
