@@ -111,30 +111,7 @@ def gather(
         samples, without = _heights(sources, frame, half, finest_first=finest, part=part is not None)
         if samples is not None:
             stages.given(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
-    stages.report(
-        "map",
-        {
-            "nodes": len(data.nodes),
-            "ways": len(data.ways),
-            "areas": len(data.areas),
-            "heights": 0 if samples is None else len(samples.points),
-            "heights_filled": 0 if samples is None else samples.filled,
-        },
-        [Dropped(id=key, reason=reason) for key, reason in data.broken],
-    )
-    if (typed := quantities_as_typed(data))[1]:
-        stages.report("values of the map", *typed)
-    if without is not None:
-        stages.report("map", {}, [without])
-    if samples is not None and samples.beyond:
-        stages.report(
-            "map",
-            {"heights_cover_percent": round(100 * samples.covered)},
-            [Dropped(id=samples.name, reason=samples.beyond)],
-        )
-    if samples is not None and samples.outliers:
-        told = [Dropped(id=name, reason=reason) for name, reason in _outlying(samples)]
-        stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
+    _report_map(data, samples, without, stages)
     credits = [
         Source(
             kind="map",
@@ -188,6 +165,34 @@ def gather(
         with stages.timed("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
+
+
+def _report_map(data: OsmData, samples: HeightSamples | None, without: Dropped | None, stages: Stages) -> None:
+    """Say what was read of the map and the elevation models, and what was not."""
+    stages.report(
+        "map",
+        {
+            "nodes": len(data.nodes),
+            "ways": len(data.ways),
+            "areas": len(data.areas),
+            "heights": 0 if samples is None else len(samples.points),
+            "heights_filled": 0 if samples is None else samples.filled,
+        },
+        [Dropped(id=key, reason=reason) for key, reason in data.broken],
+    )
+    if (typed := quantities_as_typed(data))[1]:
+        stages.report("values of the map", *typed)
+    if without is not None:
+        stages.report("map", {}, [without])
+    if samples is not None and samples.beyond:
+        stages.report(
+            "map",
+            {"heights_cover_percent": round(100 * samples.covered)},
+            [Dropped(id=samples.name, reason=samples.beyond)],
+        )
+    if samples is not None and samples.outliers:
+        told = [Dropped(id=name, reason=reason) for name, reason in _outlying(samples)]
+        stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
 
 
 def _outlying(samples: HeightSamples) -> list[tuple[str, str]]:

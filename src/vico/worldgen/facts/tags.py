@@ -10,8 +10,8 @@ from vico.geo.quantities import number, quantity
 def is_underground(tags: Mapping[str, str]) -> bool:
     """Whether a building lies below the ground, all of it.
 
-    `location`, `tunnel` and `level` say so. `layer` alone does not: it says what is drawn over what, as of a house under
-    a viaduct; beside ``parking=underground`` it does.
+    `location`, `tunnel` and `level` say so. `layer` alone does not: it says what is drawn over what, as of a house
+    under a viaduct; beside ``parking=underground`` it does.
     """
     if tags.get("location") == "underground" or tags.get("tunnel") == "yes":
         return True
