@@ -13,7 +13,10 @@ from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.events import Event
 from vico.sim.simulation import Simulation
+from vico.sim.state import Posture
+from vico.world.objects import Objects
 from vico.world.public import PublicMap
+from vico.world.world import World
 
 
 def live(
@@ -106,3 +109,58 @@ def test_words_do_not_decide_what_a_resident_does() -> None:
         return taken
 
     assert actions("Treat patients and run a coffee round") == actions("Sort papers")
+
+
+def with_chairs(count: int) -> World:
+    """The toy city with some chairs in the café's back room."""
+    world = toy_city.world()
+    chairs = [
+        {
+            "id": f"chair_{k}",
+            "entity": 300_100 + k,
+            "kind": "chair",
+            "group": "indoor",
+            "prototype": "chair",
+            "x": -1.0 + 1.5 * k,
+            "y": 10.5,
+            "z": 0.0,
+            "yaw": -np.pi / 2,
+            "scale": 1.0,
+            "size_x": 0.44,
+            "size_y": 0.42,
+            "size_z": 0.9,
+            "solid": True,
+            "room": "r_back",
+        }
+        for k in range(count)
+    ]
+    world.__dict__["objects"] = Objects.joined([world.objects, Objects.from_rows(chairs)])
+    return world
+
+
+def after_a_minute_at_work(chairs: int) -> Simulation:
+    """Three who work in the café, on their feet at first."""
+    day = [toy_city.item("main", "00:00:00", "23:59:59", toy_city.CAFE)]
+    people = toy_city.community().model_copy(
+        update={
+            "residents": [toy_city.resident(k, name, day) for k, name in enumerate(("Ada Berg", "Bo Dahl", "Cleo Ek"))]
+        }
+    )
+    sim = Simulation(with_chairs(chairs), people, SimConfig(start=9 * 3600, observe=()))
+    agents = Gatherer(followers_of(people, PublicMap.from_world(sim.world)))
+    observations, infos = sim.observe()
+    for _ in range(60):
+        result = sim.step(agents.gather(observations, infos).actions)
+        observations, infos = result.observations, result.infos
+    return sim
+
+
+def test_who_stays_somewhere_sits_down_where_there_is_a_free_seat() -> None:
+    assert (after_a_minute_at_work(3).state.people.posture == Posture.SITTING).all()
+
+
+def test_those_without_a_seat_do_not_stand_chest_to_chest() -> None:
+    people = after_a_minute_at_work(0).state.people
+    assert (people.posture == Posture.STANDING).all()
+    spots = people.position[:, :2]
+    assert np.hypot(*(spots[:, None] - spots[None])[np.triu_indices(3, 1)].T).min() >= 0.8

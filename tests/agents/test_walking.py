@@ -1,14 +1,17 @@
 """The walker reaches its goal by actions alone, and gets around what is in the way."""
 
 import math
-from types import SimpleNamespace
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
+from vico.agents.base import Action, Info
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.wayfinding import Walker
 from vico.seeds import rng
+from vico.sim.bodies import Bodies
+from vico.sim.perception import InView
 from vico.world.heights import HeightField
 from vico.world.public import PublicMap
 from vico.world.walkable import BLOCKED, OPEN, WalkableMap
@@ -125,19 +128,119 @@ def test_indoors_one_walks_around_what_one_bumped_into() -> None:
     assert math.hypot(body.pose[0] - 1.5, body.pose[1]) <= 0.3
 
 
+def told_room(*others: tuple[float, float], furniture: Sequence[Sequence[float]] = (), agent: str = "") -> Info:
+    """What one is told of a room of 6 x 4 m around the origin: what stands in it, and others, nearest first."""
+    names = {1: {"agent": agent}}
+    view = InView(bodies_at(others), np.arange(len(others)), np.zeros(len(others)), names)
+    view.room = np.array([0.0, 0, 0, 3, 2])
+    view.furniture = np.array(furniture, np.float64).reshape(-1, 5)
+    return {"in_view": view}
+
+
+def bodies_at(spots: Sequence[tuple[float, float]]) -> Bodies:
+    """People at some spots."""
+    n = len(spots)
+    position = np.column_stack([np.array(spots, np.float64).reshape(-1, 2), np.zeros(n)])
+    half = np.full(n, 0.25)
+    return Bodies(
+        np.arange(1, n + 1), np.zeros(n, np.int8), position, np.zeros(n), half, half, half * 7, np.zeros((n, 2))
+    )
+
+
+def indoor_walk(body: Point, goal: tuple[float, float], info: Info, steps: int = 60) -> int:
+    """Walk to a point of a room; return how many steps that took."""
+    walker, status = IndoorWalker("resident_1"), "ok"
+    for step in range(steps):
+        state = {"room": "hall", "action_status": status, "action_code": "hit_body", "time": float(step), "doors": []}
+        observation = {"pose": body.pose, "state": state}
+        walker.notice(observation, info)
+        action = walker.towards(observation, goal, near=0.3)
+        if action is None:
+            return step
+        body.do(action)
+        status = "collision" if body.collided else "ok"
+    return steps
+
+
 def test_indoors_one_walks_around_furniture_in_view_without_touching_it() -> None:
-    walker, body = IndoorWalker(), Point(-1.5, 0.05)
+    body = Point(-1.5, 0.05)
     body.discs = [(0.0, 0.0, 0.3)]
-    view = SimpleNamespace(room=np.array([0.0, 0, 0, 3, 2]), furniture=np.array([[0.0, 0, 0, 0.3, 0.3]]))
-    for _ in range(60):
-        observation = {"pose": body.pose, "state": {"room": "hall", "action_status": "ok"}}
-        walker.notice(observation, {"in_view": view})
-        action = walker.towards(observation, (1.5, 0.0), near=0.3)
+    assert indoor_walk(body, (1.5, 0.0), told_room(furniture=[(0.0, 0, 0, 0.3, 0.3)])) < 60
+    assert not body.collided
+
+
+def test_indoors_one_gets_into_a_passage_hardly_wider_than_a_person() -> None:
+    # A counter 0.6 m from the wall: 0.05 m of room on either side of a person.
+    body = Point(-2.0, 0.0)
+    steps = indoor_walk(body, (2.7, 1.2), told_room(furniture=[(1.9, 1.0, 0.0, 0.5, 0.8), (0.4, -1.0, 0.0, 0.3, 0.9)]))
+    assert steps < 60
+    assert math.dist(body.pose[:2], (2.7, 1.2)) <= 0.3
+
+
+def test_indoors_nobody_pushes_against_what_there_is_no_way_around() -> None:
+    body = Point(-1.5, 0.0)
+    assert indoor_walk(body, (1.5, 0.0), told_room(furniture=[(0.0, 0, 0, 0.2, 2.0)]), steps=30) == 30
+    assert math.dist(body.pose[:2], (-1.5, 0.0)) < 1.6
+    assert not body.collided
+
+
+def test_indoors_one_passes_who_stands_in_the_way_on_the_right_without_touching_them() -> None:
+    body = Point(-2.0, 0.0)
+    body.discs = [(0.0, 0.0, 0.5)]
+    passed: list[float] = []
+    step = body.do
+
+    def noted(action: Action) -> None:
+        step(action)
+        assert not body.collided
+        if abs(body.pose[0]) < 0.5:
+            passed.append(float(body.pose[1]))
+
+    body.do = noted  # type: ignore[method-assign]
+    assert indoor_walk(body, (2.0, 0.0), told_room((0.0, 0.0))) < 20
+    assert passed
+    assert max(passed) < 0.0
+
+
+def test_two_who_meet_where_only_one_fits_through_the_later_one_by_name_gets_out_of_the_way() -> None:
+    # A gap of 0.7 m in a wall across the room, with a person on either side who wants through.
+    wall = [(0.0, 1.175, 0.0, 0.6, 0.825), (0.0, -1.175, 0.0, 0.6, 0.825)]
+    bodies = {"resident_1": Point(-1.6, 0.0), "resident_2": Point(1.6, 0.0)}
+    goals = {"resident_1": (2.3, 0.0), "resident_2": (-2.3, 0.0)}
+    walkers = {name: IndoorWalker(name) for name in bodies}
+    for k in range(60):
+        for name, body in bodies.items():
+            them = next(them for them in bodies if them != name)
+            other = bodies[them]
+            body.discs = [(float(other.pose[0]), float(other.pose[1]), 0.5)]
+            status = "collision" if body.collided else "ok"
+            state = {"room": "hall", "action_status": status, "action_code": "hit_body", "time": float(k), "doors": []}
+            told = told_room((float(other.pose[0]), float(other.pose[1])), furniture=wall, agent=them)
+            walkers[name].notice({"pose": body.pose, "state": state}, told)
+            action = walkers[name].towards({"pose": body.pose, "state": state}, goals[name], near=0.3)
+            if action is not None:
+                body.do(action)
+    assert all(math.dist(bodies[name].pose[:2], goal) <= 0.3 for name, goal in goals.items())
+
+
+def test_who_rests_chest_to_chest_with_somebody_goes_where_there_is_room() -> None:
+    walker, body, other = IndoorWalker("resident_2"), Point(0.0, 0.0), (0.55, 0.0)
+    for k in range(20):
+        state = {"room": "hall", "action_status": "ok", "time": float(k), "doors": [{"position": (-3.0, 0.0, 0.0)}]}
+        walker.notice({"pose": body.pose, "state": state}, told_room(other))
+        action = walker.aside({"pose": body.pose, "state": state}, 0.8)
         if action is None:
             break
         body.do(action)
-        assert not body.collided
-    assert math.hypot(body.pose[0] - 1.5, body.pose[1]) <= 0.3
+    assert math.dist(body.pose[:2], other) >= 0.95
+    assert math.dist(body.pose[:2], (-3.0, 0.0)) >= 0.9
+
+
+def test_nobody_walks_off_the_map_to_a_point_at_its_very_edge() -> None:
+    walker = Walker(map_with_wall(), rng(0, "walk"))
+    body = Point(-20.0, HALF - 5.0)
+    walk(walker, body, (-20.0, HALF - 0.25), 30)
+    assert HALF - 0.6 <= body.pose[1] <= HALF - 0.28
 
 
 def test_rooms_one_left_are_known_again_the_last_six_of_them_and_by_who_goes_on_from_a_state() -> None:
@@ -147,7 +250,8 @@ def test_rooms_one_left_are_known_again_the_last_six_of_them_and_by_who_goes_on_
         walker.notice({"pose": pose, "state": {"room": room, "action_status": "collision"}}, {})
 
     def known(walker: IndoorWalker) -> dict[str, int]:
-        return {kept["room"]: int(np.unpackbits(kept["grid"]["bumps"]).sum()) for kept in walker.state().values()}
+        rooms = walker.state()["rooms"]
+        return {kept["room"]: int(np.unpackbits(kept["grid"]["bumps"]).sum()) for kept in rooms.values()}
 
     for room in ("hall", "kitchen", "bath", "loft", "cellar", "shop"):
         bump_in(room)

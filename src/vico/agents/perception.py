@@ -182,32 +182,6 @@ class DepthGrid:
         np.add.at(self._hits, (cells[:, 1], cells[:, 0]), 1)
         self._blocked.clear()
 
-    def mark(self, room: NDArray[np.float64], furniture: NDArray[np.float64]) -> None:
-        """Add walls and furniture that are known without a picture.
-
-        Parameters
-        ----------
-        room
-            Floor as ``x, y, yaw, half length, half width``, metres and radians, shape ``(5,)``; beyond it are walls.
-        furniture
-            What stands in it, in the same form, shape ``(k, 5)``.
-        """
-        axis = (np.arange(self.n) + 0.5) * self.cell
-        x, y = np.meshgrid(self.corner[0] + axis, self.corner[1] + axis)
-        bumps = self._cells(self._bits) | ~_within(room, x, y)
-        for box in furniture:
-            part = self._around(box)
-            bumps[part] |= _within(box, x[part], y[part])
-        self._bits = np.packbits(bumps)
-        self._blocked.clear()
-
-    def _around(self, box: NDArray[np.float64]) -> tuple[slice, slice]:
-        """Return rows and columns of cells, all those among them whose middles lie in an oriented rectangle."""
-        reach = math.hypot(box[3], box[4]) + self.cell
-        first, last = ((box[:2] + away - self.corner) / self.cell for away in (-reach, reach))
-        rows, columns = (slice(max(0, math.floor(first[k])), max(0, math.ceil(last[k]))) for k in (1, 0))
-        return rows, columns
-
     def bump(self, xy: ArrayLike) -> None:
         """Remember that something stopped a step at a point."""
         ix, iy = ((np.asarray(xy, np.float64)[:2] - self.corner) / self.cell).astype(np.int64)
@@ -245,15 +219,6 @@ class DepthGrid:
                 if 0 < dx * dx + dy * dy <= (radius / self.cell) ** 2:
                     grown |= np.roll(solid, (dy, dx), axis=(0, 1))
         return grown
-
-
-def _within(box: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which points lie in an oriented rectangle ``x, y, yaw, half length, half width``."""
-    dx, dy = x - box[0], y - box[1]
-    cosine, sine = math.cos(box[2]), math.sin(box[2])
-    return np.asarray(
-        (np.abs(dx * cosine + dy * sine) <= box[3]) & (np.abs(dy * cosine - dx * sine) <= box[4]), np.bool_
-    )
 
 
 def _a_star(

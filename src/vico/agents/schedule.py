@@ -50,6 +50,12 @@ _SERVING = ("work",)
 _LOOK_OUT = 900.0
 # How often who is stopped indoors steps aside instead of trying again.
 _GIVE_WAY = 0.5
+# What one comes for on one's feet; for all else one sits where there is a free seat. How often one moves all the same,
+# each time it comes round, and how long who got up stays on their feet, seconds.
+_STANDING = ("shop", "exercise")
+_STIRS, _ON_FEET_FOR = 0.2, (10, 40)
+# Others are too near who stands without need, metres, middle to middle.
+_TOO_NEAR = 0.8
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
 
 
@@ -108,7 +114,7 @@ class ScheduleFollower:
         self._rng = generator
         self._walker = Walker(public_map, generator)
         self._traveller = Traveller(public_map, generator)
-        self._indoors = IndoorWalker()
+        self._indoors = IndoorWalker(resident.id)
         self._seeker = SeatSeeker(self._step_towards)
         self._buyer = Buyer(self._step_towards)
         self._clerk = Clerk(self._step_towards)
@@ -128,8 +134,10 @@ class ScheduleFollower:
         self._arrived: Stay | None = None
         self._arrived_at = ""
         self._stroll: tuple[float, float] | None = None
-        # When a stroll goes on, seconds.
+        # When a stroll goes on, or one who got up sits down again, seconds.
         self._paused_until = -math.inf
+        # Where and until when it stands well, metres and seconds.
+        self._settled = (math.inf, math.inf, -math.inf)
         # Whether the last action was to go in somewhere.
         self._went_in = False
 
@@ -197,6 +205,7 @@ class ScheduleFollower:
             "arrived_at": self._arrived_at,
             "stroll": None if self._stroll is None else list(self._stroll),
             "paused_until": None if math.isinf(self._paused_until) else self._paused_until,
+            "settled": None if math.isinf(self._settled[2]) else list(self._settled),
             "went_in": self._went_in,
             "changes": self._changes.state(),
         }
@@ -222,7 +231,8 @@ class ScheduleFollower:
         self._posture, self._tried = state["posture"], set(state["tried"])
         self._arrived, self._arrived_at = None if arrived is None else self._stays[arrived], str(state["arrived_at"])
         self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
-        paused = state["paused_until"]
+        paused, settled = state["paused_until"], state["settled"]
+        self._settled = (math.inf, math.inf, -math.inf) if settled is None else (settled[0], settled[1], settled[2])
         self._paused_until, self._went_in = -math.inf if paused is None else paused, state["went_in"]
         self._changes.restore(state["changes"])
 
@@ -323,21 +333,48 @@ class ScheduleFollower:
         eats = stay.type == "meal" or stay.tag in _EATING
         if self._posture == "sitting":
             self._seeks = False
-        elif eats or self._seeks:
+        else:
+            step = self._settle(stay, eats, observation, info)
+            if step is not None:
+                return step
+        # When a seat may be free again, or it is time to sit down again.
+        again = math.inf if self._posture == "sitting" else self._seeker.again("sit")
+        again = min((later for later in (again, self._paused_until) if later > time), default=math.inf)
+        if eats:
+            bite = "" if tick % _EAT_EVERY else "drink" if self._rng.random() < 0.3 else "eat"
+            return self._rest(time, min(again, second + _EAT_EVERY - tick % _EAT_EVERY), bite or "wait")
+        if tick % _MOVE_EVERY == 0 and self._rng.random() < _STIRS:
+            if self._posture == "sitting":
+                self._paused_until = time + int(self._rng.integers(*_ON_FEET_FOR))
+                return self._become("standing")
+            self._seeks = True
+            return {"type": "wait"}
+        return self._rest(time, min(again, self._next_tick(time)), "wait" if tick % _DRINK_EVERY else "drink")
+
+    def _settle(self, stay: Stay, eats: bool, observation: Observation, info: Info) -> Action | None:
+        """Return the next action of sitting down, or else of standing in nobody's way; None where one stands well."""
+        time: float = observation["state"]["time"]
+        sits = stay.tag not in _STANDING and time >= self._paused_until
+        if eats or sits or self._seeks:
             step = self._seeker.towards("sit", observation, info)
             self._seeks = step is not None
             if step is not None:
                 return step
-        if eats:
-            bite = "" if tick % _EAT_EVERY else "drink" if self._rng.random() < 0.3 else "eat"
-            return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY, bite or "wait")
-        if tick % _MOVE_EVERY == 0 and self._rng.random() < 0.5:
-            if self._posture == "sitting":
-                return self._become("standing")
-            self._seeks = True
-            return {"type": "wait"}
-        rest = second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY)
-        return self._rest(time, rest, "wait" if tick % _DRINK_EVERY else "drink")
+        x, y = (float(value) for value in observation["pose"][:2])
+        # Who stands well goes on doing so until the next thing to do, whoever comes by: nobody asks who rests.
+        if not observation["state"]["room"] or (time < self._settled[2] and self._settled[:2] == (x, y)):
+            return None
+        self._indoors.notice(observation, info)
+        step = self._indoors.aside(observation, _TOO_NEAR)
+        if step is None:
+            self._settled = x, y, self._next_tick(time)
+        return step
+
+    def _next_tick(self, time: float) -> float:
+        """Return when it is time for the next sip or move, seconds."""
+        second = math.floor(time)
+        tick = second + self._offset
+        return second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY)
 
     def _business(self, stay: Stay, observation: Observation, info: Info) -> Action | None:
         """Return the next action of buying or serving at a till; None where there is nothing to do at one."""
@@ -425,7 +462,8 @@ class ScheduleFollower:
             return self._walker.towards((float(point[0]), float(point[1])), _STROLL_SPEED, observation, info)
         if self._aside:
             return self._aside.pop()
-        if state["action_status"] == "collision" and self._rng.random() < _GIVE_WAY:
+        is_told = "in_view" in info  # who is goes around others
+        if not is_told and state["action_status"] == "collision" and self._rng.random() < _GIVE_WAY:
             # Two who want past each other would push for ever: a step aside, somewhere.
             self._aside = [{"type": "move_forward", "distance": float(self._rng.uniform(0.3, 0.8))}]
             side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
