@@ -171,3 +171,17 @@ def test_a_recording_tells_how_far_doors_are_open_and_what_is_held_up(sim: Simul
     assert any(expected)
     row = first["entity"].tolist().index(int(people.entity[1]))
     assert (int(first["hold"][row]), float(first["hold_share"][row])) == (int(Hold.PLACARD_RIGHT), 0.5)
+
+
+def test_whoever_waits_longest_at_a_door_goes_through_next_though_others_come_out(sim: Simulation) -> None:
+    p, room = sim.state.people, sim.state.indoor.rooms[0]
+    # In front of the door, in the way of the one who comes out, who would try again and again.
+    sim.scenario.place_agent("assistant_0", (-5.0, 4.4), yaw=np.pi / 2)
+    place_in_room(1, 0, sim.state)
+    p.position[1, :2] = room.inside[:2]
+    sim.step({"assistant_1": {"type": "exit"}})
+    for _ in range(20):
+        sim.step({"assistant_0": _ENTER, "assistant_1": {"type": "exit"}})
+        if p.room[0] >= 0:
+            break
+    assert p.room[0] >= 0

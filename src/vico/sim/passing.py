@@ -83,8 +83,15 @@ def _inside(door: NDArray[np.void], position: NDArray[np.float64]) -> float:
 
 
 def _is_free(i: int, way: int, state: SimulationState) -> bool:
-    """Whether nobody is in the door that somebody wants to go through, but ahead on the same way."""
+    """Whether nobody is in the door that somebody wants to go through, but ahead on the same way.
+
+    Nobody who has waited longer to go the other way, either: they stand in front of it, and those who come out one
+    after another would keep them there, and one another in the door, for ever.
+    """
     p, entrance = state.people, entrance_of(i, state)
+    for j in np.flatnonzero((p.door >= 0) & (p.passing == 0) & (p.door_time > p.door_time[i])).tolist():
+        if (p.room[j] < 0) != (way > 0) and entrance_of(j, state) == entrance:
+            return False
     door = state.base.house_doors[entrance]
     start = _point(door, _FROM) if way < 0 else (float(p.position[i, 0]), float(p.position[i, 1]))
     for j in np.flatnonzero(p.passing != 0).tolist():
