@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 import toy_city
@@ -50,3 +51,12 @@ def test_places_that_make_no_sense_are_refused_and_those_too_near_are_moved_apar
         return
     with pytest.raises(InputError, match=f"assistant_places: .*{says}"):
         positions(assistant_places=places)
+
+
+def test_people_of_one_room_start_farther_apart_than_chest_to_chest() -> None:
+    sim = Simulation(toy_city.world(), toy_city.community(), SimConfig(start=7 * 3600, observe=()))
+    people = sim.state.people
+    standing = np.flatnonzero((people.seat < 0) & (people.room == people.room[0]))
+    spots = people.position[standing, :2]
+    assert len(spots) == 3
+    assert np.hypot(*(spots[:, None] - spots[None])[np.triu_indices(3, 1)].T).min() >= 1.0

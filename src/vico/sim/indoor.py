@@ -20,6 +20,9 @@ from vico.world.city_rooms import numbers_of
 from vico.world.model import FLIGHT_STEPS, LANDING, Entrance, Place, Room
 from vico.world.objects import Objects
 
+#: Metres between the middles of two who stand beside each other: a little more than touching, so that nobody starts in
+#: a contact.
+BESIDE = 2 * RADIUS + 0.05
 #: Lists of free spots that are remembered, one a room and door.
 _SPOTS_KEPT = 4096
 _WAY_CELL = 0.1  # metres between the points by which ways in a room are found
@@ -182,6 +185,7 @@ class Indoor:
         *,
         from_door: bool = False,
         beside: NDArray[np.float64] | None = None,
+        apart: float = BESIDE,
     ) -> NDArray[np.float64] | None:
         """Spot of a room nearest to `near` where someone can stand; None if the room is full.
 
@@ -193,6 +197,8 @@ class Indoor:
             Only spots that one can walk to from a door.
         beside
             A point of furniture, shape ``(2,)``: only spots with no other furniture between them and it.
+        apart
+            So far from others, metres, middle to middle, if there is such a spot; else as near as without touching.
 
         Returns
         -------
@@ -211,10 +217,12 @@ class Indoor:
             spots = spots[self._nothing_between(room, spots, beside)]
         if not len(taken) or not len(spots):
             return spots[0].copy() if len(spots) else None
-        # A little more than touching, so that nobody starts in a contact.
         away = np.hypot(*(spots[:, None, :2] - taken[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
-        free = np.flatnonzero(away >= 2 * RADIUS + 0.05)
-        return spots[free[0]].copy() if len(free) else None
+        for least in (apart, BESIDE):
+            free = np.flatnonzero(away >= least)
+            if len(free):
+                return spots[free[0]].copy()
+        return None
 
     def _nothing_between(self, room: int, spots: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return from which spots no furniture is in the way to a point, but what is at that point; shape ``(k,)``."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vico.sim.animation.seated import seat_height
 from vico.sim.avatars import CLIP, free_ground
 from vico.sim.carrying import carry_along
+from vico.sim.indoor import BESIDE
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import LEVEL_GAZE, Posture
 
@@ -36,12 +37,20 @@ def eye_height(state: SimulationState) -> NDArray[np.float64]:
     return np.asarray(p.height * share)
 
 
+#: Whoever is in a room when a run starts stands so far from others, where there is room, metres.
+PERSONAL = 1.0
+
+
 def place_in_room(i: int, room: int, state: SimulationState, *, near: NDArray[Any] | None = None) -> None:
-    """Put someone into a room, a step in from its door (or near a point of it), looking into the room."""
+    """Put someone into a room, a step in from its door (or near a point of it), looking into the room.
+
+    Whoever comes in by a door to others there stands beside them; without a point, `PERSONAL` metres away.
+    """
     p, indoor = state.people, state.indoor
     record = indoor.rooms[room]
     anchor = np.asarray(record.inside if near is None else near, np.float64)
-    spot = indoor.free_spot(room, anchor, state.taken_in(room, without=i))
+    taken = state.taken_in(room, without=i)
+    spot = indoor.free_spot(room, anchor, taken, apart=PERSONAL if near is None else BESIDE)
     assert spot is not None
     p.position[i] = spot
     p.door[i], p.passing[i] = -1, 0
