@@ -34,6 +34,8 @@ _ASIDE, _BACK, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 # Who rides and is stopped by a vehicle lets it pass, so many times two seconds: a tram is long and stands at stops.
 _LETS_PASS, _LETS_TRAM_PASS = 2, 15
+# Ways keep so far from the edge of the map, metres; and steps aside so far from others, middle to middle.
+_FROM_EDGE, _FROM_OTHERS = 0.3, 0.55
 # Who rides steps aside where there is so much room to walls, metres, that the bicycle can be turned there.
 _TURNED = 0.9
 
@@ -158,7 +160,7 @@ class Walker:
             self._goal = goal
             self._plan(position)
         if observation["state"]["action_status"] == "collision":
-            self._meet_obstacle(position, observation)
+            self._meet_obstacle(position, observation, info)
         elif self._stepped and not self._aside:
             self._blocked = max(0, self._blocked - 1)
         self._stepped = False
@@ -223,8 +225,9 @@ class Walker:
         return self._left[self._next] - self._left[k]
 
     def _take(self, path: Sequence[Sequence[float]]) -> None:
-        """Take a path for one's way."""
-        self._path = [(float(x), float(y)) for x, y in path]
+        """Take a path for one's way; where it runs along the map's edge, so far from it that a body has room."""
+        edge = self._map.walkable.half - _FROM_EDGE
+        self._path = [(min(max(float(x), -edge), edge), min(max(float(y), -edge), edge)) for x, y in path]
         self._left = [0.0] * len(self._path)
         for k in range(len(self._path) - 2, -1, -1):
             self._left[k] = self._left[k + 1] + math.dist(self._path[k], self._path[k + 1])
@@ -269,7 +272,7 @@ class Walker:
             return True
         return self._waited < _PATIENCE and _nearest_vehicle(observation, info) < _CAR_NEAR
 
-    def _meet_obstacle(self, position: Point, observation: Observation) -> None:
+    def _meet_obstacle(self, position: Point, observation: Observation, info: Info) -> None:
         """Wait a moment, then pass on one side; close the spot for planning if that doesn't help."""
         yaw = heading(observation)
         self._blocked += 1
@@ -294,6 +297,8 @@ class Walker:
             for degrees in _ASIDE if self._blocked < _BACK_FROM else _BACK:
                 angle = yaw + side * math.radians(degrees)
                 reach = 0.8 + 0.2 * min(self._blocked, 4)
+                if _meets_others(position, angle, reach, info):
+                    continue
                 if self._room(_ahead(position, angle, reach)) >= least and (
                     self._room(_ahead(position, angle, reach / 2)) >= 0.28
                 ):
@@ -333,6 +338,20 @@ def _patience_with(observation: Observation) -> int:
 
 def _ahead(position: Point, yaw: float, reach: float) -> Point:
     return position[0] + reach * math.cos(yaw), position[1] + reach * math.sin(yaw)
+
+
+def _meets_others(position: Point, angle: float, reach: float, info: Info) -> bool:
+    """Return whether a step aside would lead into people whom one has in view."""
+    if "in_view" not in info:
+        return False
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for body in info["in_view"].within(reach + _FROM_OTHERS):
+        if body.kind not in VEHICLES:
+            east, north = body.position[0] - position[0], body.position[1] - position[1]
+            along = min(max(cosine * east + sine * north, 0.0), reach)
+            if math.hypot(east - along * cosine, north - along * sine) < _FROM_OTHERS and along > 0.0:
+                return True
+    return False
 
 
 def _nearest_vehicle(observation: Observation, info: Info) -> float:
