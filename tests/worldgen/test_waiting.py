@@ -17,6 +17,7 @@ from vico.world.lanes import LaneGraph
 from vico.world.transit_model import Stop, Transit
 from vico.world.world import World
 from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.transit.drive import Kerbs
 from vico.worldgen.transit.waiting import _Parted, front_door, waiting_places
 
 
@@ -84,6 +85,37 @@ def test_nobody_waits_in_a_wall(stop: tuple[Stop, LaneGraph]) -> None:
     found = wait(here, lanes, 2.0, [wall])
     assert found.distance(wall) > 0.3
     assert found.distance(shapely.Point(front_door(lanes, here.lane, here.offset))) < BUS_DOOR_REACH
+
+
+def house_along(stop: Stop, lanes: LaneGraph, first: float, last: float) -> shapely.Polygon:
+    """A house at the edge of the stop's lane, between so many metres along it."""
+    x, y, yaw = lanes.at(lanes.index[stop.lane], stop.offset)
+    side = 1.0 if lanes.lefthand else -1.0
+    c, s = math.cos(yaw), math.sin(yaw)
+    corners = [(first, 1.5), (last, 1.5), (last, 9.0), (first, 9.0)]
+    return shapely.Polygon([(x + a * c - side * b * s, y + a * s + side * b * c) for a, b in corners])
+
+
+def test_no_bus_stops_where_a_house_leaves_no_room_to_wait(stop: tuple[Stop, LaneGraph]) -> None:
+    here, lanes = stop
+    kerbs = Kerbs(lanes, HeightField.flat(600.0), [house_along(here, lanes, -80.0, 80.0)])
+    lane = lanes.index[here.lane]
+    assert not kerbs.has_room(lane, here.offset)
+    assert kerbs.with_room(lane, here.offset) is None
+    spot = lanes.at(lane, here.offset)[:2]
+    assert lane not in [found for _, found, _ in kerbs.near(spot, 12.0)]
+    assert kerbs.passes(spot, 12.0)
+
+
+def test_a_bus_stops_a_little_further_on_where_that_leaves_room_to_wait(stop: tuple[Stop, LaneGraph]) -> None:
+    here, lanes = stop
+    lane = lanes.index[here.lane]
+    free = Kerbs(lanes, HeightField.flat(600.0))
+    assert free.with_room(lane, here.offset) == free.offset_on(lane, here.offset)
+    kerbs = Kerbs(lanes, HeightField.flat(600.0), [house_along(here, lanes, -12.0, 3.0)])
+    found = kerbs.with_room(lane, here.offset)
+    assert found is not None
+    assert 2.0 <= abs(found - here.offset) <= 16.0
 
 
 def test_a_good_waiting_place_stays(stop: tuple[Stop, LaneGraph]) -> None:

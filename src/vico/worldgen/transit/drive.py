@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
+from vico.worldgen.transit.waiting import can_wait
 
 BUS_LENGTH = 12.0
 
@@ -24,6 +25,8 @@ _ASTRAY = 1.7  # how much longer a metre off a route's mapped way counts
 _ON_WAY = 8.0  # metres from a route's mapped way within which a lane is on it
 _MOST_CHOICES = 6
 _LEAST_ROUND = 250.0  # metres of lanes that lead back to one another, below which there is nowhere to go
+# Where people can't wait beside a bus, it stops so far before or behind that place, metres, the nearest first.
+_SHIFTS = tuple(sign * 2.0 * k for k in range(9) for sign in ((1.0, -1.0) if k else (1.0,)))
 _BERTH_GAP = BUS_LENGTH + 6.0
 
 
@@ -42,14 +45,20 @@ class Kerbs:
 
     Lanes on decks above other streets are none: who waits for a bus stands on the ground.
 
+    Parameters
+    ----------
+    solids
+        What nobody stands in: no bus stops where there is no room to wait beside it.
+
     Attributes
     ----------
     numbers
         The lanes.
     """
 
-    def __init__(self, lanes: LaneGraph, height: HeightField) -> None:
+    def __init__(self, lanes: LaneGraph, height: HeightField, solids: Sequence[shapely.Polygon] = ()) -> None:
         self.lanes = lanes
+        self._walls = shapely.STRtree(list(solids))
         round_metres = np.bincount(lanes.component, weights=lanes.length, minlength=1)
         goes_round = round_metres[lanes.component] > _LEAST_ROUND
         usable = (lanes.inside < 0) & (lanes.right < 0) & (lanes.length > BUS_LENGTH + 8.0) & goes_round
@@ -63,10 +72,23 @@ class Kerbs:
         """Return the nearest resting place at which the whole bus stands on the lane."""
         return float(np.clip(offset, BUS_LENGTH + 2.0, self.lanes.length[lane] - 3.0))
 
+    def has_room(self, lane: int, offset: float) -> bool:
+        """Return whether people can wait beside a bus that stands on a lane."""
+        return can_wait(self.lanes, lane, offset, self._walls)
+
+    def with_room(self, lane: int, offset: float) -> float | None:
+        """Return the resting place nearest to an offset beside which people can wait; None if there is none near."""
+        for shift in _SHIFTS:
+            at = self.offset_on(lane, offset + shift)
+            if self.has_room(lane, at):
+                return at
+        return None
+
     def near(self, xy: ArrayLike, reach: float) -> list[tuple[float, int, float]]:
         """Lanes within `reach` metres of a pole, the best first: how ill each suits, its number, metres along it.
 
-        A lane that has the pole on the side away from its kerb suits 10 m worse.
+        A lane that has the pole on the side away from its kerb suits 10 m worse. Lanes beside which nobody can wait
+        near the pole are left out.
         """
         if not len(self.numbers):
             return []
@@ -78,8 +100,14 @@ class Kerbs:
             x, y, yaw = self.lanes.at(lane, along)
             right = (point.x - x) * math.sin(yaw) - (point.y - y) * math.cos(yaw) > 0
             kerb = right != self.lanes.lefthand
-            found.append((float(away[k]) + (0.0 if kerb else 10.0), lane, self.offset_on(lane, along)))
+            at = self.with_room(lane, along)
+            if at is not None:
+                found.append((float(away[k]) + (0.0 if kerb else 10.0), lane, at))
         return sorted(found)
+
+    def passes(self, xy: ArrayLike, reach: float) -> bool:
+        """Return whether a lane comes within `reach` metres of a pole, with room to wait or without."""
+        return bool((shapely.distance(self.lines, shapely.Point(xy)) < reach).any()) if len(self.lines) else False
 
     def choices(self, key: str, name: str, xy: ArrayLike, known: Sequence[Berth], reach: float) -> list[Berth]:
         """Berths at which a bus may serve a pole, the best first; known ones stand for those beside them."""

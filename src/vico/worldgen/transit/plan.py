@@ -71,6 +71,7 @@ def planned_berths(site: SiteFacts, kerbs: Kerbs, seed: int) -> list[Berth]:
         (lane, float(offset))
         for lane in kerbs.numbers.tolist()
         for offset in np.arange(BUS_LENGTH + 2.0, lanes.length[lane] - 3.0, 10.0)
+        if kerbs.has_room(lane, float(offset))
     ]
     if not spots:
         return []

@@ -135,9 +135,9 @@ def transit_from_osm(
         Lines are closed drives past two stops at least; `left_out` says why a route of the sources is none.
     """
     osm = site.osm
-    kerbs = Kerbs(lanes, height)
-    mapped = _mapped_berths(osm, kerbs)
+    kerbs = Kerbs(lanes, height, solids or [])
     timed, left_out = routes_from_gtfs(feeds)
+    mapped = _mapped_berths(osm, kerbs, left_out)
     drawn, untold = routes_from_osm(osm)
     known = {route.name for route in timed}
     left_out += [what for what in untold if not known]
@@ -224,8 +224,8 @@ def _record(number: int, line: _Chosen, stops: dict[Berth, Stop]) -> Line:
     return line_record(number, "/".join(line.names), line.timing, line.drive, stops, colour)
 
 
-def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
-    """Berths of the mapped bus stops; two poles that share a berth give one."""
+def _mapped_berths(osm: OsmData, kerbs: Kerbs, left_out: list[Dropped]) -> list[Berth]:
+    """Berths of the mapped bus stops; two poles that share a berth give one. Says which have no room to wait."""
     places = [(f"n{node.id}", node.xy, node.tags) for node in osm.nodes]
     places += [
         (area.id, np.array(area.polygon.centroid.coords[0]), area.tags)
@@ -248,6 +248,8 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
                 berth = Berth(key, tags.get("name") or f"Stop {len(berths) + 1}", near[0][1], near[0][2])
                 if merged(berth, berths) == berth:
                     berths.append(berth)
+            elif kerbs.passes(xy, _REACH):
+                left_out.append(Dropped(id=key, reason="bus stop: walls leave no room to wait beside a bus there"))
     return berths
 
 

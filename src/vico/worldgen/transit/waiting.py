@@ -32,6 +32,8 @@ _FROM_EDGE = (0.7, 0.35)
 _REACH = BUS_DOOR_REACH - 0.5
 # And so far from the bus's side and from walls.
 _FROM_BUS, _FROM_WALL = 0.8, 0.4
+# Buses stop where so much room is left there, square metres in one piece: for a few people.
+_LEAST_ROOM = 1.5
 # So far from the middle of a track.
 _FROM_TRACK = TRAM_WIDTH / 2 + 0.5
 # A stop that nothing serves is on the pavement if that is so near, metres.
@@ -51,6 +53,40 @@ def _bus_door(lanes: LaneGraph, lane: str, offset: float, behind: float) -> tupl
     aside = -1.0 if lanes.lefthand else 1.0
     outward = float(math.sin(yaw) * aside), float(-math.cos(yaw) * aside)
     return (float(x + outward[0] * BUS_WIDTH / 2), float(y + outward[1] * BUS_WIDTH / 2)), outward
+
+
+def can_wait(lanes: LaneGraph, lane: int, offset: float, walls: shapely.STRtree) -> bool:
+    """Return whether there is room for people beside a door of a bus that stands on a lane, clear of walls.
+
+    Parameters
+    ----------
+    lane
+        Its number.
+    offset
+        Where the bus's front is, metres along the lane.
+    walls
+        What nobody stands in.
+    """
+    for behind in BUS_DOORS_BEHIND_FRONT:
+        door, outward = _bus_door(lanes, lanes.ids[lane], offset, behind)
+        if not len(walls.query(shapely.Point(door), predicate="dwithin", distance=_REACH + _FROM_WALL)):
+            return True
+        room = _room_to_wait(door, outward, walls)
+        if max((part.area for part in overlay.polygons_of(room)), default=0.0) >= _LEAST_ROOM:
+            return True
+    return False
+
+
+def _room_to_wait(door: Point2, outward: Point2, walls: shapely.STRtree) -> shapely.Geometry:
+    """Return where one can stand within reach of a door, beyond the side of its vehicle and clear of walls."""
+    along = shapely.Point(door[0] + outward[0] * _FROM_BUS, door[1] + outward[1] * _FROM_BUS)
+    beside = overlay.intersection(overlay.buffer(shapely.Point(door), _REACH), _half_plane(along, outward), grid=None)
+    return overlay.difference(beside, _near_walls(beside, walls), grid=None)
+
+
+def _near_walls(area: shapely.Geometry, walls: shapely.STRtree) -> shapely.Geometry:
+    near = walls.query(overlay.buffer(area, _FROM_WALL)).tolist()
+    return overlay.union_all([overlay.buffer(walls.geometries[k], _FROM_WALL) for k in near], grid=None)
 
 
 def waiting_places(
@@ -117,17 +153,17 @@ class _Finder:
         here = shapely.Point(stop.wait[:2])
         rooms = []
         for behind in BUS_DOORS_BEHIND_FRONT:
-            rooms.append(self._room(*_bus_door(self._lanes, stop.lane, stop.offset, behind)))
+            rooms.append(_room_to_wait(*_bus_door(self._lanes, stop.lane, stop.offset, behind), self._walls))
         found = self._on_pavement(here, rooms)
         if found is not None:
             return found
         widest = self._pavements[-1]
         if not served:
             near = widest.within(overlay.buffer(here, _NOT_SERVED))
-            near = overlay.difference(near, self._near_walls(near), grid=None)
+            near = overlay.difference(near, _near_walls(near, self._walls), grid=None)
             if not near.is_empty:
                 return _nearest(near, here)
-        room = rooms[0]
+        room = next((area for area in rooms if not area.is_empty), rooms[0])
         if room.is_empty:
             (x, y), (u, v) = _bus_door(self._lanes, stop.lane, stop.offset, BUS_DOOR_BEHIND_FRONT)
             return x + u * _FROM_BUS, y + v * _FROM_BUS
@@ -143,7 +179,8 @@ class _Finder:
         for k in sorted(range(TRAM_SECTIONS * len(TRAM_DOORS)), key=lambda k: abs(k - 1)):
             door, middle = tram_door(track, offset, k, side)
             half = TRAM_WIDTH / 2
-            rooms.append(self._room(door, ((door[0] - middle[0]) / half, (door[1] - middle[1]) / half)))
+            outward = (door[0] - middle[0]) / half, (door[1] - middle[1]) / half
+            rooms.append(_room_to_wait(door, outward, self._walls))
         if any(room.covers(here) for room in rooms) and not self._carriageway.contains(here):
             return stop.wait[0], stop.wait[1]
         found = self._on_pavement(here, rooms)
@@ -159,18 +196,6 @@ class _Finder:
                 if not found.is_empty:
                     return _nearest(found, here)
         return None
-
-    def _room(self, door: Point2, outward: Point2) -> shapely.Geometry:
-        """Return where one can stand within reach of a door, beyond the side of its vehicle and clear of walls."""
-        along = shapely.Point(door[0] + outward[0] * _FROM_BUS, door[1] + outward[1] * _FROM_BUS)
-        beside = overlay.intersection(
-            overlay.buffer(shapely.Point(door), _REACH), _half_plane(along, outward), grid=None
-        )
-        return overlay.difference(beside, self._near_walls(beside), grid=None)
-
-    def _near_walls(self, area: shapely.Geometry) -> shapely.Geometry:
-        near = self._walls.query(overlay.buffer(area, _FROM_WALL)).tolist()
-        return overlay.union_all([overlay.buffer(self._walls.geometries[k], _FROM_WALL) for k in near], grid=None)
 
 
 class _Parted:
