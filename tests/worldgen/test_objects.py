@@ -174,3 +174,20 @@ def test_steep_ground_that_nobody_mapped_grows_wild() -> None:
     assert len(both[1] - both[0]) == 1
     assert both[0] <= both[1]
     assert len(placed([], carriageway=street)[0]) == 0
+
+
+def gap_beside(objects: Objects, walls: Sequence[shapely.Polygon]) -> float:
+    """The widest way past the first thing in an alley between walls, metres."""
+    foot = shapely.Polygon(objects.feet()[0])
+    return max(shapely.distance(foot, wall) for wall in walls)
+
+
+@pytest.mark.parametrize("joined", [True, False])
+def test_a_board_leaves_a_way_past_in_an_alley_between_two_houses_and_between_the_wings_of_one(joined: bool) -> None:
+    wings = [shapely.box(-20, -10, -0.8, 30), shapely.box(0.8, -10, 20, 30)]
+    house = [shapely.union_all([*wings, shapely.box(-20, 25, 20, 30)])] if joined else wings
+    objects, dropped = placed([node(1, 0.0, 0.0, tourism="information", information="board")], solids=house)
+    if dropped:
+        assert dropped[0].split(": ")[1].startswith("in the only way past")
+    else:
+        assert gap_beside(objects, wings) >= 0.9

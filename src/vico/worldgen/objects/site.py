@@ -128,21 +128,30 @@ class Site:
                 free[free] = ~shapely.intersects(feet[free][:, None], np.array(others, object)).any(axis=1)
         return free
 
-    def blocks_way(self, foot: shapely.Polygon) -> bool:
-        """Whether a foot would close the last gap between two other things on a footway.
+    def blocks_way(self, foot: shapely.Polygon, *, anywhere: bool = True) -> bool:
+        """Whether a foot would close the last gap between two other things.
 
         What is nearer to it than `WAY` counts: walls, kerbs, things. Where all of that hangs together, with gaps nobody
-        gets through, there is a way past on the other side.
+        gets through, there is a way past on the other side. Two walls of one building are two things, as in an alley
+        between its wings.
+
+        Parameters
+        ----------
+        anywhere
+            Also off the footways: people walk in yards, too. Plants grow there.
         """
-        if not shapely.intersects(self.openings.shape, foot):
+        on_footway = bool(shapely.intersects(self.openings.shape, foot))
+        if not anywhere and not on_footway:
             return False
         around = overlay.buffer(foot, _AROUND * WAY, quad_segs=3)
         near: list[BaseGeometry] = [
-            overlay.intersection(self.shapes[k], around)
+            part
             for k in np.sort(self.solids.query(around, predicate="intersects")).tolist()
+            for part in shapely.get_parts(overlay.intersection(self.shapes[k], around))
         ]
         near += [other.foot for other in self._near(around) if other.foot.intersects(around)]
-        near += self.carriageway.edges(around)
+        # Where there is no footway one walks on the road as well.
+        near += self.carriageway.edges(around) if on_footway else []
         return len(near) > 1 and not _hang_together(near)
 
     def twin(self, kind: str, foot: shapely.Polygon, gap: float) -> bool:

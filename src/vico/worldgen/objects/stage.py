@@ -38,6 +38,7 @@ from vico.worldgen.objects.site import Site
 from vico.worldgen.objects.trees import lawn_wishes, planted_wishes, planting
 from vico.worldgen.objects.wishes import Wish
 
+_PLANTS = "natural"  # the group of their models
 _LAMPS = ("street_lamp", "lamp")  # kinds
 _TWIN_GAP = 0.3  # metres between two that are one, mapped twice
 _KERB_REACH = 9.0  # signals and signs are mapped on the street's middle
@@ -178,7 +179,7 @@ def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str
         yaw,
         0.0 if wish.piece else reach,
         site,
-        model.solid and model.kind not in standing().landmarks,
+        None if not model.solid or model.kind in standing().landmarks else model.group != _PLANTS,
     )
     if found is None:
         return f"{model.kind}: {reason}" + (f", and no room within {reach:g} m" if reach and not wish.piece else "")
@@ -208,16 +209,19 @@ def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str
 
 
 def _room(
-    wish: Wish, wide: float, deep: float, yaw: float, reach: float, site: Site, keeps_way: bool
+    wish: Wish, wide: float, deep: float, yaw: float, reach: float, site: Site, keeps_way: bool | None
 ) -> tuple[tuple[NDArray[np.float64], shapely.Polygon] | None, str | None]:
-    """Find the nearest free spot and the foot there, or None and why there is none where the wish is."""
+    """Find the nearest free spot and the foot there, or None and why there is none where the wish is.
+
+    `keeps_way` says whether it leaves people room to pass anywhere, on footways only (False), or nowhere (None).
+    """
     foot = _rectangles(wish.xy[None], wide, deep, yaw)[0]
     if wish.piece:
         core = _rectangles(wish.xy[None], wide * 0.5, deep * 0.5, yaw)[0]
         reason = site.conflict(foot, 0.0, core=core)
         return (None, reason) if reason else ((wish.xy, foot), None)
     reason = site.conflict(foot, 0.1)
-    if reason is None and keeps_way and site.blocks_way(foot):
+    if reason is None and keeps_way is not None and site.blocks_way(foot, anywhere=keeps_way):
         reason = "in the only way past"
     if reason is None:
         return (wish.xy, foot), None
@@ -225,7 +229,7 @@ def _room(
         spots = wish.xy + ring
         feet = _rectangles(spots, wide, deep, yaw)
         for k in np.flatnonzero(site.free(feet, 0.1)).tolist():
-            if not (keeps_way and site.blocks_way(feet[k])):
+            if keeps_way is None or not site.blocks_way(feet[k], anywhere=keeps_way):
                 return (spots[k], feet[k]), None
     return None, reason
 
