@@ -299,3 +299,41 @@ def test_who_needs_room_to_turn_has_it_at_each_corner() -> None:
         assert action is not None
         body.do(action)
     assert -30.0 < body.pose[1] < -26.0
+
+
+def test_a_step_past_a_post_keeps_to_the_way_though_there_is_room_where_it_begins() -> None:
+    cells = np.full((160, 160), OPEN, np.uint8)
+    cells[80, 80] = BLOCKED  # a post at (0.25, 0.25)
+    public = PublicMap(HALF, WalkableMap(cells, HALF), HeightField.flat(HALF), [], [], [], [])
+    walker, body = Walker(public, rng(0, "walk")), Point(-0.75, -0.6)
+    # Six degrees off the way, towards the post, which the way passes by 0.85 m.
+    body.pose[3:5] = math.cos(0.11), math.sin(0.11)
+    observation = {"pose": body.pose, "state": {"action_status": "ok"}}
+    action = walker.towards((8.0, -0.6), 1.0, observation, {"entities": {}})
+    assert action is not None
+    assert action["type"] == "turn_right"
+    body.pose[:2] = -0.75, -2.75
+    clear = walker.towards((8.0, -2.75), 1.0, observation, {"entities": {}})
+    assert clear is not None
+    assert clear["type"] == "move_forward"
+
+
+def test_on_foot_one_steps_back_from_a_tram_and_lets_it_pass() -> None:
+    walker, body = Walker(map_with_wall(), rng(0, "walk")), Point(-30.0, 0.0)
+    body.discs = [(-25.0, 0.0, 2.0)]  # it stands there for half a minute
+    stopped = 0
+    for second in range(60):
+        if second == 30:
+            body.discs = []
+        stopped += body.collided
+        state = {
+            "action_status": "collision" if body.collided else "ok",
+            "action_code": "hit_body",
+            "action_reason": "stopped by tram",
+        }
+        action = walker.towards((-15.0, 0.0), 1.0, {"pose": body.pose, "state": state}, {"entities": {}})
+        if action is None:
+            break
+        body.do(action)
+    assert stopped <= 5
+    assert math.dist(body.pose[:2], (-15.0, 0.0)) <= 0.5

@@ -17,8 +17,10 @@ from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
 #: Corners count as passed this close, metres.
 CORNER = 0.35
 #: Off the line by more than this after a step means turning first, metres; where there is no more room than `NARROW`
-#: metres, by more than `NARROW_DRIFT`.
+#: metres anywhere along the step, by more than `NARROW_DRIFT`.
 DRIFT, NARROW, NARROW_DRIFT = 0.12, 0.6, 0.03
+#: Shares of a step at which the room to walls is looked at.
+ALONG = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Surfaces that are not stepped on without a look for vehicles.
 ROAD = (ROADWAY, CROSSING)
 
@@ -82,7 +84,12 @@ def stride_lengths(
     scale = 1.0 / np.maximum(away, 1e-9)
     aside = speed * np.abs(heading_x * north - heading_y * east) * scale / np.hypot(heading_x, heading_y)
     position = np.column_stack([x, y])
-    allowed = np.where(walkable.clearance_at(position) > NARROW + _MARGIN, DRIFT, NARROW_DRIFT)
+    room = walkable.clearance_at(position)
+    norm = speed / np.hypot(heading_x, heading_y)
+    for share in ALONG[1:]:
+        step = np.column_stack([x + share * norm * heading_x, y + share * norm * heading_y])
+        room = np.minimum(room, walkable.clearance_at(step))
+    allowed = np.where(room > NARROW + _MARGIN, DRIFT, NARROW_DRIFT)
     goes &= (aside < allowed - _MARGIN) & (heading_x * east + heading_y * north > 0.0)
     ahead = np.column_stack([x + east * scale, y + north * scale])
     goes &= np.isin(walkable.class_at(position), ROAD) | ~np.isin(walkable.class_at(ahead), ROAD)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.state import AgentState
-from vico.agents.strides import CORNER, DRIFT, NARROW, NARROW_DRIFT, ROAD
+from vico.agents.strides import ALONG, CORNER, DRIFT, NARROW, NARROW_DRIFT, ROAD
 from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
 
@@ -36,6 +36,8 @@ _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 _LETS_PASS, _LETS_TRAM_PASS = 2, 15
 # Ways keep so far from the edge of the map, metres; and steps aside so far from others, middle to middle.
 _FROM_EDGE, _FROM_OTHERS = 0.3, 0.55
+# On foot one steps so far back from a vehicle, metres, and lets it pass until it has stopped one so often.
+_STEPS_BACK, _LETS_BY = 0.8, 3
 # Who rides steps aside where there is so much room to walls, metres, that the bicycle can be turned there.
 _TURNED = 0.9
 
@@ -246,10 +248,11 @@ class Walker:
         corner = self._path[self._next]
         east, north = corner[0] - position[0], corner[1] - position[1]
         away = math.sqrt(east * east + north * north)
-        error = wrapped(math.atan2(north, east) - heading(observation))
+        yaw = heading(observation)
+        error = wrapped(math.atan2(north, east) - yaw)
         stride = min(away, speed)
-        # Where it is narrow there is no room for drifting.
-        room = self._room(position)
+        # Where it is narrow there is no room for drifting: all along the step, for a post may stand beside it.
+        room = min(self._room(_ahead(position, yaw, stride * share)) for share in ALONG)
         drift = NARROW_DRIFT if room <= NARROW else DRIFT if room <= _WIDE else self.wide_drift
         if abs(error) > 1e-3 and (abs(stride * math.sin(error)) > drift or math.cos(error) <= 0.0):
             return {"type": "turn_left" if error > 0 else "turn_right", "degrees": abs(math.degrees(error))}
@@ -281,9 +284,12 @@ class Walker:
         if self._blocked == 1 and not solid:
             self._aside = [{"type": "wait"}] * int(self._rng.integers(1, 3))
             return
-        if self._turns_in and self._blocked <= _patience_with(observation):
+        patience = _patience_with(observation)
+        if self._turns_in and self._blocked <= patience:
             # It goes on when it can: who presses on beside it gets stuck between it and a wall.
             self._aside = [{"type": "wait"}] * 2
+            return
+        if not self._turns_in and self._steps_back_from_vehicle(position, yaw, patience):
             return
         if self._blocked % 4 == 0:
             x, y = _ahead(position, yaw, 0.9)
@@ -306,6 +312,16 @@ class Walker:
                     self._aside = [{"type": turn, "degrees": degrees}, {"type": "move_forward", "distance": reach}]
                     return
         self._plan(position)
+
+    def _steps_back_from_vehicle(self, position: Point, yaw: float, patience: int) -> bool:
+        """Step back from a vehicle that stopped one on foot, and let it pass, the longer the more often it did."""
+        if not 1 < self._blocked <= min(patience, _LETS_BY):
+            return False
+        waits: list[Action] = [{"type": "wait"}] * (2 * self._blocked)
+        if self._blocked == 2 and self._room(_ahead(position, yaw + math.pi, _STEPS_BACK)) >= 0.3:
+            waits = [{"type": "turn_left", "degrees": 180.0}, {"type": "move_forward", "distance": _STEPS_BACK}, *waits]
+        self._aside = waits
+        return True
 
 
 def shows_red(point: Point, info: Info) -> bool:
@@ -330,7 +346,7 @@ def closed_ground(info: Info) -> list[tuple[float, float, float]]:
 
 def _patience_with(observation: Observation) -> int:
     """Return how often who rides waits for what stopped it to go on."""
-    what = str(observation["state"]["action_reason"]).removeprefix("stopped by ")
+    what = str(observation["state"].get("action_reason", "")).removeprefix("stopped by ")
     if what == "tram":
         return _LETS_TRAM_PASS
     return _LETS_PASS if what in VEHICLES else 0
