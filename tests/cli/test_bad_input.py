@@ -292,7 +292,6 @@ def test_a_folder_that_is_not_there_is_named(
         ("world", "build"),
         ("world",),
         (),
-        ("frobnicate",),
         ("run", "w"),
         ("run", "w", "c", "--out", "o", "--steps", "many"),
         ("eval", "assistant", "--worlds", "w", "--out", "o", "--category", "frob"),
@@ -345,3 +344,50 @@ def test_a_run_on_another_day_than_its_communitys_says_so(
 def test_a_world_built_without_heights_says_that_it_is_flat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert vico("world", "build", "--radius", 60, "--lat", 60.169, "--lon", 24.9435, "--out", tmp_path / "w") == 0
     assert "the ground is flat: no source tells its heights" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["rnu", "W", "P"], "no verb 'rnu'; did you mean vico run?"),
+        (["world", "buidl"], "no verb 'world buidl'; did you mean vico world build?"),
+        (["xyzzy"], "no verb 'xyzzy'; there are "),
+        (["run", "PEOPLE", "WORLD"], "is a community, and a world is wanted here; are two folders exchanged?"),
+        (["check", "community", "WORLD"], "is a world, and a community is wanted here"),
+        (["world", "info", "FOLDER"], "is no finished world; make one with vico world build"),
+        (["view", "WORLD"], "is a world, and a run is wanted here"),
+        (["run", "WORLD", "PEOPLE", "--speed", 3], "--speed is for the page of a run that is shown; add --live"),
+        (["run", "WORLD", "PEOPLE", "--allow-host", "hub"], "--allow-host is for the page"),
+        (["run", "WORLD", "PEOPLE", "--out", "/proc/x"], "/proc cannot be written to; choose another folder"),
+        (["world", "build", "--lat", 24.9435, "--lon", 60.169, "--osm", "MAP"], "latitude and longitude are exchanged"),
+        (["world", "build", "--lat", 48.1, "--lon", 11.5, "--osm", "MAP"], "the extract covers 60.1"),
+    ],
+)
+def test_advice_names_what_is_wrong(
+    words: list[object],
+    told: str,
+    helsinki_path: Path,
+    helsinki_people: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "folder").mkdir()
+    known: dict[object, object] = {"WORLD": helsinki_path, "PEOPLE": helsinki_people, "FOLDER": tmp_path / "folder"}
+    known["MAP"] = packaged_extract().path
+    given = [known.get(word, word) for word in words]
+    if words[0] in ("run", "world") and "--out" not in words and "info" not in words:
+        given += ["--out", tmp_path / "out"]
+    assert told in refused(capsys, *given)
+
+
+def test_a_number_that_is_none_is_said_to_be_none(capsys: pytest.CaptureFixture[str]) -> None:
+    assert vico("run", "W", "P", "--steps", "many") == 2
+    assert "'many' is no whole number; give one such as 300" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    "verb", [["run"], ["live"], ["film"], ["world", "build"], ["community", "build"], ["eval", "commute"]]
+)
+def test_no_help_speaks_of_none(verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert vico(*verb, "--help") == 0
+    assert "None" not in capsys.readouterr().out

@@ -38,7 +38,7 @@ def test_a_damaged_spec_is_refused_with_its_field(change: dict[str, object], tol
 
 def test_an_unknown_option_is_told_with_those_there_are() -> None:
     with pytest.raises(InputError, match="max_steps"):
-        vico.make(toy_city.world(), bicycles=3)  # type: ignore[call-arg]
+        vico.make(toy_city.world(), fog=3)  # type: ignore[call-arg]
 
 
 def test_a_spec_without_a_folder_makes_no_environment() -> None:

@@ -47,7 +47,7 @@ def test_an_opened_world_is_kept_until_it_is_built_anew(copy: Path) -> None:
 
 def test_a_folder_without_manifest_is_no_finished_world(copy: Path) -> None:
     (copy / "world.json").unlink()
-    with pytest.raises(MissingFileError, match=r"no finished world; build it with --force"):
+    with pytest.raises(MissingFileError, match=r"no finished world; make one with vico world build"):
         read_world(copy)
 
 

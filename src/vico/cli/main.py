@@ -35,6 +35,7 @@ from vico.cli.options import (
     WorldBuildOptions,
     with_ray_address,
 )
+from vico.cli.parsing import REGISTRY, check_verb
 from vico.cli.viewer_options import FilmOptions, StillOptions
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
@@ -377,6 +378,19 @@ def warm_up() -> int:
     return verb.warm_up()
 
 
+# Verbs of several words, by the first.
+_GROUPS = {
+    "world": world,
+    "city": city,
+    "community": community,
+    "check": check,
+    "assets": assets,
+    "motion": motion,
+    "llm": language_model,
+    "eval": evaluation,
+    "dataset": dataset,
+    "leaderboard": leaderboard,
+}
 app.command(world, name="world", help="Make worlds and look into them.")
 app.command(city, name="city", help="Make cities of tiles.")
 app.command(community, name="community", help="People a world.")
@@ -446,6 +460,11 @@ def _leave(code: int, sentence: str = "") -> NoReturn:
     sys.exit(code)
 
 
+def _verbs() -> dict[str, list[str]]:
+    """Return the first words of all verbs, and what may come after each that has several."""
+    return {name: list(_GROUPS[name]._subcommands) if name in _GROUPS else [] for name in app._subcommands}
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; a sentence for whatever goes wrong, never a traceback."""
     gc.set_threshold(20_000, 20, 20)  # what is imported is never garbage: imports alone take a seventh less
@@ -455,10 +474,12 @@ def main(arguments: list[str] | None = None) -> None:
         if given == ["--version"]:
             print(__version__)
             _leave(0)
+        check_verb(given, _verbs())
         code = app.cli(
             prog="vico",
             description="An open world for humans, robots and society.",
             args=with_ray_address(given),
+            registry=REGISTRY,
             config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes),
         )
     except SystemExit as end:  # help was asked for, options were refused, or rich found the pipe closed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -97,8 +98,10 @@ def check_output(out: Path, *inputs: Path, force: bool, kind: FolderKind | None 
         ground = ground.parent
     if not ground.is_dir():
         raise InputError(f"--out {out}: {ground} is not a directory; choose another folder")
-    if not os.access(ground, os.W_OK | os.X_OK):
-        raise InputError(f"--out {out}: {ground} cannot be written to; choose another folder")
+    try:  # rights alone don't tell: nobody writes into /proc, nor on a disk that was mounted to be read
+        os.rmdir(tempfile.mkdtemp(prefix=".vico-", dir=ground))
+    except OSError:
+        raise InputError(f"--out {out}: {ground} cannot be written to; choose another folder") from None
     folder = out.resolve()
     for kept in (*inputs, Path.cwd(), Path(os.path.expanduser("~"))):  # "~" itself where there is no home
         if kept.resolve().is_relative_to(folder):

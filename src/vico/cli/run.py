@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +55,7 @@ STATES_EVERY = 300
 _PLAYED_ROOM = {"robot": 1.2, "assistant": 0.6}
 
 # Options that decide nothing of what is in the run folder; the others are kept in its run.json.
+_DEFAULTS = {field.name: field.default for field in fields(RunOptions)}
 _NOT_KEPT = ("out", "resume", "workers", "force", "json", *LIVE)
 
 
@@ -173,6 +174,10 @@ class Job:
         played: PlayedAgent | None = None,
     ) -> Job:
         """Read what is needed, and look at what is in the output folder."""
+        unused = [name for name in LIVE if getattr(options, name) != _DEFAULTS[name]]
+        if unused and not options.live:
+            option = unused[0].replace("_", "-")
+            raise InputError(f"run: --{option} is for the page of a run that is shown; add --live, or leave it out")
         found = None if options.force else _cut_short(out)
         kind = RUN_FOLDER if options.force else None
         check_output(out, world, community, force=options.force or found is not None, kind=kind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -12,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from vico.clock import seconds_of_day
 from vico.errors import InputError, SchemaError
-from vico.sim.config import SimConfig, SimSettings
+from vico.sim.config import SimConfig, SimSettings, check_types
 
 SCHEMA = "vico.env"
 VERSION = 1
@@ -78,6 +79,11 @@ class EnvSpec(SimSettings):
     max_steps: int = 1500
     form: str | Mapping[str, Any] = "rich"
 
+    def __post_init__(self) -> None:
+        check_types(self, "env")
+        if not isinstance(self.observe, str) and not _are_names(self.observe):
+            raise InputError(f"env: observe is {self.observe!r}; it has to be 'all', 'none', or names of agents")
+
     @classmethod
     def of(cls, world: Any, community: Any, options: EnvOptions) -> EnvSpec:
         """Make a spec from what `make` is given; worlds and communities in memory have no folder to name.
@@ -90,7 +96,9 @@ class EnvSpec(SimSettings):
         known = [field.name for field in fields(cls)]
         unknown = [name for name in options if name not in known]
         if unknown:
-            raise InputError(f"env: there is no option {unknown[0]!r}; options are {', '.join(known)}")
+            near = difflib.get_close_matches(unknown[0], known, n=1)
+            meant = f"did you mean {near[0]!r}?" if near else f"options are {', '.join(known)}"
+            raise InputError(f"env: there is no option {unknown[0]!r}; {meant}")
         return cls(world=_folder(world), community=_folder(community), **options)
 
     @property
@@ -135,6 +143,10 @@ class EnvSpec(SimSettings):
             first = error.errors()[0]
             where = ".".join(str(part) for part in first["loc"])
             raise SchemaError(f"env spec: {where}: {first['msg']}") from None
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)
 
 
 def _folder(source: Any) -> str | None:

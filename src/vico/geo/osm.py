@@ -375,13 +375,52 @@ def read_osm(
     if not (data.ways or data.nodes or data.areas):
         if reader.objects and reader.unlocated and not reader.way_rows:
             raise SchemaError(f"{path}: ways come before their nodes; sort it with: osmium sort FILE -o SORTED.osm.pbf")
-        raise EmptyInputError(f"{path}: nothing in {window}; check the coordinates, or use another extract")
+        raise EmptyInputError(f"{path}: nothing in {window}; {_elsewhere(path, frame)}")
     square = shapely.box(-half, -half, half, half)
     if need_buildings and not any(
         area.tags.get("building", "no") != "no" and shapely.intersects(area.polygon, square) for area in data.areas
     ):
-        raise EmptyInputError(f"{path}: no building in {window}; check the coordinates, or use another extract")
+        raise EmptyInputError(f"{path}: no building in {window}; {_elsewhere(path, frame)}")
     return data
+
+
+def extract_bounds(path: Path) -> tuple[float, float, float, float]:
+    """South, west, north and east of an OSM extract, degrees: of its stated bounds, else of its nodes.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If there is no such file, or it is broken or empty.
+    """
+    checked_extract(path)
+    try:
+        box = osmium.io.Reader(str(path)).header().box()
+        if box.valid():
+            low, high = box.bottom_left, box.top_right
+            return low.lat, low.lon, high.lat, high.lon
+        deleted = deleted_objects(path)
+        places = [
+            (node.location.lat, node.location.lon)
+            for node in osmium.FileProcessor(str(path), osmium.osm.NODE)
+            if node.location.valid() and not node.deleted and ("n", node.id) not in deleted
+        ]
+    except RuntimeError as error:
+        raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
+    if not places:
+        raise SchemaError(f"{path}: holds no points; download it again, or clip it anew")
+    lats, lons = zip(*places, strict=True)
+    return min(lats), min(lons), max(lats), max(lons)
+
+
+def _elsewhere(path: Path, frame: LocalFrame) -> str:
+    """Say how to mend a window that lies beside what an extract covers: where that is, or what is exchanged."""
+    south, west, north, east = extract_bounds(path)
+    where = f"the extract covers {south:.4f} to {north:.4f} north, {west:.4f} to {east:.4f} east"
+    if south <= frame.lat <= north and west <= frame.lon <= east:
+        return f"{where}: move the window, or use another extract"
+    if south <= frame.lon <= north and west <= frame.lat <= east:
+        return f"latitude and longitude are exchanged: {where}; give --lat {frame.lon:g} --lon {frame.lat:g}"
+    return f"{where}: check the coordinates, or use another extract"
 
 
 def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmData:

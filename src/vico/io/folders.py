@@ -79,6 +79,42 @@ def listed_in(manifest: str, key: str = "files") -> Callable[[Path], Collection[
     return names
 
 
+#: What a folder is, by the manifest that it holds.
+_MANIFESTS = {
+    "world.json": "a world",
+    "city.json": "a city",
+    "community.json": "a community",
+    "run.json": "a run",
+    "dataset.json": "a dataset",
+    "results.json": "an evaluation",
+    "export.json": "an export",
+}
+
+
+def described(folder: Path) -> str:
+    """Say what a folder is, by its manifest: "a community"; empty if it is none of ours."""
+    return next((what for manifest, what in _MANIFESTS.items() if (folder / manifest).is_file()), "")
+
+
+def mistaken(folder: Path, wanted: str, make: str) -> str:
+    """Return the sentence on a folder that is not of the kind that is wanted.
+
+    Parameters
+    ----------
+    wanted
+        The kind: ``world``, ``community``.
+    make
+        The command that makes one.
+    """
+    found = described(folder)
+    if found:
+        return f"{folder}: is {found}, and a {wanted} is wanted here; are two folders exchanged?"
+    inside = sorted(path.name for path in folder.iterdir() if path.is_dir() and described(path) == f"a {wanted}")
+    if inside:
+        return f"{folder}: is no {wanted}, but holds one: give {folder / inside[0]}"
+    return f"{folder}: is no finished {wanted}; make one with {make}"
+
+
 class FolderLock:
     """The exclusive right to write into a folder, which is there already; held until `release`.
 

@@ -6,7 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import date as Date
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
 
 from vico.clock import DAY
 from vico.errors import InputError
@@ -123,6 +126,53 @@ class SimSettings:
     periods: Mapping[str, float | str] = field(default_factory=dict)
 
 
+def check_types(settings: SimSettings, owner: str) -> None:
+    """Make sure that the fields of settings are of their kinds; names that are one text become a tuple.
+
+    Parameters
+    ----------
+    owner
+        What the settings are of, for errors.
+
+    Raises
+    ------
+    InputError
+        If one is not.
+    """
+    for name, hint in get_type_hints(type(settings)).items():
+        value = getattr(settings, name)
+        kinds = set(get_args(hint)) if get_origin(hint) in (Union, UnionType) else {hint}
+        if isinstance(value, np.generic):
+            value = value.item()
+        if hint == tuple[str, ...] and isinstance(value, str):
+            value = tuple(part.strip() for part in value.split(",") if part.strip())
+        if str in kinds and name == "date" and isinstance(value, Date):
+            value = value.isoformat()
+        if hint == tuple[str, ...]:
+            if not isinstance(value, tuple | list) or not all(isinstance(one, str) for one in value):
+                raise InputError(f"{owner}: {name} is {value!r}; it has to be names, as in ('husky', 'go2')")
+            value = tuple(value)
+        elif kinds <= _PLAIN.keys() and not any(_is_plain(value, kind) for kind in kinds):
+            words = " or ".join(_PLAIN[kind] for kind in sorted(kinds, key=lambda kind: kind.__name__))
+            raise InputError(f"{owner}: {name} is {value!r}; it has to be {words}")
+        object.__setattr__(settings, name, value)
+
+
+_PLAIN: dict[Any, str] = {
+    bool: "True or False",
+    int: "a whole number, such as 30",
+    float: "a number, such as 0.5",
+    str: "text",
+    type(None): "None",
+}
+
+
+def _is_plain(value: Any, kind: Any) -> bool:
+    if isinstance(value, bool) or kind is bool:
+        return isinstance(value, bool) and kind is bool
+    return isinstance(value, int | float) if kind is float else isinstance(value, kind)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SimConfig(SimSettings):
     """Everything that decides a run beside the world and the community.
@@ -143,6 +193,7 @@ class SimConfig(SimSettings):
         return self if self.date is not None else replace(self, date=(day or NO_DAY).isoformat())
 
     def __post_init__(self) -> None:
+        check_types(self, "simulation")
         for name in ("seed", "assistants", "cars", "cyclists", "pedestrians", "residents"):
             value = getattr(self, name)
             if value is not None and value < 0:

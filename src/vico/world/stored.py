@@ -27,7 +27,7 @@ from pydantic import ValidationError
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
-from vico.io.folders import FolderKind, listed_in
+from vico.io.folders import FolderKind, listed_in, mistaken
 from vico.version import __version__
 from vico.world import model
 from vico.world.model import Manifest
@@ -54,7 +54,7 @@ def read_stored(path: Path) -> World:
     if not folder.is_dir():
         raise MissingFileError(f"{folder}: no such folder; make one with vico world build")
     if not (folder / "world.json").exists():
-        raise MissingFileError(f"{folder}: holds no world.json, so it is no finished world; build it with --force")
+        raise MissingFileError(mistaken(folder, "world", "vico world build"))
     content = read_json(folder / "world.json")
     if not isinstance(content, dict) or content.get("schema_name") != model.SCHEMA:
         found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__

@@ -13,11 +13,8 @@ import shutil
 from collections.abc import Collection
 from pathlib import Path
 
-import osmium
-
-from vico.errors import InputError, MissingFileError, SchemaError
-from vico.geo.osm import checked_extract
-from vico.geo.osm_editing import deleted_objects
+from vico.errors import InputError, MissingFileError
+from vico.geo.osm import extract_bounds
 from vico.io.files import read_json, write_json
 from vico.io.folders import FolderKind, FolderLock, check_replaceable, folder_errors, new_folder, remove
 from vico.world.folder import read_world
@@ -49,24 +46,8 @@ def extract_centre(path: Path) -> tuple[float, float]:
     MissingFileError, SchemaError
         If there is no such file, or it is broken or empty.
     """
-    checked_extract(path)
-    try:
-        box = osmium.io.Reader(str(path)).header().box()
-        if box.valid():
-            low, high = box.bottom_left, box.top_right
-            return (low.lat + high.lat) / 2, (low.lon + high.lon) / 2
-        deleted = deleted_objects(path)
-        places = [
-            (node.location.lat, node.location.lon)
-            for node in osmium.FileProcessor(str(path), osmium.osm.NODE)
-            if node.location.valid() and not node.deleted and ("n", node.id) not in deleted
-        ]
-    except RuntimeError as error:
-        raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
-    if not places:
-        raise SchemaError(f"{path}: holds no points; download it again, or clip it anew")
-    lats, lons = zip(*places, strict=True)
-    return (min(lats) + max(lats)) / 2, (min(lons) + max(lons)) / 2
+    south, west, north, east = extract_bounds(path)
+    return (south + north) / 2, (west + east) / 2
 
 
 def build_world(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.files import read_json
+from vico.io.folders import mistaken
 from vico.sim.recording.schema import MANIFEST, SCHEMA, SEGMENT_STEPS, VERSION
 from vico.version import __version__
 
@@ -124,7 +125,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         If there is none, or it is of another version.
     """
     if not (path / MANIFEST).exists():
-        raise MissingFileError(f"{path}: holds no {MANIFEST}; make a run with vico run")
+        raise MissingFileError(mistaken(path, "run", "vico run"))
     manifest = read_json(path / MANIFEST)
     if not isinstance(manifest, dict) or manifest.get("schema_name") != SCHEMA:
         raise SchemaError(f"{path / MANIFEST}: not a {SCHEMA} file; give a run folder")
