@@ -13,6 +13,7 @@ from vico.io.files import sha256_of
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated, outline_of
 from vico.world.check.finding import WorldFinding
 from vico.world.check.objects import check_clearances, check_objects
+from vico.world.check.opendrive import check_opendrive
 from vico.world.check.places import check_entrances, check_places
 from vico.world.check.rooms import check_containers, check_indoors, check_rooms
 from vico.world.check.streets import check_rails, check_roads, check_transit
@@ -152,4 +153,4 @@ _RULES: tuple[_Rule, ...] = (
     check_entities,
     check_dropped,
 )
-_STREET_RULES: tuple[_Rule, ...] = (check_roads, check_transit, check_rails)
+_STREET_RULES: tuple[_Rule, ...] = (check_roads, check_transit, check_rails, check_opendrive)

@@ -23,6 +23,7 @@ from vico.world.heights import HeightField
 from vico.world.model import FAILED
 from vico.worldgen.facts.expendable import leave_out
 from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.streets.opendrive import sound_opendrive
 from vico.worldgen.streets.roads import (
     DEFAULTS,
     SIDEWALK_WIDTH,
@@ -208,7 +209,8 @@ def _converted(
         plain = without_kinks(_plain_net(net.read_bytes()))
         if kerbs is not None:
             plain = sidewalks_beside(plain, kerbs, left_driving=site.left_driving)
-        return RoadNetwork(plain if height is None else _laid(plain, height), _plain_xodr(xodr.read_bytes()))
+        roads = sound_opendrive(_plain_xodr(xodr.read_bytes()), height)
+        return RoadNetwork(plain if height is None else _laid(plain, height), roads)
 
 
 def empty_network(frame: LocalFrame, half: float) -> RoadNetwork:
