@@ -48,6 +48,21 @@ def test_an_unknown_robot_is_refused_with_the_names_of_the_known_ones() -> None:
         robot_model("spot")
 
 
+@pytest.mark.parametrize("name", ["cart.urdf", "robots/cart.xml", "CART.URDF", "cart.usd"])
+def test_a_robot_s_file_is_refused_with_the_page_that_says_how_robots_are_added(name: str) -> None:
+    with pytest.raises(InputError, match="files of robots are not taken yet; docs/robots.md#adding-a-robot") as refused:
+        robot_model(name)
+    assert "\n" not in str(refused.value)
+    page = Path(__file__).parents[2] / "docs" / "robots.md"
+    assert "\n## Adding a robot\n" in page.read_text()
+
+
+@pytest.mark.parametrize(("name", "meant"), [("huskey", "husky"), ("H1:velocty", "h1"), ("manipulater", "manipulator")])
+def test_a_misspelt_robot_is_told_which_was_meant(name: str, meant: str) -> None:
+    with pytest.raises(InputError, match=f"did you mean '{meant}'"):
+        robot_model(name)
+
+
 @pytest.mark.parametrize(("name", "kilograms"), [("drone", 2.064), ("husky", 50.0), ("go2", 15.0), ("h1", 51.4)])
 def test_our_models_weigh_what_their_makers_publish(name: str, kilograms: float) -> None:
     compiled = mujoco.MjSpec.from_string(robot_model(name, packs=False).mjcf).compile()

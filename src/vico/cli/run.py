@@ -15,6 +15,7 @@ from vico.agents.base import Agent
 from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
+from vico.assets.robots import robot_kind
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
@@ -178,6 +179,8 @@ class Job:
         if unused and not options.live:
             option = unused[0].replace("_", "-")
             raise InputError(f"run: --{option} is for the page of a run that is shown; add --live, or leave it out")
+        for name in _names(options.robots):
+            robot_kind(name)
         found = None if options.force else _cut_short(out)
         kind = RUN_FOLDER if options.force else None
         check_output(out, world, community, force=options.force or found is not None, kind=kind)

@@ -1,6 +1,6 @@
 """Robots: what physics, control and drawing need to know of each."""
 
-from vico.assets.robots.catalogue import register_robot, robot_model, robot_names, robot_packages
+from vico.assets.robots.catalogue import register_robot, robot_kind, robot_model, robot_names, robot_packages
 from vico.assets.robots.control_settings import (
     ControllerSettings,
     FourLegs,
@@ -51,6 +51,7 @@ __all__ = [
     "TwoLegs",
     "flight_space",
     "register_robot",
+    "robot_kind",
     "robot_model",
     "robot_names",
     "robot_packages",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from difflib import get_close_matches
 
 from vico.assets.packages import Package
 from vico.assets.robots.drone import drone
@@ -13,6 +14,9 @@ from vico.assets.robots.manipulator import manipulator
 from vico.assets.robots.model import RobotModel
 from vico.assets.robots.packs import GO2_PACKAGE, H1_PACKAGE, HUSKY_PACKAGE
 from vico.errors import InputError
+
+# What a robot is described in elsewhere: URDF, MJCF and SDF (.xml too), USD.
+_FILES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".usd", ".usda", ".usdc", ".usdz")
 
 _MAKERS: dict[str, Callable[[bool], RobotModel]] = {
     "drone": drone,
@@ -63,11 +67,30 @@ def robot_model(name: str, *, packs: bool = True) -> RobotModel:
     InputError
         If there is no such robot, or it has no such action space.
     """
-    kind, colon, space = name.partition(":")
-    if kind not in _MAKERS:
-        raise InputError(f"robot {kind!r} is not known; choose among {', '.join(sorted(_MAKERS))}")
+    kind = robot_kind(name)
     model = _MAKERS[kind](packs)
-    return model.with_space(space) if colon else model
+    return model.with_space(name.removeprefix(f"{kind}:")) if ":" in name else model
+
+
+def robot_kind(name: str) -> str:
+    """Return the kind of a robot, without its action space.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind, or `name` is a file.
+    """
+    if name.lower().endswith(_FILES):
+        raise InputError(
+            f"robot {name!r}: files of robots are not taken yet; docs/robots.md#adding-a-robot says how to add one in "
+            f"Python, and these are there: {', '.join(sorted(_MAKERS))}"
+        )
+    kind = name.partition(":")[0]
+    if kind not in _MAKERS:
+        near = get_close_matches(kind.lower(), _MAKERS, 1)
+        hint = f", did you mean {near[0]!r}?" if near else ""
+        raise InputError(f"robot {kind!r} is not known; choose among {', '.join(sorted(_MAKERS))}{hint}")
+    return kind
 
 
 def robot_packages() -> tuple[Package, ...]:
