@@ -50,7 +50,7 @@ def test_an_unknown_robot_is_refused_with_the_names_of_the_known_ones() -> None:
 
 @pytest.mark.parametrize("name", ["cart.urdf", "robots/cart.xml", "CART.URDF", "cart.usd"])
 def test_a_robot_s_file_is_refused_with_the_page_that_says_how_robots_are_added(name: str) -> None:
-    with pytest.raises(InputError, match="files of robots are not taken yet; docs/robots.md#adding-a-robot") as refused:
+    with pytest.raises(InputError, match=r"are not taken yet; docs/robots\.md#adding-a-robot") as refused:
         robot_model(name)
     assert "\n" not in str(refused.value)
     page = Path(__file__).parents[2] / "docs" / "robots.md"

@@ -36,13 +36,29 @@ def test_trimesh_reads_the_gltf_with_every_object_where_it_stands(helsinki: Worl
     assert sum(len(g.faces) for g in scene.geometry.values()) >= walls
 
 
+def test_each_building_is_a_node_of_the_gltf_by_its_id(helsinki: World, tmp_path: Path) -> None:
+    export_world(helsinki, "gltf", tmp_path / "an export")
+    content = (tmp_path / "an export" / "world.glb").read_bytes()
+    text = json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
+    nodes = {node["name"]: node for node in text["nodes"] if "mesh" in node}
+    assert len(nodes) == len([node for node in text["nodes"] if "mesh" in node])
+    for building in helsinki.buildings:
+        parts = text["meshes"][nodes[building.id]["mesh"]]["primitives"]
+        low = np.min([text["accessors"][p["attributes"]["POSITION"]]["min"] for p in parts], axis=0)
+        high = np.max([text["accessors"][p["attributes"]["POSITION"]]["max"] for p in parts], axis=0)
+        east, north = np.mean(building.footprint[0], axis=0)
+        assert low[0] - 1 <= east <= high[0] + 1
+        assert low[2] - 1 <= -north <= high[2] + 1
+        assert nodes[building.id]["extras"]["entity"] == building.entity
+
+
 def test_mujoco_loads_the_world_and_a_ball_comes_to_rest_on_its_ground(helsinki: World, tmp_path: Path) -> None:
     import mujoco
 
-    counts = export_world(helsinki, "mjcf", tmp_path / "out")
+    counts = export_world(helsinki, "mjcf", tmp_path / "an export")
     assert counts["hulls"] == len(helsinki.surfaces("collision"))
     x, y = helsinki.places[0].position[:2]
-    spec = mujoco.MjSpec.from_file(str(tmp_path / "out" / "world.xml"))
+    spec = mujoco.MjSpec.from_file(str(tmp_path / "an export" / "world.xml"))
     ball = spec.worldbody.add_body(pos=[x, y, float(helsinki.height((x, y))) + 0.5])
     ball.add_freejoint()
     ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0], mass=1.0)
@@ -62,7 +78,8 @@ def test_openusd_reads_the_stage_it_is_given(helsinki: World, tmp_path: Path) ->
     stage = Usd.Stage.Open(str(tmp_path / "out" / "world.usdc"))
     assert UsdGeom.GetStageUpAxis(stage) == "Z"
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
-    hulls = [p for p in stage.Traverse() if p.HasAPI(UsdPhysics.MeshCollisionAPI)]
+    under = stage.GetPrimAtPath("/World/collision")
+    hulls = [p for p in Usd.PrimRange(under) if p.HasAPI(UsdPhysics.MeshCollisionAPI)]
     assert len(hulls) == len(helsinki.surfaces("collision"))
     instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath("/World/objects"))
     outdoors = helsinki.objects.where(helsinki.objects.outdoors)
@@ -77,6 +94,37 @@ def test_openusd_reads_the_stage_it_is_given(helsinki: World, tmp_path: Path) ->
         for attribute in prim.GetAttributes():
             if attribute.GetName() == "inputs:file":
                 assert (tmp_path / "out" / attribute.Get().path).is_file()
+
+
+def test_a_usd_stage_has_what_a_simulator_of_robots_needs(helsinki: World, tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="OpenUSD is not installed: pip install 'virtual-community[usd]'")
+    from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade
+
+    export_world(helsinki, "usd", tmp_path / "an export")
+    stage = Usd.Stage.Open(str(tmp_path / "an export" / "world.usdc"))
+    assert stage.HasAuthoredMetadata("kilogramsPerUnit")
+    (scene,) = [UsdPhysics.Scene(p) for p in stage.Traverse() if p.IsA(UsdPhysics.Scene)]
+    assert tuple(scene.GetGravityDirectionAttr().Get()) == (0, 0, -1)
+    assert {p.GetTypeName() for p in stage.Traverse() if p.HasAPI(UsdLux.LightAPI)} == {"DistantLight", "DomeLight"}
+    colliders = [p for p in stage.Traverse() if p.HasAPI(UsdPhysics.CollisionAPI)]
+    for prim in colliders:
+        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+        assert UsdPhysics.MaterialAPI(material.GetPrim()).GetStaticFrictionAttr().Get() > 0
+    # Each model says what it is, and the solid ones have the box that people and robots meet.
+    outdoors = helsinki.objects.where(helsinki.objects.outdoors)
+    instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath("/World/objects"))
+    paths, index = instancer.GetPrototypesRel().GetTargets(), list(instancer.GetProtoIndicesAttr().Get())
+    boxes = UsdGeom.BBoxCache(0, [UsdGeom.Tokens.guide])
+    for k in range(0, len(outdoors), 7):
+        model = stage.GetPrimAtPath(paths[index[k]])
+        assert list(UsdSemantics.LabelsAPI(model, "class").GetLabelsAttr().Get()) == [outdoors.kind[k]]
+        box = stage.GetPrimAtPath(paths[index[k]].AppendChild("collider"))
+        assert box.IsValid() == bool(outdoors.solid[k])
+        if box.IsValid():
+            sides = np.array(boxes.ComputeLocalBound(box).ComputeAlignedRange().GetSize()) * outdoors.scale[k]
+            corners = outdoors.feet()[k]
+            wide, deep = np.linalg.norm(corners[1] - corners[0]), np.linalg.norm(corners[2] - corners[1])
+            np.testing.assert_allclose(sides, [wide, deep, outdoors.size_z[k]], atol=0.03)
 
 
 def test_geojson_lies_on_earth_where_the_world_does(helsinki: World, tmp_path: Path) -> None:
