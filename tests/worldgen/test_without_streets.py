@@ -86,3 +86,7 @@ def test_people_live_there_and_cars_are_refused_in_one_sentence(
     assert vico(*common, "--cars", 5, "--out", tmp_path / "cars") == 2
     assert "the world has no street for cars; use --cars 0" in capsys.readouterr().err
     assert vico(*common, "--cars", 0, "--out", tmp_path / "none") == 0
+    capsys.readouterr()
+    # Nobody asked for cars: there are as many as there is room for.
+    assert vico(*common, "--out", tmp_path / "unsaid") == 0
+    assert "there is room for 0 cars" in capsys.readouterr().err

@@ -278,11 +278,11 @@ class RunOptions:
     physics
         Engine that moves robots: mujoco, or genesis (an extra).
     cars
-        How many cars drive around.
+        How many cars drive around; unset: 30, or as many as there is room for.
     cyclists
         How many people nobody plays ride bicycles in the streets.
     pedestrians
-        How many people nobody plays walk around.
+        How many people nobody plays walk around; unset: 30, or as many as there is room for.
     junctions
         Who may be in a junction: one vehicle at a time; those who are not in each other's way (shared); the same by
         signals, where the map has them; or one at a time by signals (both).
@@ -360,9 +360,9 @@ class RunOptions:
     robot_places: Path | None = None
     assistant_places: Path | None = None
     physics: Literal["mujoco", "genesis"] = "mujoco"
-    cars: int = 30
+    cars: int | None = None
     cyclists: int = 0
-    pedestrians: int = 30
+    pedestrians: int | None = None
     junctions: Literal["one", "shared", "signals", "both"] = "one"
     traffic: str = "none"
     observe: CommaSeparated = "all"

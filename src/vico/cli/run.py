@@ -40,6 +40,7 @@ from vico.sim.recording.checkpoints import checkpoint_steps
 from vico.sim.recording.manifest import read_manifest
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.sim.simulation import Simulation
+from vico.sim.traffic.starting import NoRoomError
 from vico.threads import use_workers, workers
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
@@ -57,6 +58,8 @@ _PLAYED_ROOM = {"robot": 1.2, "assistant": 0.6}
 
 # Options that decide nothing of what is in the run folder; the others are kept in its run.json.
 _DEFAULTS = {field.name: field.default for field in fields(RunOptions)}
+# Cars and pedestrians of a run that is asked for none in particular.
+_TRAFFIC = 30
 _NOT_KEPT = ("out", "resume", "workers", "force", "json", *LIVE)
 
 
@@ -199,9 +202,9 @@ class Job:
             assistant_places=_places("assistant", options.assistant_places, place, played),
             physics=options.physics,
             errands=True,
-            cars=options.cars,
+            cars=_TRAFFIC if options.cars is None else options.cars,
             cyclists=options.cyclists,
-            pedestrians=options.pedestrians,
+            pedestrians=_TRAFFIC if options.pedestrians is None else options.pedestrians,
             junctions=options.junctions,
             traffic=named_or_read(options.traffic),
             observe=None if options.observe == "all" else _names(options.observe),
@@ -301,7 +304,18 @@ class Job:
 
     def _simulation(self) -> Simulation:
         # Residents act on what they have in view and hear; mostly, the recorder alone looks at pictures.
-        sim = Simulation(self.world, self.community, self.config, defer_pictures=True)
+        config = self.config
+        while True:
+            try:
+                sim = Simulation(self.world, self.community, config, defer_pictures=True)
+                break
+            except NoRoomError as error:
+                if getattr(self.options, error.kind) is not None:
+                    raise
+                # Nobody asked for so many: a small window has as many as it has room for.
+                print(f"{self.options.world}: there is room for {error.room} {error.kind}", file=sys.stderr)
+                room: dict[str, Any] = {error.kind: error.room}
+                config = replace(config, **room)
         if self.options.check == "overlaps":
             sim.check_overlaps()
         return sim

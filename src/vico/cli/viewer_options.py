@@ -41,7 +41,8 @@ class LiveOptions:
     steps
         Seconds to simulate at most.
     cars, cyclists, pedestrians
-        How many drive, ride and walk around that nobody plays.
+        How many drive, ride and walk around that nobody plays; unset: 30 cars and 30 pedestrians, or as many as there
+        is room for.
     observe
         Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
     speed
@@ -70,9 +71,9 @@ class LiveOptions:
     weather: str = "fair"
     events: str = "none"
     steps: int = 86_400
-    cars: int = 30
+    cars: int | None = None
     cyclists: int = 0
-    pedestrians: int = 30
+    pedestrians: int | None = None
     observe: CommaSeparated = "none"
     speed: float = 1.0
     paused: bool = False
@@ -118,7 +119,8 @@ class PlayOptions:
     seconds
         To simulate at most.
     cars, cyclists, pedestrians
-        How many drive, ride and walk around that nobody plays.
+        How many drive, ride and walk around that nobody plays; unset: 30 cars and 30 pedestrians, or as many as there
+        is room for.
     view
         What whom you play sees is rendered and recorded, which a demonstration needs.
     port
@@ -143,9 +145,9 @@ class PlayOptions:
     date: str | None = None
     weather: str = "fair"
     seconds: int = 36_000
-    cars: int = 30
+    cars: int | None = None
     cyclists: int = 0
-    pedestrians: int = 30
+    pedestrians: int | None = None
     view: Literal["recorded", "none"] = "recorded"
     port: int = 0
     allow_host: Hosts = ()

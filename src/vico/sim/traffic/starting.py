@@ -23,6 +23,27 @@ from vico.world.walkways import SIDEWALK, Walkways
 _TRIES = 400  # places tried for a car or pedestrian
 
 
+class NoRoomError(InputError):
+    """A world has no room for as many as are asked for.
+
+    Attributes
+    ----------
+    kind
+        Of whom: ``cars``, ``cyclists`` or ``pedestrians``.
+    room
+        How many there is room for.
+    """
+
+    kind = ""
+    room = 0
+
+
+def _no_room(kind: str, room: int, sentence: str) -> NoRoomError:
+    error = NoRoomError(f"traffic: {sentence}; use --{kind} {room}")
+    error.kind, error.room = kind, room
+    return error
+
+
 @dataclass(frozen=True)
 class Starting:
     """Vehicles and pedestrians that are given their first places.
@@ -66,7 +87,7 @@ class Starting:
         """Put the cars from number `first` on somewhere on the usable lanes; `cars`: how many there are in all."""
         random = rng(seed, "traffic", "cars")
         if cars and not len(usable):
-            raise InputError("traffic: the world has no street for cars; use --cars 0")
+            raise _no_room("cars", 0, "the world has no street for cars")
         share = self.lanes.length[usable] / self.lanes.length[usable].sum() if len(usable) else None
         for v in range(first, cars):
             for _ in range(_TRIES):
@@ -75,7 +96,7 @@ class Starting:
                 if high > low and self.place_vehicle(v, lane, random.uniform(low, high), 2.0):
                     break
             else:
-                raise InputError(f"traffic: no room for car {v + 1} of {cars}; use fewer, as in --cars {v}")
+                raise _no_room("cars", v, f"no room for car {v + 1} of {cars}")
 
     def place_cyclists(self, seed: int, usable: NDArray[np.int64], cyclists: int) -> None:
         """Put cyclists, the last of the vehicles, somewhere at the kerb of usable lanes."""
@@ -88,14 +109,14 @@ class Starting:
                 if high > low and self.place_vehicle(v, lane, random.uniform(low, high), 1.0):
                     break
             else:
-                raise InputError(f"traffic: no room for cyclist {k + 1} of {cyclists}; use fewer, as in --cyclists {k}")
+                raise _no_room("cyclists", k, f"no room for cyclist {k + 1} of {cyclists}")
 
     def place_pedestrians(self, seed: int, first: int) -> None:
         """Put the pedestrians from number `first` on somewhere on sidewalks, those who walk together side by side."""
         random = rng(seed, "traffic", "pedestrians")
         usable = np.flatnonzero((self.walks.kind == SIDEWALK) & (self.walks.length > 3.0))
         if len(self.walkers) and not len(usable):
-            raise InputError("traffic: the world has no sidewalk; use --pedestrians 0")
+            raise _no_room("pedestrians", 0, "the world has no sidewalk")
         share = self.walks.length[usable] / self.walks.length[usable].sum() if len(usable) else None
         choose_companions(self.walkers, first, seed)
         for i in range(first, len(self.walkers)):
@@ -107,10 +128,7 @@ class Starting:
                 if self._place_pedestrian(i, walkway, offset, way):
                     break
             else:
-                raise InputError(
-                    f"traffic: no room for pedestrian {i + 1} of {len(self.walkers)}; "
-                    f"use fewer, as in --pedestrians {i}"
-                )
+                raise _no_room("pedestrians", i, f"no room for pedestrian {i + 1} of {len(self.walkers)}")
 
     def _place_pedestrian(self, i: int, walkway: int, offset: float, way: int) -> bool:
         b = len(self.fleet) + i
