@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -141,6 +142,81 @@ def test_amass_files_of_every_model_are_read(tmp_path: Path, width: int) -> None
     assert clip.pose[1, J["left_knee"] - 1].tolist() == pytest.approx([0.0, 0.7, 0.0])
 
 
+def amass_arrays(poses: Any) -> dict[str, Any]:
+    parts = {"root_orient": 3, "pose_body": 63, "pose_jaw": 3, "pose_eye": 6, "pose_hand": 90}
+    ends = np.cumsum(list(parts.values()))
+    return dict(zip(parts, np.split(poses, ends[:-1], axis=1), strict=True))
+
+
+def test_amass_parts_are_the_pose_they_were_cut_from(tmp_path: Path) -> None:
+    poses, trans = np.random.default_rng(4).normal(0.0, 0.3, (3, 165)), np.ones((3, 3))
+    np.savez(tmp_path / "whole.npz", poses=poses, trans=trans, mocap_frame_rate=60.0)
+    np.savez(tmp_path / "parts.npz", trans=trans, mocap_frame_rate=np.array([60.0]), **amass_arrays(poses))
+    whole, parts = read_amass(tmp_path / "whole.npz"), read_amass(tmp_path / "parts.npz")
+    np.testing.assert_array_equal(parts.pose, whole.pose)
+    np.testing.assert_array_equal(parts.orientation, whole.orientation)
+    np.testing.assert_array_equal(parts.position, whole.position)
+
+
+def test_hands_and_face_rest_in_an_amass_file_of_the_body_alone(tmp_path: Path) -> None:
+    arrays = amass_arrays(np.random.default_rng(4).normal(0.0, 0.3, (3, 165)))
+    body = {name: arrays[name] for name in ("root_orient", "pose_body")}
+    np.savez(tmp_path / "a.npz", trans=np.ones((3, 3)), mocap_frame_rate=60.0, **body)
+    clip = read_amass(tmp_path / "a.npz")
+    assert clip.pose[:, :21].any()
+    assert not clip.pose[:, 21:].any()
+
+
+def test_an_amass_file_without_translation_stays_on_the_spot_and_on_the_ground(tmp_path: Path) -> None:
+    upright = np.tile([np.pi / 2, 0.0, 0.0], (3, 1))
+    np.savez(tmp_path / "a.npz", root_orient=upright, pose_body=np.zeros((3, 63)), mocap_frame_rate=60.0)
+    body = joints()
+    placed = places_of(read_amass(tmp_path / "a.npz"), body)
+    np.testing.assert_allclose(placed[:, J["left_ankle"], 2], body[J["left_ankle"], 2], atol=0.01)
+    assert not np.diff(placed, axis=0).any()
+
+
+class _Trap:
+    """Deletes a file when it is unpickled."""
+
+    def __init__(self, victim: Path) -> None:
+        self.victim = victim
+
+    def __reduce__(self) -> Any:
+        return os.unlink, (str(self.victim),)
+
+
+def test_nothing_in_an_amass_file_is_unpickled(tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("alive")
+    trap = np.array(_Trap(victim), dtype=object)
+    np.savez(tmp_path / "a.npz", poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), mocap_framerate=30, gender=trap)
+    assert len(read_amass(tmp_path / "a.npz")) == 2
+    np.savez(tmp_path / "b.npz", poses=trap, trans=np.zeros((2, 3)), mocap_framerate=30)
+    with pytest.raises(SchemaError, match="no readable"):
+        read_amass(tmp_path / "b.npz")
+    with pytest.raises(InputError, match="pickles run code"):
+        import_motion(tmp_path / "b.pkl")
+    assert victim.read_text() == "alive"
+
+
+@pytest.mark.parametrize(
+    ("arrays", "words"),
+    [
+        ({"poses": np.zeros((0, 156)), "trans": np.zeros((0, 3)), "mocap_framerate": 30}, "has no frame"),
+        ({"root_orient": np.zeros((0, 3)), "pose_body": np.zeros((0, 63)), "mocap_framerate": 30}, "has no frame"),
+        ({"betas": np.zeros(16), "gender": "male"}, "it holds betas, gender"),
+        ({"root_orient": np.zeros((2, 3)), "mocap_framerate": 30}, "it holds root_orient, mocap_framerate"),
+        ({"poses": np.zeros((2, 156)), "trans": np.zeros((2, 3))}, "it holds poses, trans"),
+        ({"root_orient": np.zeros((2, 3)), "pose_body": np.zeros((3, 63)), "mocap_framerate": 30}, r"be \(2, 63\)"),
+    ],
+)
+def test_amass_files_without_a_motion_are_refused_in_a_sentence(tmp_path: Path, arrays: Any, words: str) -> None:
+    np.savez(tmp_path / "a.npz", **arrays)
+    with pytest.raises((SchemaError, InputError), match=rf"a\.npz: .*{words}"):
+        read_amass(tmp_path / "a.npz")
+
+
 def test_a_motion_comes_back_from_its_file(tmp_path: Path) -> None:
     clip = motion_from_smplx(np.zeros((4, 165)), np.zeros((4, 3)), 30.0, name="stand")
     clip.write(tmp_path / "stand.motion")
@@ -163,7 +239,15 @@ def _bvh_of(change: Any) -> str:
         (lambda text: text.replace("Zrotation", "Wrotation", 1), "line 5"),
         (lambda text: text.replace("\n0.0 ", "\nnan ", 1), "no frame of 75 numbers"),
         (lambda text: text.replace("UpLeg", "Tentacle"), "no joint stands for left_hip"),
-        (lambda text: text.replace("Frame Time: 0.0", "Frame Time: -0.0"), "frames of"),
+        (lambda text: text.replace("Frame Time: 0.0", "Frame Time: -0.0"), "line 144: a frame takes -0.0333333 s"),
+        (lambda text: text.replace("Frame Time: 0.0", "Frame Time: 0,0"), "line 144: a number has a comma"),
+        (lambda text: text.replace("OFFSET 0.0 0.0", "OFFSET 0,0 0.0", 1), "line 4: a number has a comma"),
+        (lambda text: text.replace("\n0.0 ", "\n0,0 ", 1), "line 145: a number has a comma"),
+        (
+            lambda text: text[: text.index("Frames")] + "Frames: 0\nFrame Time: 0.1\n",
+            "line 143: the motion has no frame",
+        ),
+        (lambda text: text[: text.index("Frames")], "no lines Frames: and Frame Time:"),
     ],
 )
 def test_broken_bvh_is_refused_in_a_sentence(tmp_path: Path, change: Any, words: str) -> None:

@@ -31,6 +31,11 @@ def import_motion(path: Path) -> MotionClip:
         If it is damaged.
     """
     reader = _READERS.get(path.suffix.lower())
+    if path.suffix.lower() in (".pkl", ".pickle"):
+        raise InputError(
+            f"{path}: pickles run code when they are read, and are not; save its poses, trans and "
+            "mocap_frame_rate with numpy.savez"
+        )
     if reader is None:
         raise InputError(
             f"{path}: motions are read from {', '.join(_READERS)}; convert FBX files first, for example with Blender's "

@@ -5,6 +5,7 @@ The format: Meredith and Maddock, Motion Capture File Formats Explained, Univers
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,14 +13,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.motions.clip import MOST_FRAMES, MotionClip
-from vico.assets.motions.retargeting import Skeleton, joints_by_name, retargeted
+from vico.assets.motions.clip import MOST_FRAMES, MOST_RATE, MotionClip
+from vico.assets.motions.retargeting import retargeted
 from vico.assets.motions.rotations import from_angles
+from vico.assets.motions.skeleton import Skeleton, joints_by_name
 from vico.errors import MissingFileError, SchemaError
 
 _MOST_BYTES = 512 << 20
 _MOST_JOINTS = 512
-_CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
+# Channels as programs write them; scales change no direction, and are left.
+_CHANNEL = re.compile(r"([xyz])_?(position|pos|translation|rotation|rot|scale)", re.IGNORECASE)
+_KINDS = {"pos": "position", "translation": "position", "rot": "rotation"}
+# Braces, and what stands behind them or behind an offset, are read as lines of their own.
+_STATEMENT = re.compile(r"\s*([{}])\s*|\s+(?=CHANNELS\b|OFFSET\b)")
+_COUNT, _TIME = re.compile(r"frames\s*:?\s*(.*)", re.IGNORECASE), re.compile(r"frame\s*time\s*:?\s*(.*)", re.IGNORECASE)
 
 
 @dataclass
@@ -45,7 +52,7 @@ def read_bvh(path: Path) -> MotionClip:
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut it into pieces")
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
     lines = iter(enumerate(text.splitlines(), start=1))
@@ -61,68 +68,105 @@ def _hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> _Hierarchy:
     """Read up to the line MOTION."""
     found, open_joints = _Hierarchy(), [-1]
     for number, line in lines:
-        words = line.split()
-        if not words or words[0] in ("HIERARCHY", "{"):
-            continue
-        if words[0] == "MOTION":
+        if line.strip().upper() == "MOTION":
             if not found.names or len(open_joints) > 1:
                 break
             return found
-        try:
-            _read_line(words, line.strip(), found, open_joints)
-        except (ValueError, IndexError):
-            raise SchemaError(f"{path}: line {number}: {line.strip()[:60]!r} is no line of a BVH hierarchy") from None
+        for statement in filter(None, _STATEMENT.split(line.strip())):
+            try:
+                _read_statement(statement, found, open_joints)
+            except (ValueError, IndexError):
+                _refuse_comma(statement, path, number)
+                shown = line.strip()[:60]
+                raise SchemaError(f"{path}: line {number}: {shown!r} is no line of a BVH hierarchy") from None
     raise SchemaError(f"{path}: no whole BVH hierarchy before the line MOTION; export it anew")
 
 
-def _read_line(words: list[str], line: str, found: _Hierarchy, open_joints: list[int]) -> None:
-    """Take a line of the hierarchy in; -2 among the open joints is an end site."""
-    kind = words[0]
+def _read_statement(statement: str, found: _Hierarchy, open_joints: list[int]) -> None:
+    """Take a statement of the hierarchy in; -2 among the open joints is an end site."""
+    words = statement.split()
+    kind = words[0].upper()
     if kind in ("ROOT", "JOINT") and len(found.names) < _MOST_JOINTS:
         found.parents.append(open_joints[-1])
-        found.names.append(line.split(None, 1)[1])
+        found.names.append(statement.split(None, 1)[1])
         found.offsets.append([0.0, 0.0, 0.0])
         found.channels.append([])
         open_joints.append(len(found.names) - 1)
-    elif kind == "End":
+    elif kind in ("END", "ENDSITE"):
         open_joints.append(-2)
     elif kind == "}" and len(open_joints) > 1:
         open_joints.pop()
     elif kind == "OFFSET" and len(words) == 4:
         if open_joints[-1] >= 0:
             found.offsets[open_joints[-1]] = [float(word) for word in words[1:]]
-    elif kind == "CHANNELS" and open_joints[-1] >= 0 and int(words[1]) == len(words) - 2:
-        if any(word not in _CHANNELS for word in words[2:]):
-            raise ValueError(line)
-        found.channels[open_joints[-1]] = words[2:]
-    else:
-        raise ValueError(line)
+    elif kind == "CHANNELS" and int(words[1]) == len(words) - 2 and (open_joints[-1] >= 0 or len(words) == 2):
+        found.channels[open_joints[-1]] = [_channel(word) for word in words[2:]]
+    elif kind not in ("HIERARCHY", "{"):
+        raise ValueError(statement)
+
+
+def _channel(word: str) -> str:
+    """Return a channel's name as the format has it, ``Xposition``."""
+    match = _CHANNEL.fullmatch(word)
+    if match is None:
+        raise ValueError(word)
+    kind = match[2].lower()
+    return match[1].upper() + _KINDS.get(kind, kind)
+
+
+def _refuse_comma(text: str, path: Path, number: int) -> None:
+    """Raise `SchemaError` if a number has a comma for its decimals."""
+    if re.search(r"\d,\d", text):
+        raise SchemaError(
+            f"{path}: line {number}: a number has a comma where its decimals begin; export it with decimal points, "
+            "for example with the computer's language set to English"
+        ) from None
 
 
 def _frames(lines: Iterator[tuple[int, str]], channels: int, path: Path) -> tuple[NDArray[np.float64], float]:
     """Return every frame's channels, shape ``(t, channels)``, and the frames a second."""
     wanted, seconds, rows = 0, 0.0, []
+    count_line = time_line = 0
     for number, line in lines:
-        words = line.replace(",", " ").split()
-        if not words:
+        text = line.strip()
+        if not text:
             continue
         try:
-            if words[0] == "Frames:":
-                wanted = int(words[1])
-            elif words[:2] == ["Frame", "Time:"]:
-                seconds = float(words[2])
+            if time := _TIME.fullmatch(text):
+                seconds, time_line = float(time[1]), number
+            elif count := _COUNT.fullmatch(text):
+                wanted, count_line = int(count[1]), number
             else:
-                row = np.array(words, np.float64)
-                if len(row) != channels or not np.isfinite(row).all():
-                    raise ValueError(line)
-                rows.append(row)
-        except (ValueError, IndexError):
+                rows.append(_row(text, channels))
+        except ValueError:
+            _refuse_comma(text, path, number)
             raise SchemaError(f"{path}: line {number}: no frame of {channels} numbers; export it anew") from None
         if len(rows) > MOST_FRAMES:
             raise SchemaError(f"{path}: more than {MOST_FRAMES} frames; cut it into pieces")
-    if not rows or len(rows) != wanted or not seconds > 0:
-        raise SchemaError(f"{path}: {len(rows)} of {wanted} frames of {seconds} s are there; export it anew")
+    if not (count_line and time_line):
+        raise SchemaError(f"{path}: no lines Frames: and Frame Time: after the line MOTION; export it anew")
+    if not rows and not wanted:
+        raise SchemaError(f"{path}: line {count_line}: the motion has no frame; export it with its animation")
+    if len(rows) != wanted:
+        raise SchemaError(
+            f"{path}: line {count_line}: {len(rows)} of {wanted} frames are there; export it anew, or mend the number"
+        )
+    if not 1.0 / MOST_RATE <= seconds < np.inf:
+        raise SchemaError(
+            f"{path}: line {time_line}: a frame takes {seconds:g} s; write {1.0 / MOST_RATE:g} or more, for example "
+            "0.0333333 for 30 frames a second"
+        )
     return np.stack(rows), 1.0 / seconds
+
+
+def _row(text: str, channels: int) -> NDArray[np.float64]:
+    """Return the numbers of a frame, apart by white space or commas."""
+    # Numbers apart by white space alone are as many as the channels: commas within them begin decimals.
+    words = text.split() if len(text.split()) == channels else text.replace(",", " ").split()
+    row = np.array([word.removesuffix(",") for word in words], np.float64)
+    if len(row) != channels or not np.isfinite(row).all():
+        raise ValueError(text)
+    return row
 
 
 def _skeleton(hierarchy: _Hierarchy) -> Skeleton:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from vico.assets.motions.clip import MOST_FRAMES, MotionClip
-from vico.assets.motions.retargeting import Skeleton, joints_by_name, retargeted
+from vico.assets.motions.retargeting import retargeted
+from vico.assets.motions.skeleton import Skeleton, joints_by_name
 from vico.errors import MissingFileError, SchemaError
 from vico.io.gltf_file import GltfFault, GltfFile, faults_told, node_matrix
 

@@ -1,9 +1,7 @@
-"""Motions of other skeletons on ours: joints are found by name, and turned by how the bones rest."""
+"""Motions of other skeletons on ours: joints are turned by how the bones rest."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,30 +10,9 @@ from numpy.typing import NDArray
 from vico.assets.motions.clip import HIP_HEIGHT, MotionClip
 from vico.assets.motions.grounding import grounded
 from vico.assets.motions.rotations import Matrices, turning, vectors_of
+from vico.assets.motions.skeleton import Skeleton, joints_by_name
 from vico.assets.people import FINGERS, JOINTS, PARENTS, J
 from vico.errors import InputError
-
-# Words that files call our joints by, without side, prefix and number; the first that fits is taken.
-_NAMES: dict[str, tuple[str, ...]] = {
-    "hip": ("hip", "upleg", "upperleg", "thigh", "femur", "hipjoint"),
-    "knee": ("knee", "leg", "lowerleg", "lowleg", "calf", "shin", "tibia"),
-    "ankle": ("ankle", "foot"),
-    "foot": ("toebase", "toe", "ball", "toes"),
-    "collar": ("collar", "clavicle", "shoulder"),
-    "shoulder": ("arm", "uparm", "upperarm", "shoulder", "humerus"),
-    "elbow": ("elbow", "forearm", "lowarm", "lowerarm", "radius"),
-    "wrist": ("wrist", "hand"),
-    **{f"{finger}{k}": (f"hand{finger}{k}", f"{finger}{k}", f"{finger}0{k}") for finger in FINGERS for k in (1, 2, 3)},
-}
-_PELVIS = ("hips", "pelvis", "hip", "root")
-_NECK, _HEAD = ("neck", "neck1"), ("head",)
-_SPINE = re.compile(r"(spine|abdomen|chest|lowerback|upperback|torso|waist)\d*")
-#: Without these there is no person.
-_NEEDED = (
-    "pelvis",
-    "head",
-    *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "shoulder", "elbow")),
-)
 
 # Where bones point in the T-pose from the joint of this name to the next one along the limb.
 _DOWN, _LEFT = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
@@ -47,98 +24,6 @@ _LIMBS = {
     "wrist": ("middle1", _LEFT),
     **{f"{finger}{k}": (f"{finger}{k + 1}", _LEFT) for finger in FINGERS[:-1] for k in (1, 2)},
 }
-
-
-@dataclass(frozen=True)
-class Skeleton:
-    """Joints of a file at rest.
-
-    Attributes
-    ----------
-    names
-        Of the joints; a parent comes before its children.
-    parents
-        Index of each joint's parent, -1 for roots, shape ``(n,)``.
-    places
-        Where each is at rest, in the file's axes and unit, shape ``(n, 3)``.
-    """
-
-    names: tuple[str, ...]
-    parents: NDArray[np.int64]
-    places: NDArray[np.float64]
-
-
-def joints_by_name(skeleton: Skeleton, *, source: str) -> dict[str, int]:
-    """Return which of the file's joints stand for ours.
-
-    Raises
-    ------
-    InputError
-        If one that a person cannot do without is not found.
-    """
-    words = [_plain(name) for name in skeleton.names]
-    found: dict[str, int] = {}
-    middle: tuple[tuple[str, tuple[str, ...]], ...] = (("pelvis", _PELVIS), ("neck", _NECK), ("head", _HEAD))
-    for ours, options in middle:
-        hits = [k for option in options for k, (side, word) in enumerate(words) if not side and word == option]
-        if hits:
-            found[ours] = hits[0]
-    for side in ("left", "right"):
-        taken: set[int] = set()
-        for part, options in _ordered(words, side):
-            hits = [
-                k for option in options for k, word in enumerate(words) if word == (side, option) and k not in taken
-            ]
-            if hits:
-                found[f"{side}_{part}"] = hits[0]
-                taken.add(hits[0])
-    missing = [name for name in _NEEDED if name not in found]
-    if missing:
-        there = ", ".join(skeleton.names[:20])
-        raise InputError(
-            f"{source}: no joint stands for {', '.join(missing)}; it has {there}. "
-            "Rename its joints as Mixamo or SMPL-X do, or give a file of a whole person"
-        )
-    return found | _spine(skeleton, words, found)
-
-
-def _ordered(words: list[tuple[str, str]], side: str) -> list[tuple[str, tuple[str, ...]]]:
-    """Return our parts and their words: where an arm is called so, `shoulder` is the collar bone."""
-    has_arm = any(word in ((side, "arm"), (side, "uparm"), (side, "upperarm")) for word in words)
-    return [
-        (part, tuple(w for w in options if w != "shoulder" or has_arm == (part == "collar")))
-        for part, options in _NAMES.items()
-    ]
-
-
-def _plain(name: str) -> tuple[str, str]:
-    """Return side ("left", "right" or "") and the word of a joint's name, without prefix, in small letters."""
-    word = re.sub(r"([a-z])([A-Z])", r"\1_\2", name.rsplit(":", 1)[-1]).lower()
-    parts = [part for part in re.split(r"[^a-z0-9]+", word) if part and part not in ("mixamorig", "bip01", "bip001")]
-    side = ""
-    for k, part in enumerate(parts):
-        for long, short in (("left", "l"), ("right", "r")):
-            if part in (long, short):
-                side, parts[k] = long, ""
-            elif part.startswith(long) and len(part) > len(long):
-                side, parts[k] = long, part[len(long) :]
-    return side, "".join(parts)
-
-
-def _spine(skeleton: Skeleton, words: list[tuple[str, str]], found: dict[str, int]) -> dict[str, int]:
-    """Return which joints between pelvis and neck stand for our three of the spine."""
-    chain: list[int] = []
-    k = int(skeleton.parents[found.get("neck", found["head"])])
-    while k >= 0 and k != found["pelvis"]:
-        if _SPINE.fullmatch(words[k][1]):
-            chain.append(k)
-        k = int(skeleton.parents[k])
-    chain.reverse()
-    if not chain:
-        return {}
-    picked = {1: (0,), 2: (0, 1)}.get(len(chain), (0, len(chain) // 2, len(chain) - 1))
-    ours = {1: ("spine2",), 2: ("spine1", "spine3")}.get(len(chain), ("spine1", "spine2", "spine3"))
-    return {name: chain[at] for name, at in zip(ours, picked, strict=True)}
 
 
 def retargeted(

@@ -6,6 +6,7 @@ AMASS, has z up as ours has. Shapes (betas) and expressions are not motion, and 
 
 from __future__ import annotations
 
+import io
 import zipfile
 import zlib
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.motions.clip import HIP_HEIGHT, MotionClip
+from vico.assets.motions.grounding import grounded
 from vico.assets.motions.rotations import matrices_of, vectors_of
 from vico.assets.people import JOINTS, J
 from vico.errors import InputError, MissingFileError, SchemaError
@@ -25,6 +27,8 @@ _SMPLX_HIP_HEIGHT = 0.95
 _MOST_BYTES = 1 << 30
 #: Names under which archives keep their frame rate.
 _RATES = ("mocap_frame_rate", "mocap_framerate")
+#: Parts under which archives keep the pose, in the order of the joints, and how many joints each has.
+_PARTS = {"root_orient": 1, "pose_body": 21, "pose_jaw": 1, "pose_eye": 2, "pose_hand": 30}
 
 # Rows: our axes (forward, left, up) in those of an SMPL-X body (left, up, forward).
 _AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -59,6 +63,8 @@ def motion_from_smplx(
             f"motion {name!r}: poses have shape {poses.shape}; they have to be (t, 165) of SMPL-X, (t, 156) of SMPL-H "
             "or (t, 72) of SMPL"
         )
+    if not len(poses):
+        raise InputError(f"motion {name!r} has no frame; take a file with at least one")
     given = poses.reshape(len(poses), -1, 3)
     if not np.isfinite(given).all():
         raise InputError(f"motion {name!r}: poses hold numbers that are not finite; repair the file")
@@ -101,7 +107,11 @@ def smplx_of(clip: MotionClip) -> dict[str, NDArray[np.float32]]:
 
 
 def read_amass(path: Path) -> MotionClip:
-    """Read a motion of AMASS: an ``.npz`` with ``poses``, ``trans`` and a frame rate.
+    """Read a motion of AMASS: an ``.npz`` with ``poses`` or its parts, ``trans`` and a frame rate.
+
+    Of the parts ``root_orient`` and ``pose_body`` have to be there; jaw, eyes and hands rest without theirs. Without
+    ``trans`` it stays on the spot, on the ground where its feet are lowest. Nothing is unpickled, and other arrays are
+    not read.
 
     Raises
     ------
@@ -110,20 +120,47 @@ def read_amass(path: Path) -> MotionClip:
     SchemaError
         If it is no such archive.
     InputError
-        If its arrays have other shapes.
+        If its arrays have other shapes, or it has no frame.
     """
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut it into pieces")
-        data = read_npz(path.read_bytes(), ("poses", "trans", *_RATES))
-        rate = next((float(data[key]) for key in _RATES if key in data), None)
-        if rate is None or "poses" not in data or "trans" not in data:
-            held = ", ".join(data) or "none of them"
-            raise SchemaError(f"{path}: no motion of AMASS (poses, trans, mocap_frame_rate); it holds {held}")
-        return motion_from_smplx(data["poses"], data["trans"], rate, name=path.stem)
+        packed = path.read_bytes()
+        data = read_npz(packed, ("poses", *_PARTS, "trans", *_RATES))
+        rate = next((np.asarray(data[key], np.float64) for key in _RATES if key in data), None)
+        if rate is None or rate.size != 1 or not ("poses" in data or {"root_orient", "pose_body"} <= data.keys()):
+            raise SchemaError(
+                f"{path}: no motion of AMASS (poses, or root_orient and pose_body; mocap_frame_rate, one number); "
+                f"it holds {_held(packed)}"
+            )
+        poses = data["poses"] if "poses" in data else _joined(data)
+        if "trans" in data:
+            return motion_from_smplx(poses, data["trans"], rate.item(), name=path.stem)
+        return grounded(motion_from_smplx(poses, np.zeros((len(poses), 3)), rate.item(), name=path.stem))
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     except (ValueError, OSError, EOFError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        if isinstance(error, (SchemaError, InputError)):
+        if isinstance(error, SchemaError):
             raise
         raise SchemaError(f"{path}: no readable .npz of plain arrays ({error})") from None
+
+
+def _joined(data: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
+    """Return the pose of all joints, radians, shape ``(t, 165)``; parts that are not there rest."""
+    frames = len(np.atleast_1d(data["root_orient"]))
+    parts = []
+    for part, joints in _PARTS.items():
+        array = np.asarray(data.get(part, np.zeros((frames, 3 * joints))), np.float64)
+        if array.shape not in ((frames, 3 * joints), (frames, joints, 3)):
+            raise InputError(f"{part} has shape {array.shape}; it has to be ({frames}, {3 * joints})")
+        parts.append(array.reshape(frames, 3 * joints))
+    return np.concatenate(parts, axis=1)
+
+
+def _held(packed: bytes) -> str:
+    """Return the names of an archive's arrays, none of which is read."""
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        names = [name.removesuffix(".npy") for name in archive.namelist()]
+    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "") or "none of them"

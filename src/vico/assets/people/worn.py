@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.assets.motions.gltf import Rig, bound_matrices
-from vico.assets.motions.retargeting import Skeleton, joints_by_name
+from vico.assets.motions.skeleton import Skeleton, joints_by_name
 from vico.assets.people.model import JOINTS, PARENTS, J, SkinnedBody, t_pose
 from vico.errors import MissingFileError, SchemaError
 from vico.io.gltf_file import GltfFault, GltfFile, faults_told
