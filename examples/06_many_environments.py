@@ -1,6 +1,6 @@
 """Play several environments side by side, and let a planner try what would happen in one of them.
 
-python examples/06_many_environments.py --world out/demo/world --community out/demo/people --envs 2
+python examples/06_many_environments.py --world out/demo/world --community out/demo/community --envs 2
 """
 
 import argparse

@@ -3,7 +3,7 @@
 Somebody is looked for by name. The assistant goes where people are, asks whoever is near, reads the answers back
 (`vico.agents.talk.understanding`), goes where they point to, and asks again there.
 
-python examples/12_asking_people.py --world out/demo/world --community out/demo/people --seed 1 --steps 900
+python examples/12_asking_people.py --world out/demo/world --community out/demo/community --seed 1 --steps 900
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Watch a run that goes on, and reach into it, from a program of one's own: a client of the viewer's protocol.
 
-python examples/15_live.py --world out/demo/world --community out/demo/people --out out/live-example
+python examples/15_live.py --world out/demo/world --community out/demo/community --out out/live-example
 
 Needs the extra "viewer". Nothing of vico's code is used by the client: docs/viewer_protocol.md says all that it knows.
 """

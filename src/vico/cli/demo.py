@@ -30,6 +30,8 @@ from vico.worldgen.sources import Sources
 #: A run with the film of it.
 EVENING = replace(RUN_FOLDER, names=lambda folder: (*RUN_FOLDER.names(folder), _FILM))
 _FILM = "film.mp4"
+#: Folders that the demo makes, in the order in which it makes them.
+PARTS = ("world", "community", "run", "evening")
 
 
 def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
@@ -39,7 +41,7 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     check_output(out, force=again)
     if out.exists() and not out.is_dir():
         raise OutputExistsError(f"{out}: is a file; choose another --out")
-    world, people, run, evening = (out / name for name in ("world", "community", "run", "evening"))
+    world, people, run, evening = (out / name for name in PARTS)
     # What else lies there stays.
     for folder, kind in ((world, WORLD_FOLDER), (people, COMMUNITY_FOLDER), (run, RUN_FOLDER), (evening, EVENING)):
         check_replaceable(folder, force=again, kind=kind)

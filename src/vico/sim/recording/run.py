@@ -335,7 +335,7 @@ class Run:
 _COUNTS = tuple(name for name in TABLES["steps"] if name not in ("step", "time", "hash"))
 
 
-def read_run(path: Path) -> Run:
+def read_run(path: Path | str) -> Run:
     """Open a run folder; what is asked of the run is read when it is asked for.
 
     A run that is being written can be opened, too: it is read as far as it came, and `Run.refresh` looks for more.
@@ -345,7 +345,7 @@ def read_run(path: Path) -> Run:
     MissingFileError, SchemaError, EmptyInputError
         If it is no run, damaged, of another version, or was stopped before anything was recorded.
     """
-    return Run(path)
+    return Run(Path(path))
 
 
 __all__ = ["AgentRecord", "Moment", "Run", "Tracks", "read_run"]
