@@ -74,7 +74,9 @@ def inline_commands(page: Path) -> Iterator[tuple[str, list[str]]]:
     text = re.sub(r"^```.*?^```", lambda block: "\n" * block[0].count("\n"), page.read_text("utf-8"), flags=re.M | re.S)
     for match in _INLINE.finditer(text):
         where = f"{page.relative_to(ROOT)}:{text[: match.start()].count(chr(10)) + 1}"
-        yield where, [word for word in shlex.split(match[1])[1:] if word != "..."]
+        said = match[1].partition(" | ")[0].replace("[", "").replace("]", "")
+        # One of what stands for the others: --to gltf|usd.
+        yield where, [word.partition("|")[0] for word in shlex.split(said)[1:] if word != "..."]
 
 
 def lost_imports(code: str) -> list[str]:

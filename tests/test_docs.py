@@ -9,8 +9,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr
-from io import StringIO
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +143,11 @@ def test_runs_of_the_pages_begin(
     assert len(alone) >= 4
     monkeypatch.chdir(tmp_path)
     for number, options in enumerate(alone):
-        small = {"world": folders["world"], "community": folders["community"], "cars": min(options.cars, 5)}
+        small = {
+            "world": folders["world"],
+            "community": folders["community"],
+            "cars": 5 if options.cars is None else min(options.cars, 5),
+        }
         assert run(replace(options, **small, out=Path(f"{number}"), steps=1)) == 0
 
 
@@ -160,15 +164,21 @@ def test_paths_of_the_demo_are_those_that_it_writes() -> None:
 
 
 def test_scripts_that_the_pages_call_take_the_options_that_are_shown() -> None:
-    lines = [line for page in PAGES for block in snippets(page) for line in block.code.replace("\\\n", " ").splitlines()]
+    lines = [
+        line for page in PAGES for block in snippets(page) for line in block.code.replace("\\\n", " ").splitlines()
+    ]
     lines += [
         line for path in sorted((ROOT / "examples").glob("*.py")) for line in path.read_text("utf-8").splitlines()[:12]
     ]
     wrong = []
     for line in lines:
-        if called := re.match(r"\s*(?:\S*/)?python3? ((?:examples|scripts|benchmarks)/\w+\.py)(.*)", line.split(" # ")[0]):
+        if called := re.match(
+            r"\s*(?:\S*/)?python3? ((?:examples|scripts|benchmarks)/\w+\.py)(.*)", line.split(" # ")[0]
+        ):
             source = (ROOT / called[1]).read_text(encoding="utf-8")
             named = set(re.findall(r'"[\w-]+"', source))
             options = re.findall(r"(?<=[\s\[])--[\w-]+", called[2])
-            wrong += [f"{line.strip()}: no {option}" for option in options if not {f'"{option}"', f'"{option[2:]}"'} & named]
+            wrong += [
+                f"{line.strip()}: no {option}" for option in options if not {f'"{option}"', f'"{option[2:]}"'} & named
+            ]
     assert "\n".join(wrong) == ""
