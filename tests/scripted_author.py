@@ -35,7 +35,7 @@ class ScriptedAuthor:
     def __call__(self, request: Request) -> Answer:
         body = json.loads(request.body)
         self.asked.append(body)
-        record, data = body["response_format"]["json_schema"]["name"], data_of(body)
+        record, data = _record_of(body), data_of(body)
         twisted = None if self.twist is None else self.twist(record, data, body)
         if twisted is not None:
             return says(twisted) if isinstance(twisted, str) else twisted
@@ -43,6 +43,14 @@ class ScriptedAuthor:
         if record not in writers:
             return refuses(400, f"no such record: {record}")
         return says(json.dumps(writers[record](data), ensure_ascii=False))
+
+
+def _record_of(body: dict[str, Any]) -> str:
+    """The name of the record that is asked for: by its schema, or in words where a server refused that."""
+    if "response_format" in body:
+        return str(body["response_format"]["json_schema"]["name"])
+    words = body["messages"][-1]["content"]
+    return next(name for name in ("Characters", "SocialNetwork", "DayPlan") if f'"title":"{name}"' in words)
 
 
 def in_letters(identifier: str) -> str:

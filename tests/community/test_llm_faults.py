@@ -109,7 +109,7 @@ def test_a_server_that_is_silent(town: World, sound: Community) -> None:
         (lambda data: says(plan(data)[:200], finish="length"), "breaks off because it is too long"),
         (lambda data: "I would rather write a poem.", "holds no JSON object"),
         (lambda data: '{"day": []}', "schedule: Field required"),
-        (lambda data: plan(data, cash=1000), "schedule.1.cash: Extra inputs are not permitted"),
+        (lambda data: plan(data, start_tim="7"), "schedule.1.start_tim: Extra inputs are not permitted"),
         (lambda data: plan(data, start_time=7), "start_time"),
         (lambda data: says("", refusal="I can't plan people's lives."), "I can't plan people's lives."),
         (lambda data: says("", finish="content_filter"), "filtered"),

@@ -269,7 +269,7 @@ BAD = [
     ([], "give --runs, or --world and --episodes"),
     (["--runs", "{run}", "--episodes", "3"], "not both"),
     (["--runs", "{run}", "{run}"], "given twice"),
-    (["--runs", "{nothing}"], "holds no run.json"),
+    (["--runs", "{nothing}"], "is no finished run"),
     (["--runs", "{run}", "--outputs", "smell"], "no output 'smell'"),
     (["--runs", "{run}", "--size", "63"], "even number"),
     (["--runs", "{run}", "--size", "512", "--test", "0"], "256 pixels were recorded"),

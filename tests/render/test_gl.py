@@ -249,7 +249,7 @@ def test_flow_is_the_same(both: tuple[Scene, GlRenderer], record: dict[str, Any]
 
 def test_without_moderngl_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "moderngl", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'vico\[gl\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'virtual-community\[gl\]'"):
         GlRenderer(Scene([]))
 
 

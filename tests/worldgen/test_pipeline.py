@@ -37,14 +37,14 @@ def test_an_existing_folder_is_refused_and_left_alone(helsinki_path: Path) -> No
 
 def test_force_replaces_the_folder_and_what_a_killed_build_left(tmp_path: Path) -> None:
     out = tmp_path / "world"
-    out.mkdir()
-    (out / "old.txt").write_text("old")
+    build_world(EXTRACT, **CENTRE, half=60, out=out, options=BuildOptions(previews=True, keep_stages=False))
+    assert (out / "previews").is_dir()
     partial = tmp_path / "world.partial"
     partial.mkdir()
     (partial / "rubbish").write_text("left by a killed build")
     build_world(EXTRACT, **CENTRE, half=60, out=out, force=True, options=BuildOptions(previews=False))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["world"]
-    assert not (out / "old.txt").exists()
+    assert not (out / "previews").exists()
 
 
 def test_an_interrupted_build_leaves_no_world_but_its_finished_stages(

@@ -284,14 +284,17 @@ class LanguageModel:
         if self._replay is not None:
             return self._replay.answer(self._whole(turns, reply))
         tried: set[str] = set()
+        retries = self.connection.retries
         while True:
             request = self._request(turns, reply)
             try:
-                answer = self._read_answer(self._sent(request), tokens_of(turns))
+                answer = self._read_answer(self._sent(request, retries), tokens_of(turns))
                 break
             except RequestError as error:
                 part = self._to_leave_out(error, request, reply, tried)
-                if part is None:
+                if error.status == _FAILED and not error.names("response_format"):
+                    retries -= error.tries  # a server that fails all the same is not asked more often for it
+                if part is None or retries < 0:
                     self._forget(tried)
                     raise error.for_people(self.endpoint) from None
                 tried.add(part)
@@ -327,8 +330,8 @@ class LanguageModel:
                 return part
         return None
 
-    def _sent(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Return the answer to a request that is sent as often as it takes."""
+    def _sent(self, request: dict[str, Any], retries: int) -> dict[str, Any]:
+        """Return the answer to a request that is sent as often as it takes, and sent again so many times at most."""
         how = self.connection
         failed = 0
 
@@ -340,11 +343,11 @@ class LanguageModel:
                 if error.status == _FAILED and "response_format" in request:
                     # It may be the schema: then no waiting helps. Without such a word it is tried twice.
                     failed += 1
-                    error.transient = failed < 2 and not error.names("response_format")
+                    error.transient = failed < min(2, retries) and not error.names("response_format")
                 raise
 
         try:
-            return with_retries(send, backoff=Backoff(how.retries), sleep=how.sleep)
+            return with_retries(send, backoff=Backoff(retries), sleep=how.sleep)
         except RequestError as error:
             if error.status in (*_REFUSED, _FAILED):
                 raise
