@@ -25,6 +25,7 @@ from websockets.sync.client import connect
 
 from vico.errors import InputError
 from vico.runner.control import Control
+from vico.runner.loop import Runner
 from vico.viewer.server.gate import Gate
 from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState
@@ -306,6 +307,31 @@ def toy(tmp_path: Path) -> Iterator[LiveToy]:
     """A run that goes on as fast as it can."""
     with live_toy(tmp_path / "run", control=Control(tmp_path / "run", speed=50.0)) as toy:
         yield toy
+
+
+def test_a_step_without_a_picture_is_no_fault_of_the_page(toy: LiveToy) -> None:
+    with stream(toy.url) as client:
+        client.send(type="follow", rate=10)
+        client.until(lambda s: s.frames)
+    told = json.loads(get(toy.url, "/api/view?agent=resident_0&step=0"))
+    assert told["picture"] is None
+    assert told["reason"]
+
+
+def test_how_somebody_is_can_be_told_while_the_run_is_busy(toy: LiveToy) -> None:
+    busy, done = threading.Event(), threading.Event()
+
+    def wait(runner: Runner) -> None:
+        busy.set()
+        done.wait(20)
+
+    toy.control.ask(wait)
+    assert busy.wait(10)
+    try:
+        told = json.loads(get(toy.url, f"/api/moment?step={toy.viewer.source.last}&agent=resident_0"))
+    finally:
+        done.set()
+    assert told["agents"]["resident_0"]["plan"] is None
 
 
 def test_who_follows_gets_what_is_new_at_its_rate(toy: LiveToy) -> None:

@@ -18,7 +18,7 @@ from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.source import Source
 from vico.viewer.sources.tables import LiveTables
-from vico.viewer.sources.views import RecordedViews, Seen, picture_of, seen_by
+from vico.viewer.sources.views import NoPictureError, RecordedViews, Seen, picture_of, seen_by
 from vico.world.world import World
 
 # Seconds that pictures and plans are waited for: a first picture needs the scene to be made.
@@ -123,7 +123,7 @@ class LiveViewer(Hook):
         if step < self._tables.last or self.control.told()["status"] == "ended":
             run = self._tables.run
             if run is None or run.last < step:
-                raise InputError(f"step {step} is not written yet: look at it again in a minute")
+                raise NoPictureError(f"step {step} is not written yet: look at it again in a minute")
             self._recorded = self._recorded or RecordedViews(run)
             return self._recorded.view(agent, step, output)
 
@@ -155,4 +155,8 @@ class LiveViewer(Hook):
 
         if self.control.told()["status"] == "ended":
             return {}
-        return waited(self.control.ask(ask), _PLAN_WITHIN)
+        try:
+            return waited(self.control.ask(ask), _PLAN_WITHIN)
+        except InputError:
+            # The run makes a first picture, or ends: how somebody is can be told without their plans.
+            return {}

@@ -71,10 +71,13 @@ def test_a_finger_on_the_left_walks_and_one_on_the_right_looks(played: tuple[Bro
     page.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
     # Touches are answered between two pictures: without a graphics card there are none meanwhile.
     page.evaluate("vico.page.frozen = true")
-    page.evaluate(f"window.start = {_PLACE}.slice(), window.yaw = vico.play.input.yaw")
+    page.evaluate(f"window.start = {_PLACE}.slice()")
     _touch(page, "touchStart", (120, 300))
     _touch(page, "touchMove", (120, 250))
     page.wait_for("Math.abs(vico.play.input._stick.y - 50 / 60) < 0.02")
+    # Until a finger leads the gaze, it comes round behind the body.
+    page.wait_for("vico.play.input.looks")
+    page.evaluate("window.yaw = vico.play.input.yaw")
     _touch(page, "touchStart", (120, 250), (450, 200))
     _touch(page, "touchMove", (120, 250), (350, 200))
     page.wait_for("Math.abs(vico.play.input.yaw - yaw - 0.32) < 0.05")
@@ -136,6 +139,34 @@ def test_what_is_typed_is_said_in_the_street(played: tuple[BrowserPage, Path]) -
         "fetch('/api/search?q=Good morning').then((a) => a.json()).then((f) => f.hits.some((h) => h.what === 'event'))"
     )
     page.wait_for(said, seconds=60)
+
+
+def test_what_nobody_hears_is_said_to_be_so(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    data = "{ hearers: [], missed: { resident_1: 'noise' } }"
+    event = f"{{ kind: 'message', agent: vico.play.name, time: 0, text: 'Hello?', data: {data} }}"
+    page.evaluate(f"vico.source._tell('events', {{ events: [{event}] }})")
+    assert "nobody heard it: it is too loud here" in page.evaluate("document.querySelector('.play-heard').textContent")
+    assert "Nobody heard it" in page.evaluate("document.getElementById('toast').textContent")
+
+
+def test_the_question_mark_shows_the_keys_of_the_game_and_keeps_them_from_the_body(
+    played: tuple[BrowserPage, Path],
+) -> None:
+    page, _ = played
+    keys = "document.querySelector('#help dl').textContent"
+    page.press("?", "Slash")
+    page.wait_for("document.getElementById('help').open")
+    assert "go through a door" in page.evaluate(keys)
+    _hold(page, "ArrowUp", "ArrowUp", down=True)
+    assert page.evaluate("vico.play.input.message().down") == []
+    _hold(page, "ArrowUp", "ArrowUp", down=False)
+    page.press("?", "Slash")
+    page.wait_for("!document.getElementById('help').open && vico.play.active")
+    page.evaluate("document.getElementById('help-button').click()")
+    assert "go through a door" in page.evaluate(keys)
+    page.press("Escape", "Escape")
+    page.wait_for("!document.getElementById('help').open && vico.play.active")
 
 
 def test_the_camera_is_behind_the_own_body_and_escape_lets_go(played: tuple[BrowserPage, Path]) -> None:

@@ -1,6 +1,6 @@
 // What is written over the picture and beside it: names, what is being said, the weather, where one looks from.
 
-import { nameOf } from "./panel_words.js";
+import { nameOf, unheardText } from "./panel_words.js";
 
 /** Names are shown above people within so many metres, and messages for so many seconds. */
 const NAMED_WITHIN = 60;
@@ -18,7 +18,7 @@ export class Captions {
   update(events, time) {
     this._talking = new Map();
     for (const event of events) {
-      if ((event.kind === "message" || event.kind === "speech") && event.time <= time && event.time > time - SPOKEN_FOR) this._talking.set(event.agent, event.text);
+      if ((event.kind === "message" || event.kind === "speech") && event.time <= time && event.time > time - SPOKEN_FOR) this._talking.set(event.agent, `“${event.text}”${unheardText(event) && " (nobody heard it)"}`);
     }
   }
 
@@ -49,7 +49,7 @@ export class Captions {
   /** @param {any} agent @returns {string | null} what somebody says now */
   _spoken(agent) {
     const said = this._talking.get(agent.name);
-    return said ? `${nameOf(agent)}: “${said}”` : null;
+    return said ? `${nameOf(agent)}: ${said}` : null;
   }
 }
 

@@ -29,8 +29,15 @@ export class Keys {
   constructor(actions, cameras) {
     this.enabled = true;
     this.actions = actions;
+    /** What the help tells. */
+    this.list = KEYS;
     window.addEventListener("keydown", (event) => {
-      if (!this.enabled || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (this.open && event.key === "Escape") {
+        event.preventDefault();
+        dialog.close();
+      }
+      if (this.open && event.key !== "?") return;
+      if (event.defaultPrevented || !this.enabled || event.ctrlKey || event.metaKey || event.altKey) return;
       const inField = /** @type {any} */ (event.target).closest?.("input, select, textarea, [role=listbox]");
       if (inField && event.key !== "Escape") return;
       // Buttons keep what a keyboard does with them.
@@ -45,14 +52,22 @@ export class Keys {
     window.addEventListener("keyup", (event) => cameras?.down.delete(event.code));
     window.addEventListener("blur", () => cameras?.down.clear());
     const dialog = byId("help");
-    dialog.querySelector("dl").replaceChildren(...KEYS.flatMap(([key, text]) => [el("dt", {}, el("kbd", { text: key })), el("dd", { text })]));
     byId("help-close").addEventListener("click", () => dialog.close());
     byId("help-button").addEventListener("click", () => this.help());
   }
 
+  /** Whether the help is shown. */
+  get open() {
+    return byId("help").open;
+  }
+
   help() {
     const dialog = byId("help");
-    if (dialog.open) dialog.close();
-    else dialog.showModal();
+    if (dialog.open) {
+      dialog.close();
+      return;
+    }
+    dialog.querySelector("dl").replaceChildren(...this.list.flatMap(([key, text]) => [el("dt", {}, el("kbd", { text: key })), el("dd", { text })]));
+    dialog.showModal();
   }
 }

@@ -358,7 +358,7 @@ class Page {
     const { clock, source, between, view } = this;
     this.captions.update(this.timeline.events, clock.time);
     const happenings = this.showHappenings();
-    this.panel.update(this.step, clock.time, between.bodies.get(this.selected));
+    this.panel.update(this.step, clock.time, between.bodies.get(this.selected), source.live && clock.following);
     if (!byId("events").hidden) this.log.update(clock.time);
     if (!byId("metrics").hidden && now - this._charted > 1500) {
       this._charted = now;

@@ -3,7 +3,7 @@
 import { byId, el } from "./dom.js";
 import { clockText } from "./clock.js";
 import { showSight } from "./panel_sight.js";
-import { actionText, dataOf, inside, nameOf, secondsOf } from "./panel_words.js";
+import { actionText, dataOf, inside, nameOf, secondsOf, unheardText } from "./panel_words.js";
 import { getJson } from "./source.js";
 
 const LENSES = [
@@ -191,8 +191,9 @@ export class Panel {
    * @param {number} step
    * @param {number} time
    * @param {any} body
+   * @param {boolean} newest whether the page follows a run that goes on
    */
-  async update(step, time, body) {
+  async update(step, time, body, newest) {
     if (!this.entity) return;
     if (!this.agent) {
       if (body && this.parts.state) this._state([["Position", `${body.x.toFixed(1)}, ${body.y.toFixed(1)}, ${body.z.toFixed(1)} m`], ["Speed", `${body.speed.toFixed(1)} m/s`]]);
@@ -208,7 +209,7 @@ export class Panel {
     const now = found?.agents?.[name];
     if (!now || entity !== this.entity) return;
     this._now(now, body);
-    showSight(this, name, step);
+    showSight(this, name, step, newest);
   }
 
   /** @param {any} now @param {any} body */
@@ -291,7 +292,10 @@ export class Panel {
     if (key === this._said) return;
     this._said = key;
     this.parts.messages.replaceChildren(
-      ...mine.map((e) => el(e.agent === name ? "li.own" : "li", {}, el("small", { text: `${clockText(e.time)} ${this._title(e.agent)}` }), el("span", { text: e.text }))),
+      ...mine.map((e) => {
+        const unheard = e.agent === name ? unheardText(e) : "";
+        return el(e.agent === name ? "li.own" : "li", {}, el("small", { text: `${clockText(e.time)} ${this._title(e.agent)}${unheard && ` · ${unheard}`}` }), el("span", { text: e.text }));
+      }),
     );
     if (!mine.length) this.parts.messages.replaceChildren(el("li.note", { text: "Said and heard nothing yet." }));
   }

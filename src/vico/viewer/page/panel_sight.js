@@ -8,18 +8,19 @@ import { getJson } from "./source.js";
  * @param {import("./panel.js").Panel} panel
  * @param {string} name
  * @param {number} step
+ * @param {boolean} newest whether the page follows a run that goes on: then what is seen now is asked for
  */
-export async function showSight(panel, name, step) {
+export async function showSight(panel, name, step, newest) {
   const { entity, lens } = panel;
   const { picture, pictureNote, names } = panel.parts;
-  const live = panel.source.live && step >= panel.source.last - 1 ? "" : `&step=${step}`;
+  const live = newest ? "" : `&step=${step}`;
   const answer = await fetch(`api/view?agent=${encodeURIComponent(name)}${live}&output=${lens}`).catch(() => null);
   if (entity !== panel.entity || picture !== panel.parts.picture) return;
-  if (!answer?.ok) {
+  if (!answer?.ok || answer.headers.get("Content-Type") === "application/json") {
     picture.hidden = true;
     names.replaceChildren();
     const why = await answer?.json().catch(() => null);
-    pictureNote.textContent = why?.error ?? "There is no picture of this step.";
+    pictureNote.textContent = why?.reason ?? why?.error ?? "There is no picture of this step.";
     return;
   }
   const old = picture.src;

@@ -15,6 +15,19 @@ export function dataOf(event) {
   }
 }
 
+/**
+ * Why nobody heard what was said; "" where somebody did.
+ * @param {any} event of kind `message`
+ * @returns {string}
+ */
+export function unheardText(event) {
+  const { hearers, missed } = dataOf(event);
+  if (!hearers || hearers.length) return "";
+  const whys = new Set(Object.values(missed ?? {}));
+  if (!whys.size) return "nobody was near enough to hear it";
+  return `nobody heard it: ${[...whys].map((why) => (why === "noise" ? "it is too loud here" : "walls are in the way")).join(", ")}`;
+}
+
 /** @param {any} action @returns {string} */
 export function actionText(action) {
   if (!action) return "nothing";

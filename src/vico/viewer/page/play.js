@@ -2,6 +2,8 @@
 // about to be, and slides to what the server says.
 
 import { el } from "./dom.js";
+import { KEYS } from "./keys.js";
+import { unheardText } from "./panel_words.js";
 import { HELP } from "./play_help.js";
 import { Input } from "./play_input.js";
 import { Predicted } from "./play_predicted.js";
@@ -21,7 +23,7 @@ class Play {
     this.active = false;
     this.eyes = false;
     this.predicted = new Predicted();
-    this.input = new Input(vico.view?.cameras?.canvas ?? document.body, () => this.active);
+    this.input = new Input(vico.view?.cameras?.canvas ?? document.body, () => this.active && !this.vico.ui.keys?.open);
     this.input.onButton = (key) => this._button(key);
     this._last = performance.now();
     this._sent = 0;
@@ -40,8 +42,16 @@ class Play {
     this.layer.classList.add("playing");
     document.querySelector(".body")?.classList.add("plain");
     this.vico.cameras?.setMode("play");
-    if (this.vico.ui.keys) this.vico.ui.keys.enabled = false;
+    this._lendKeys();
     this.vico.page.selected = 0;
+  }
+
+  /** While one plays the keys are the game's, and so is their help. */
+  _lendKeys() {
+    const { keys } = this.vico.ui;
+    if (!keys) return;
+    keys.enabled = !this.active;
+    keys.list = this.active ? HELP : KEYS;
   }
 
   /** Let go of everything and give the page its keys back. */
@@ -51,7 +61,7 @@ class Play {
     this._send(performance.now(), true);
     document.exitPointerLock?.();
     this.layer.classList.remove("playing");
-    if (this.vico.ui.keys) this.vico.ui.keys.enabled = true;
+    this._lendKeys();
     const body = this.vico.state.bodies.get(this.entity);
     if (body) this.vico.cameras?.lookAt(body.x, body.y, body.z + 1.2, 20);
   }
@@ -68,15 +78,14 @@ class Play {
     this.heard = el("ol.play-heard", { "aria-live": "polite" });
     this.chat = el("input.play-chat", { type: "text", maxlength: 1000, placeholder: "Say something (Enter)", "aria-label": "Say something" });
     this.again = el("button.play-again", { onclick: () => this.begin(), text: "Play" });
-    this.help = el("dl.play-help", { hidden: true });
-    for (const [key, text] of HELP) this.help.append(el("dt", {}, el("kbd", { text: key })), el("dd", { text }));
-    this.layer.append(this.task, this.state, this.heard, this.hints, this.chat, this.again, this.help);
+    this.layer.append(this.task, this.state, this.heard, this.hints, this.chat, this.again);
     this.chat.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this._chatKey(event));
     this.chat.addEventListener("focus", () => this.input.release());
   }
 
   _listen() {
     this.source.addEventListener("you", (/** @type {any} */ { detail }) => this._take(detail));
+    this.source.addEventListener("events", (/** @type {any} */ { detail }) => detail.events.forEach((/** @type {any} */ event) => this._said(event)));
     const between = this.vico.state;
     const set = between.set.bind(between);
     between.set = (/** @type {any[]} */ ...values) => {
@@ -100,11 +109,15 @@ class Play {
 
   /** @param {KeyboardEvent} event */
   _key(event) {
-    if (!this.active || event.target === this.chat || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!this.active || event.defaultPrevented || event.target === this.chat || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.repeat) return;
     const key = event.key;
-    if (key === "Escape") this.pause();
-    else if (key === "?") this.help.hidden = !this.help.hidden;
+    const { keys } = this.vico.ui;
+    if (key === "?") {
+      this._letGo();
+      keys?.help();
+    } else if (keys?.open) return;
+    else if (key === "Escape") this.pause();
     else if (key === "Enter") this.chat.focus();
     else if (key.toLowerCase() === "v") this.eyes = !this.eyes;
     else {
@@ -188,11 +201,22 @@ class Play {
     this.state.textContent = [this.name, where, you.vehicle, you.posture === "standing" ? "" : you.posture, held.length ? `holds ${held.join(", ")}` : "", you.reason]
       .filter(Boolean)
       .join(" · ");
-    for (const said of you.heard ?? []) {
-      this.heard.append(el("li", { text: `${this._called(said.speaker)}: ${said.text}` }));
-      while (this.heard.children.length > 6) this.heard.firstChild.remove();
-    }
+    for (const said of you.heard ?? []) this._line(`${this._called(said.speaker)}: ${said.text}`);
     if (you.task) this._task(you.task);
+  }
+
+  /** Show what the own person said, and say so where nobody heard it. @param {any} event */
+  _said(event) {
+    if (event.kind !== "message" || event.agent !== this.name) return;
+    const unheard = unheardText(event);
+    this._line(`You: ${event.text}${unheard && ` (${unheard})`}`);
+    if (unheard) this.vico.ui.toast(`${unheard[0].toUpperCase()}${unheard.slice(1)}.`, true);
+  }
+
+  /** @param {string} text said or heard */
+  _line(text) {
+    this.heard.append(el("li", { text }));
+    while (this.heard.children.length > 6) this.heard.firstChild.remove();
   }
 
   /** @param {string} name */

@@ -17,6 +17,7 @@ from starlette.staticfiles import StaticFiles
 
 from vico.errors import InputError, MissingFileError, VicoError
 from vico.viewer.server.state import ViewerState
+from vico.viewer.sources.views import NoPictureError
 
 PAGE = Path(__file__).parents[1] / "page"
 #: Steps whose frames one answer holds at most.
@@ -115,6 +116,9 @@ async def _view(state: ViewerState, request: Request) -> Response:
     step = _step(state, request, "step", state.source.last)
     try:
         content, kind = await run_in_threadpool(state.view, agent, step, output or "rgb")
+    except NoPictureError as error:
+        # An answer like any other: a page asks for each step, and a 404 would be a fault in its browser's console.
+        return _json({"picture": None, "reason": str(error)})
     except VicoError as error:
         return JSONResponse({"error": str(error)}, 404)
     if isinstance(content, Mapping):

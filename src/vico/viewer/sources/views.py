@@ -26,6 +26,10 @@ _FARTHEST = 50.0
 _MOST_REPEATED = 600
 
 
+class NoPictureError(InputError):
+    """A step has no picture, or not yet, of what an agent sees; nothing is wrong with the question."""
+
+
 class Seen(NamedTuple):
     """What an agent sees.
 
@@ -47,13 +51,15 @@ def seen_by(sim: Simulation, agent: str) -> Seen:
     Raises
     ------
     InputError
-        If nobody is called so, or it has neither eyes nor a camera.
+        If nobody is called so.
+    NoPictureError
+        If it has no camera.
     """
     if agent not in sim.agents:
         raise InputError(f"nobody is called {agent!r}")
     index, robots = sim.agents.index(agent), sim.state.robots
     if robots is not None and index >= len(sim.state.people) and not robots.sees(index - len(sim.state.people)):
-        raise InputError(f"{agent} has no camera")
+        raise NoPictureError(f"{agent} has no camera")
     seeing, sim.seeing = sim.seeing, [index]
     try:
         observations, infos = sim.observe([agent])
@@ -111,9 +117,17 @@ class RecordedViews:
 
         Raises
         ------
-        InputError, MissingFileError, SchemaError
-            If there is none, and none can be made.
+        InputError
+            If nobody is called so, or there is no such picture.
+        NoPictureError
+            If there is none of the step, and none can be made.
+        SchemaError
+            If this version of vico makes another run of what was recorded.
         """
+        if agent not in {one["name"] for one in self._run.agents}:
+            raise InputError(f"nobody is called {agent!r}")
+        if output not in OUTPUTS:
+            raise InputError(f"there is no {output!r} of what it sees; there are {', '.join(OUTPUTS)}")
         with self._lock:
             if output == "rgb" and (film := self._run.views.get(agent)) is not None:
                 for _, picture in film.frames({step}):
@@ -127,10 +141,14 @@ class RecordedViews:
             try:
                 self._repeated = RepeatedRun.of_folders(self._run)
             except (MissingFileError, VicoError) as error:
-                raise InputError(f"no film of what {agent} saw, and it cannot be simulated again: {error}") from None
+                raise NoPictureError(
+                    f"no film of what {agent} saw, and it cannot be simulated again: {error}"
+                ) from None
         before = max([k for k in self._run.checkpoints if k <= step], default=0)
         if step - before > _MOST_REPEATED:
-            raise InputError(f"no film of what {agent} saw, and the checkpoint before it is {step - before} steps away")
+            raise NoPictureError(
+                f"no film of what {agent} saw, and the checkpoint before it is {step - before} steps away"
+            )
         if step < self._repeated.step and before == 0:
             self._repeated = RepeatedRun.of_folders(self._run)
         self._repeated.go_to(step)
