@@ -48,6 +48,7 @@ def live_toy(
     steps: int = 100_000,
     control: Control | None = None,
     player: PlayedAgent | None = None,
+    idle: float = 0.0,
     **config: Any,
 ) -> Iterator[LiveToy]:
     """Run it until the block ends, or `steps` are made."""
@@ -58,7 +59,7 @@ def live_toy(
     agents = Gatherer(everybody, trusted=everybody)
     hands = control or Control(out)
     recorder = Recorder(out, sim, sources={}, wanted=steps)
-    with LiveViewer(hands, world, player=player) as viewer:
+    with LiveViewer(hands, world, player=player, idle=idle) as viewer:
         viewer.show(recorder, agents)
 
         def run() -> None:

@@ -354,6 +354,20 @@ def test_steps_go_on_and_older_ones_are_there_while_it_goes_on(toy: LiveToy) -> 
         assert client.until(lambda s: s.last("range_end"))["sent"] == 11
 
 
+def test_a_run_waits_while_no_page_is_open_and_goes_on_when_one_is(tmp_path: Path) -> None:
+    with live_toy(tmp_path / "run", control=Control(tmp_path / "run", speed=50.0), idle=0.3) as toy:
+        deadline = time.monotonic() + 20.0
+        while toy.control.told()["status"] != "paused" and time.monotonic() < deadline:
+            time.sleep(0.05)
+        held = toy.viewer.source.last
+        time.sleep(0.3)
+        assert toy.viewer.source.last == held
+        with stream(toy.url) as client:
+            client.send(type="follow")
+            client.until(lambda s: s.frames and s.frames[-1][0].step > held + 20)
+        assert not toy.control.paused
+
+
 def test_a_hundred_clients_that_read_nothing_slow_nothing_down(toy: LiveToy) -> None:
     address = address_of(toy.url)
 

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from vico.viewer.play import PlayedAgent
 
 #: Options of a run that decide how it is shown, and nothing in it.
-LIVE = ("live", "speed", "paused", "port", "allow_host")
+LIVE = ("live", "speed", "paused", "port", "allow_host", "idle")
+
+#: The longest that a run may be asked to go on without a page before it waits, seconds.
+MOST_IDLE = 1_000_000
 
 
 @contextmanager
@@ -39,13 +42,22 @@ def live_viewer(
     require_server()
     if not 0 <= options.speed <= FASTEST:
         raise InputError(f"run: --speed {options.speed:g}; it has to be 0 to {FASTEST:g}")
+    if not 0 <= options.idle <= MOST_IDLE:
+        raise InputError(f"run: --idle {options.idle:g}; it has to be 0 to {MOST_IDLE}")
     assert control is not None
     from vico.viewer.live import LiveViewer
 
     with LiveViewer(
-        control, world, city=city_of(world), player=player, port=options.port, hosts=options.allow_host
+        control,
+        world,
+        city=city_of(world),
+        player=player,
+        port=options.port,
+        hosts=options.allow_host,
+        idle=options.idle,
     ) as viewer:
         viewer.announce = told
+        viewer.announce_idle = _told_idle
         yield viewer
 
 
@@ -60,6 +72,17 @@ def city_of(world: World) -> Path:
 def told(url: str) -> None:
     """Say where the page is; on stdout, for programs that start this one."""
     print(f"open in a browser on this machine:  {url}", flush=True)
+
+
+def _told_idle(second: float) -> None:
+    """Say that the run waits because no page is there."""
+    hours, minutes = int(second // 3600) % 24, int(second // 60) % 60
+    print(
+        f"nobody has the page open: the run waits at {hours:02d}:{minutes:02d} until somebody has "
+        "(--idle 0: it never waits)",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def wait_for_interrupt(sentence: str) -> None:

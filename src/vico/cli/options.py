@@ -339,6 +339,8 @@ class RunOptions:
     allow_host
         With --live: a name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be
         given several times.
+    idle
+        With --live: seconds without a page open after which the run waits for one; 0: it never waits.
     force
         Replace what this verb made there before; refused if the folder holds anything else.
     json
@@ -388,6 +390,7 @@ class RunOptions:
     paused: bool = False
     port: int = 0
     allow_host: Hosts = ()
+    idle: float = 0.0
     force: bool = False
     json: bool = False
 

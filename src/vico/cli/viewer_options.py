@@ -56,6 +56,8 @@ class LiveOptions:
     allow_host
         A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
         times.
+    idle
+        Seconds without a page open after which the run waits for one; 0: it never waits.
     seed
         Decides everything that is left to chance.
     """
@@ -80,6 +82,7 @@ class LiveOptions:
     interventions: Path | None = None
     port: int = 0
     allow_host: Hosts = ()
+    idle: float = 300.0
     seed: int = 0
 
     def run_options(self) -> RunOptions:
@@ -128,6 +131,8 @@ class PlayOptions:
     allow_host
         A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
         times.
+    idle
+        Seconds without a page open after which the run waits for one; 0: it never waits.
     waits
         With a task: seconds that it waits for you at its page.
     seed
@@ -151,6 +156,7 @@ class PlayOptions:
     view: Literal["recorded", "none"] = "recorded"
     port: int = 0
     allow_host: Hosts = ()
+    idle: float = 60.0
     waits: float = 600.0
     seed: int = 0
 
@@ -168,6 +174,7 @@ class PlayOptions:
             "pedestrians",
             "port",
             "allow_host",
+            "idle",
         )
         given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "seed")}
         given["assistants"] = int(played.removeprefix("assistant_")) + 1 if played.startswith("assistant_") else 0

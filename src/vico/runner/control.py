@@ -104,6 +104,7 @@ class Control:
         self.out, self.paused = out, paused
         self.switch: Switch | None = None
         self.stopping = self._ended = False
+        self._attended = True
         self.step = 0
         self._pace = Pace(speed)
         self._script = deque(script)
@@ -148,6 +149,12 @@ class Control:
                 self._waiting.append(waiting)
                 self._something.notify_all()
         return waiting.told
+
+    def attend(self, there: bool) -> None:
+        """Let the run go on while somebody is there, and hold it up while nobody is; it stays paused if it was."""
+        with self._something:
+            self._attended = there
+            self._something.notify_all()
 
     # Asked by the runner.
 
@@ -220,7 +227,7 @@ class Control:
         return known if self._allowed is None else [name for name in known if name in self._allowed]
 
     def _holds(self) -> bool:
-        return self.paused and not self._steps_left
+        return not self._attended or (self.paused and not self._steps_left)
 
     def _do_waiting(self, runner: Runner) -> None:
         while True:

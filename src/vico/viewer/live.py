@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -42,6 +43,8 @@ class LiveViewer(Hook):
         To listen on; 0 takes the one that the run was shown on before, or a free one.
     hosts
         Names of hosts, beside this machine's own, under which the page is shown.
+    idle
+        Seconds without any page connected after which the run waits for one; 0 for never.
     """
 
     def __init__(
@@ -53,10 +56,13 @@ class LiveViewer(Hook):
         player: PlayedAgent | None = None,
         port: int = 0,
         hosts: Sequence[str] = (),
+        idle: float = 0.0,
     ) -> None:
         self.control = control
         self._world, self._city, self._player, self._port = world, city, player, port
-        self._hosts = hosts
+        self._hosts, self._idle = hosts, idle
+        # When the last page left, on a clock that never goes back; None while there is one.
+        self._left: float | None = time.monotonic()
         self._server: ViewerServer | None = None
         self._recorder: Recorder | None = None
         self._tables = LiveTables(control.out)
@@ -64,6 +70,8 @@ class LiveViewer(Hook):
         self._recorded: RecordedViews | None = None
         #: Told the address once the page is there.
         self.announce: Callable[[str], None] = lambda url: None
+        #: Told the time of day, seconds, at which the run waits because no page is there.
+        self.announce_idle: Callable[[float], None] = lambda second: None
 
     @property
     def url(self) -> str:
@@ -92,6 +100,7 @@ class LiveViewer(Hook):
         source.plans = lambda names: self._plans(agents, names)
         if self._server is None:
             state = ViewerState(source, self.view, city=self._city, hands=self.control, player=self._player)
+            state.visited = self._visited
             self._server = ViewerServer(state, port=self._port, keep=recorder.out, hosts=self._hosts).__enter__()
             self.announce(self.url)
         else:
@@ -100,6 +109,8 @@ class LiveViewer(Hook):
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Take in how things stand before the first step."""
         assert self._recorder is not None
+        if self._left is not None:
+            self._left = time.monotonic()
         self._tables.begin()
         if self._recorder.latest:
             self._tables.add(0, self._recorder.latest, self._recorder.latest_cast)
@@ -114,6 +125,15 @@ class LiveViewer(Hook):
             self._player.tell(self._recorder.sim)
         if self._server is not None:
             self._server.notify()
+        if self._idle and self._left is not None and time.monotonic() - self._left > self._idle:
+            self.control.attend(False)
+            self.announce_idle(self._recorder.sim.state.second)
+
+    def _visited(self, clients: int) -> None:
+        """Note whether a page is there; asked by the server's thread."""
+        self._left = None if clients else time.monotonic()
+        if clients:
+            self.control.attend(True)
 
     def view(self, agent: str, step: int, output: str) -> tuple[bytes | dict[str, Any], str]:
         """Return what an agent sees: now, rendered between two steps, or at an earlier step, from the recording."""

@@ -36,6 +36,7 @@ class Hub:
     def __init__(self, state: ViewerState) -> None:
         self.state = state
         self.listeners: set[asyncio.Event] = set()
+        self._clients = 0
         #: Replies that are waited for.
         self.replies: set[asyncio.Task[None]] = set()
         #: Whether clients get what they are still owed, and are then let go.
@@ -62,6 +63,11 @@ class Hub:
         if self.listeners and not self._pending and self._loop is not None:
             self._pending = True
             self._loop.call_soon_threadsafe(self._wake)
+
+    def count(self, more: int) -> None:
+        """Note that a client has come (1) or left (-1)."""
+        self._clients += more
+        self.state.visited(self._clients)
 
     def end(self) -> None:
         """Send clients what they are still owed, replies among it, and let them go; from another thread."""

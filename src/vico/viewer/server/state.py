@@ -73,6 +73,8 @@ class ViewerState:
         player: Player | None = None,
     ) -> None:
         self.source, self.view, self.city, self.hands, self.player = source, view, city, hands, player
+        #: Told how many clients are connected whenever one comes or leaves.
+        self.visited: Callable[[int], None] = lambda clients: None
 
     def more(self) -> dict[str, Any]:
         """Return what ``/api/run`` tells beside the source's head."""

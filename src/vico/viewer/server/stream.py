@@ -48,6 +48,7 @@ class Stream:
     async def serve(self, socket: WebSocket) -> None:
         """Talk with one client until it is gone."""
         await socket.accept()
+        self._hub.count(1)
         client = Client(socket, self._hub)
         client.tell(self._hello())
         writer = asyncio.create_task(client.write())
@@ -60,6 +61,7 @@ class Stream:
             await asyncio.gather(writer, reader, return_exceptions=True)
             if self._hub.state.player is not None:
                 self._hub.state.player.leave(client.number)
+            self._hub.count(-1)
 
     async def _read(self, socket: WebSocket, client: Client) -> None:
         budget, before = float(MOST_MESSAGES), time.monotonic()
