@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from command_line import vico
+from vico.cli.run import _MEANINGS
 from vico.community import read_community
 from vico.worldgen.packaged import packaged_extract
 
@@ -391,3 +392,8 @@ def test_a_number_that_is_none_is_said_to_be_none(capsys: pytest.CaptureFixture[
 def test_no_help_speaks_of_none(verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert vico(*verb, "--help") == 0
     assert "None" not in capsys.readouterr().out
+
+
+def test_each_number_of_a_run_has_a_word_beside_it() -> None:
+    assert {"collisions", "refused", "late", "rescued", "stuck", "reentered"} <= _MEANINGS.keys()
+    assert all(len(words) > 8 for words in _MEANINGS.values())

@@ -119,11 +119,14 @@ def print_json(content: Any) -> None:
     print(text)
 
 
-def print_table(title: str, rows: Mapping[str, Any]) -> None:
-    """Print names and values as a two-column table on stdout."""
+def print_table(title: str, rows: Mapping[str, Any], words: Mapping[str, str] | None = None) -> None:
+    """Print names and values as a table on stdout, with a third column where `words` say what they mean."""
     table = Table(title=title, title_justify="left", show_header=False)
+    for _ in range(0 if words is None else 2):
+        table.add_column(no_wrap=True)  # a hash that is cut is of no use: the words give way
     for name, value in rows.items():
-        table.add_row(name, f"{value:,.2f}" if isinstance(value, float) else f"{value}")
+        shown = f"{value:,.2f}" if isinstance(value, float) else f"{value}"
+        table.add_row(name, shown, *([] if words is None else [words.get(name, "")]))
     Console().print(table)
 
 

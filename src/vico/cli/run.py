@@ -58,6 +58,23 @@ _PLAYED_ROOM = {"robot": 1.2, "assistant": 0.6}
 
 # Options that decide nothing of what is in the run folder; the others are kept in its run.json.
 _DEFAULTS = {field.name: field.default for field in fields(RunOptions)}
+#: What the numbers of a run count, and which way is good.
+_MEANINGS = {
+    "steps": "steps that were simulated",
+    "wall_seconds": "seconds that took",
+    "real_time_factor": "simulated seconds in one of these; more is better",
+    "peak_rss_mb": "megabytes of memory at most",
+    "state_hash": "the same for the same version, settings and seed",
+    "collisions": "motions that ended at a person, a wall or a thing; a few an hour and person are usual",
+    "refused": "actions that could not be done; 0 is best",
+    "arrivals": "places of schedules that were reached",
+    "late": "of these, after the time to be there; 0 is best",
+    "observations": "observations that agents were given",
+    "rescued": "vehicles that were taken out of jams; 0 is best",
+    "stuck": "vehicles in a jam at the end; metrics.json says where and why",
+    "reentered": "cars that left the map and came in elsewhere; neither good nor bad",
+    "junctions": "rule of the junctions",
+}
 # Cars and pedestrians of a run that is asked for none in particular.
 _TRAFFIC = 30
 _NOT_KEPT = ("out", "resume", "workers", "force", "json", *LIVE)
@@ -92,7 +109,7 @@ def run(options: RunOptions) -> int:
     else:
         counted = {name: value.get("count", value) for name, value in metrics.items() if isinstance(value, dict)}
         shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
-        print_table(str(options.out), shown)
+        print_table(str(options.out), shown, _MEANINGS)
     if talk is not None:
         print(_talk_told(talk), file=sys.stderr)
     return _judged(metrics)

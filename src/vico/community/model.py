@@ -308,6 +308,16 @@ class Community(Record):
     authorship: Authorship | None = None
     further_days: list[CommunityDay] = Field(default_factory=list)
 
+    def __repr__(self) -> str:
+        days = f" and {len(self.further_days)} more days" if self.further_days else ""
+        return (
+            f"Community({len(self.residents)} residents, {len(self.groups)} groups, {self.weekday} {self.date}{days}; "
+            f"for world {self.world.name!r})"
+        )
+
+    def __str__(self) -> str:
+        return repr(self)
+
     @property
     def dates(self) -> list[Date]:
         """The days there are schedules for, the residents' own first."""

@@ -87,6 +87,14 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self._plain_infos = options.name == "arrays"
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
 
+    def __repr__(self) -> str:
+        agents = self.possible_agents
+        first = ", ".join(agents[:3]) + (", ..." if len(agents) > 3 else "")
+        return (
+            f"{type(self).__name__}(world {self.world.manifest.name!r}, {len(agents)} agents ({first}), episodes of "
+            f"{self.max_steps} steps)"
+        )
+
     @property
     def sim(self) -> Simulation:
         """The simulation under way; for evaluators, not for agents."""

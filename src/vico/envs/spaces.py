@@ -40,6 +40,13 @@ FAR, MOST_ENTITIES = 1e7, 2**31 - 1
 LONGEST_NAME = 64
 
 
+class TextSpace(spaces.Text):
+    """Gymnasium's `Text`, shown by how many characters there are: all of them are more than a screen."""
+
+    def __repr__(self) -> str:
+        return f"Text({self.min_length}, {self.max_length}, {len(self.character_set)} characters)"
+
+
 def told_space(longest: int) -> spaces.Text:
     """Return the space of texts in observations that are no longer than so many characters."""
     # A copy shares the tables of characters, which take ten milliseconds, but not the stream of chance.
@@ -48,7 +55,7 @@ def told_space(longest: int) -> spaces.Text:
 
 @cache
 def _text_space(longest: int) -> spaces.Text:
-    return spaces.Text(longest, min_length=0, charset=CHARACTERS)
+    return TextSpace(longest, min_length=0, charset=CHARACTERS)
 
 
 def _number(low: float, high: float, *shape: int, dtype: Any = np.float64) -> spaces.Box:
@@ -150,7 +157,7 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
             "agent": spaces.Discrete(max(1, people)),
             "place": spaces.Discrete(max(1, places)),
             "index": spaces.Discrete(64),
-            "text": spaces.Text(LONGEST_TEXT, charset=_SPOKEN),
+            "text": TextSpace(LONGEST_TEXT, charset=_SPOKEN),
             "where": spaces.Discrete(3),
         }
     )

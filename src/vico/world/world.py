@@ -69,6 +69,15 @@ class World:
         for name, value in parts.items():
             self.__dict__["_models" if name == "models" else name] = value
 
+    def __repr__(self) -> str:
+        counts, origin = self.manifest.counts, self.manifest.origin
+        size = ", ".join(f"{counts[name]:,} {name}" for name in ("buildings", "places", "roads") if name in counts)
+        where = "in memory" if self.path is None else str(self.path)
+        return (
+            f"{type(self).__name__}({self.manifest.name!r}, {2 * self.half:g} m square at {origin.lat:.5f}, "
+            f"{origin.lon:.5f}: {size}; {where})"
+        )
+
     def shared(self, kind: type[T], make: Callable[[], T]) -> T:
         """Return what others have made of the world and share, made the first time that it is asked for."""
         known = self._derived.get(kind)

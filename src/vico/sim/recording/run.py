@@ -139,6 +139,10 @@ class Run:
         if not self._segments:
             raise EmptyInputError(f"{path}: the run was stopped before its first minute was written; run it anew")
 
+    def __repr__(self) -> str:
+        status = self.manifest.get("status", "unfinished")
+        return f"Run({str(self.path)!r}: {self.last} steps, {len(self.agents)} agents, {status})"
+
     def refresh(self) -> bool:
         """Look for what was recorded meanwhile; return whether there is more."""
         before = self.last
