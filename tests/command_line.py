@@ -38,3 +38,21 @@ def kill_once(arguments: list[object], ready: Callable[[], bool]) -> None:
     process.kill()
     process.communicate()
     assert process.returncode == -signal.SIGKILL
+
+
+def interrupted(arguments: list[object], ready: Callable[[], bool], number: signal.Signals) -> tuple[int, str]:
+    """Start a command, send it a signal as soon as `ready`, and return its exit code and what it said."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "vico.cli.main", *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 240
+    while not ready():
+        assert process.poll() is None, f"finished before it was interrupted: {process.communicate()[1]}"
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=120)
+    return process.returncode, said

@@ -26,6 +26,7 @@ from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.asset_verbs import assets
 from vico.cli.city_verbs import city
 from vico.cli.dataset_verbs import dataset
+from vico.cli.interrupts import Stopped
 from vico.cli.motion_verbs import motion
 from vico.cli.options import (
     CommaSeparated,
@@ -490,7 +491,9 @@ def main(arguments: list[str] | None = None) -> None:
         _leave(141)
     except OSError as error:
         _leave(2, _sentence(error))
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if isinstance(stop, Stopped):
+            _leave(stop.code, str(stop))
         _leave(130, "stopped; what was finished is on disk")
     except Exception as error:  # whatever: who runs a command is not who mends the program
         _leave(2, _fault(error))

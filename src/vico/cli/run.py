@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -16,6 +17,7 @@ from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
 from vico.assets.robots import robot_kind
+from vico.cli.interrupts import Stopped, taken_note_of
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
@@ -359,11 +361,18 @@ class Job:
             runner = Runner(
                 leg.sim, leg.agents, hooks=hooks, states_every=leg.every, faults=leg.faults, director=control
             )
-            if control is None:
-                runner.run(steps)
-            else:
+            if control is not None:
                 runner.run(steps, until=lambda: control.over)
-            return recorder.close("complete" if leg.sim.metrics.steps >= steps else "stopped")
+                return recorder.close("complete" if leg.sim.metrics.steps >= steps else "stopped")
+            with taken_note_of() as asked:
+                runner.run(steps, until=lambda: bool(asked))
+                made = leg.sim.metrics.steps
+                if not asked or made >= steps:
+                    return recorder.close("complete")
+                kept = made > 0 and leg.every > 0 and (made % leg.every == 0 or runner.save())
+                recorder.close("stopped")
+        going_on = f"go on with: vico run --resume {shlex.quote(str(self.out))}" if kept else "no state was kept"
+        raise Stopped(f"{self.out}: stopped after step {made} of {steps}; {going_on}", asked.number)
 
     def _agents(self) -> Gatherer:
         """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
