@@ -175,7 +175,11 @@ def test_scripts_that_the_pages_call_take_the_options_that_are_shown() -> None:
         if called := re.match(
             r"\s*(?:\S*/)?python3? ((?:examples|scripts|benchmarks)/\w+\.py)(.*)", line.split(" # ")[0]
         ):
-            source = (ROOT / called[1]).read_text(encoding="utf-8")
+            # A script may leave an option to a module beside it.
+            script = ROOT / called[1]
+            source = script.read_text(encoding="utf-8")
+            beside = re.findall(r"^from (\w+) import", source, re.MULTILINE)
+            source += "".join(p.read_text("utf-8") for one in beside if (p := script.with_name(f"{one}.py")).exists())
             named = set(re.findall(r'"[\w-]+"', source))
             options = re.findall(r"(?<=[\s\[])--[\w-]+", called[2])
             wrong += [

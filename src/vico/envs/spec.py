@@ -27,6 +27,7 @@ class EnvOptions(TypedDict, total=False):
     residents: int | None
     assistants: int
     robots: tuple[str, ...]
+    physics: str
     robot_places: Mapping[str, Sequence[float]]
     assistant_places: Mapping[str, Sequence[float]]
     errands: bool
@@ -44,10 +45,12 @@ class EnvOptions(TypedDict, total=False):
     worn: Mapping[str, str]
     quality: str | Mapping[str, bool]
     renderer: str
+    memory: float
     date: str | None
     utc_offset: float | None
     weather: str | Mapping[str, Any]
     events: str | Mapping[str, Any]
+    opening_hours: bool
     periods: Mapping[str, float | str]
     max_steps: int
     form: str | Mapping[str, Any]
