@@ -169,6 +169,10 @@ class WorldView:
     segmentation: NDArray[np.int32]
     names: dict[int, dict[str, str]]
 
+    def __repr__(self) -> str:
+        height, width = self.depth.shape
+        return f"WorldView({width} x {height} pixels, {len(self.names)} named things in view)"
+
     def save(self, path: Path | str) -> None:
         """Write the colours as a picture file; the ending decides the format."""
         Image.fromarray(self.rgb).save(path)

@@ -86,6 +86,11 @@ def entity_of(run: Any, name: str) -> int:
     return int(next(agent["entity"] for agent in run.agents if agent["name"] == name))
 
 
+def test_a_dataset_says_how_much_it_holds(built: dict[str, Dataset]) -> None:
+    about = built["lerobot"].about
+    assert repr(built["lerobot"]).startswith(f"Dataset(lerobot: 6 episodes, {about.frames} frames; ")
+
+
 def test_residents_are_told_what_their_day_says(built: dict[str, Dataset]) -> None:
     activities = {text for row in built["lerobot"].episodes() for text in row["instructions"]}
     assert activities

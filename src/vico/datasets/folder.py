@@ -88,7 +88,8 @@ class Dataset:
         If it is none, damaged, or of another version.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | str) -> None:
+        path = Path(path)
         if not (path / RECORD).exists():
             raise MissingFileError(f"{path}: holds no {RECORD}; make a dataset with vico dataset build")
         content = read_json(path / RECORD)
@@ -107,6 +108,10 @@ class Dataset:
             raise SchemaError(
                 f"{path}: its actions are as {self.about.producer} had them, which has others than this; build it anew"
             )
+
+    def __repr__(self) -> str:
+        about = self.about
+        return f"Dataset({about.format}: {about.episodes:,} episodes, {about.frames:,} frames; {self.path})"
 
     @property
     def form(self) -> Form:

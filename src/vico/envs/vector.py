@@ -162,6 +162,9 @@ class ParallelVectorEnv:
         self._arrays = SharedArrays(whole, self.num_envs)
         self._workers.ask([Call("attach", (self._arrays.name, self._arrays.layout, k)) for k in range(self.num_envs)])
 
+    def __repr__(self) -> str:
+        return f"ParallelVectorEnv({self.num_envs} environments of {len(self.possible_agents)} agents)"
+
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's observations, in every environment."""
         return self._spaces["observation_space"][agent]

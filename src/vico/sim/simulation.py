@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.clock import clock_of
 from vico.errors import InputError, some_of
 from vico.sim.actions import AgentFault, apply_actions
 from vico.sim.base import SimulationBase
@@ -149,6 +150,15 @@ class Simulation:
             self.base.know_things()
         world.forget()
         world.drop_pages()
+
+    def __repr__(self) -> str:
+        when = f"{self.config.date} {clock_of(int(self.state.second))}"
+        names = self.agents
+        first = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+        return (
+            f"Simulation(world {self.world.manifest.name!r}, {when}, step {self.metrics.steps}, "
+            f"{len(names)} agents ({first}))"
+        )
 
     # The loop.
 

@@ -75,6 +75,10 @@ class PublicMap:
     tram_lines: list[TramLine] = field(default_factory=list)
     streets: list[PublicStreet] = field(default_factory=list)
 
+    def __repr__(self) -> str:
+        told = f"{len(self.places):,} places, {len(self.buildings):,} buildings, {len(self.streets):,} named streets"
+        return f"PublicMap({2 * self.half:g} m square: {told}, {len(self.lines) + len(self.tram_lines)} lines)"
+
     @classmethod
     def from_world(cls, world: World) -> PublicMap:
         """Copy the public part of `world`."""
