@@ -27,6 +27,7 @@ from vico.cli.output import print_json
 _MODULES = {
     "mujoco": "vico.io.mujoco",
     "mapbox-earcut": "mapbox_earcut",
+    "opening-hours-py": "opening_hours",
     "Pillow": "PIL.Image",
     "pyarrow": "pyarrow.parquet",
     "scipy": "scipy.spatial",

@@ -452,7 +452,9 @@ def _leave(code: int, sentence: str = "") -> NoReturn:
             sys.stdout.flush()
     except BrokenPipeError:
         # Whoever read the output, `head` for one, has had enough; nothing may be flushed into the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Both may be the pipe (2>&1), and what is left for either would be flushed into it when the program ends.
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
         code = code or 141
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
