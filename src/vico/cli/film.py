@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from vico.cli.interrupts import Stopped, signal_of
 from vico.cli.live import city_of
-from vico.cli.output import progress_bars
+from vico.cli.output import Report, progress_bars
 from vico.cli.viewer_options import FilmOptions, StillOptions
 from vico.clock import seconds_of_day
 from vico.errors import InputError, MissingFileError, OutputExistsError
+from vico.render.film import partial_film
 from vico.render.quality import RenderQuality
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun
@@ -48,7 +50,8 @@ def film(options: FilmOptions) -> int:
         report("reading the run", 0, 1)
         repeated = RepeatedRun.of_folders(recorded, world=options.world, community=options.community)
         report("reading the run", 1, 1)
-        frames = write_film_of_shots(out, repeated, spans, report=lambda done, count: report("film", done, count))
+        with _told_where_interrupted(out, report, settings.rate) as film:
+            frames = write_film_of_shots(out, repeated, spans, report=film)
     print(f"{out}: {frames} frames, {frames / settings.rate:.1f} s")
     return 0
 
@@ -98,16 +101,12 @@ def _film_of_page(options: FilmOptions, run: Run) -> int:
     width, height = size_of(options.size)
     shot = shot_of(options.follow, options.view, width=width, height=height)
     first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
-    with _page_of(options.run, options.world) as address, progress_bars() as report:
-        frames = write_film(
-            address,
-            options.out,
-            shot,
-            first=first,
-            last=last,
-            rate=options.fps,
-            report=lambda done, count: report("film", done, count),
-        )
+    with (
+        _page_of(options.run, options.world) as address,
+        progress_bars() as report,
+        _told_where_interrupted(options.out, report, options.fps) as film_report,
+    ):
+        frames = write_film(address, options.out, shot, first=first, last=last, rate=options.fps, report=film_report)
     print(f"{options.out}: {frames} frames, {frames / options.fps:.1f} s")
     return 0
 
@@ -123,6 +122,27 @@ def _still_of_page(options: StillOptions, run: Run) -> int:
         write_still(address, options.out, shot, step)
     print(options.out)
     return 0
+
+
+@contextmanager
+def _told_where_interrupted(out: Path, report: Report, rate: int) -> Iterator[Callable[[int, int], None]]:
+    """Give what is told of a film's frames; where the block is interrupted, say how much of the film is there."""
+    made, wanted = 0, 0
+
+    def told(done: int, count: int) -> None:
+        nonlocal made, wanted
+        made, wanted = done, count
+        report("film", done, count)
+
+    try:
+        yield told
+    except KeyboardInterrupt as stop:
+        if not made:
+            raise
+        sentence = (
+            f"{partial_film(out)}: stopped after {made} of {wanted} frames, {made / rate:.1f} s that can be played"
+        )
+        raise Stopped(signal_of(stop), sentence) from None
 
 
 @contextmanager

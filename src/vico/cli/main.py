@@ -26,7 +26,7 @@ from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.asset_verbs import assets
 from vico.cli.city_verbs import city
 from vico.cli.dataset_verbs import dataset
-from vico.cli.interrupts import Stopped
+from vico.cli.interrupts import ended_by_signals, exit_code
 from vico.cli.motion_verbs import motion
 from vico.cli.options import (
     CommaSeparated,
@@ -478,13 +478,14 @@ def main(arguments: list[str] | None = None) -> None:
             print(__version__)
             _leave(0)
         check_verb(given, _verbs())
-        code = app.cli(
-            prog="vico",
-            description="An open world for humans, robots and society.",
-            args=with_ray_address(given),
-            registry=REGISTRY,
-            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes),
-        )
+        with ended_by_signals():
+            code = app.cli(
+                prog="vico",
+                description="An open world for humans, robots and society.",
+                args=with_ray_address(given),
+                registry=REGISTRY,
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes),
+            )
     except SystemExit as end:  # help was asked for, options were refused, or rich found the pipe closed
         _leave(141 if isinstance(end.__context__, BrokenPipeError) else end.code if isinstance(end.code, int) else 0)
     except VicoError as error:
@@ -494,9 +495,7 @@ def main(arguments: list[str] | None = None) -> None:
     except OSError as error:
         _leave(2, _sentence(error))
     except KeyboardInterrupt as stop:
-        if isinstance(stop, Stopped):
-            _leave(stop.code, str(stop))
-        _leave(130, "stopped; what was finished is on disk")
+        _leave(exit_code(stop), str(stop) or "stopped; what was finished is on disk")
     except Exception as error:  # whatever: who runs a command is not who mends the program
         _leave(2, _fault(error))
     _leave(code)

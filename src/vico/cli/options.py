@@ -317,8 +317,8 @@ class RunOptions:
     isolate
         Ask each of them in a process of its own.
     states_every
-        Checkpoint after so many steps, from which the run can go on if it is cut short; 0 for none. Without it every
-        300 steps, if all agents have a state.
+        Checkpoint after so many steps, from which the run can go on if it is cut short; 0 for none but where Ctrl-C or
+        SIGTERM stops it. Without it every 300 steps, if all agents have a state.
     workers
         Threads that render, and agents that are asked at a time where there is no deadline; 0 is one a processor.
         Decides nothing but how long it takes.

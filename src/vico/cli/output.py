@@ -13,7 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 from vico.errors import InputError
@@ -21,13 +29,17 @@ from vico.io.folders import FolderKind, check_replaceable
 
 Report = Callable[[str, int, int], None]
 
+# The longest time without a line of a stage that is going on, seconds.
+_SILENCE = 30.0
+
 
 @contextmanager
 def progress_bars() -> Iterator[Report]:
     """Give a function `(stage, done, total)` that keeps one bar a stage on stderr.
 
-    Where stderr is no terminal, a line a stage is written when it is done, and one each tenth of a long one. What
-    fails takes its bars with it: the sentence that says why stands alone.
+    Where stderr is no terminal, a line a stage is written when it is done, and one each tenth of a long one, or each
+    half minute where a tenth takes longer. Both say how long the rest takes, at the pace so far. What fails takes its
+    bars with it: the sentence that says why stands alone.
     """
     console = Console(file=sys.stderr)
     if not console.is_terminal:
@@ -36,9 +48,11 @@ def progress_bars() -> Iterator[Report]:
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description:<22}"),
-        BarColumn(bar_width=30),
+        BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("left"),
     )
     with Progress(*columns, console=console, refresh_per_second=4) as progress:
         tasks: dict[str, Any] = {}
@@ -56,19 +70,32 @@ def progress_bars() -> Iterator[Report]:
 
 
 def _lines() -> Report:
-    began: dict[str, float] = {}
-    told: dict[str, int] = {}
+    began: dict[str, tuple[float, int]] = {}
+    told: dict[str, tuple[int, float]] = {}
 
     def report(stage: str, done: int, total: int) -> None:
-        start = began.setdefault(stage, time.perf_counter())
+        now = time.perf_counter()
+        # A run that goes on has done some of it before.
+        start, first = began.setdefault(stage, (now, done))
         tenth = 10 * done // max(total, 1)
-        if tenth == told.get(stage, 0) or (total < 100 and done < total):
+        before, when = told.setdefault(stage, (0, start))
+        if (tenth == before or (total < 100 and done < total)) and (now - when < _SILENCE or done >= total):
             return
-        told[stage] = tenth
-        seconds = time.perf_counter() - start
-        print(f"{stage:<22} {done}/{total}  {seconds:.1f} s", file=sys.stderr, flush=True)
+        told[stage] = tenth, now
+        seconds = now - start
+        rest = seconds * (total - done) / (done - first) if done > first else 0.0
+        left = f", {duration(rest)} left" if rest else ""
+        print(f"{stage:<22} {done}/{total}  {seconds:.1f} s{left}", file=sys.stderr, flush=True)
 
     return report
+
+
+def duration(seconds: float) -> str:
+    """Return a time in two units at most, as people say it: 45 s, 12 min, 2 h 5 min."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def check_output(out: Path, *inputs: Path, force: bool, kind: FolderKind | None = None) -> None:

@@ -17,7 +17,7 @@ from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
 from vico.assets.robots import robot_kind
-from vico.cli.interrupts import Stopped, taken_note_of
+from vico.cli.interrupts import Stopped, StopRequest, stopped_between_steps
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
@@ -246,7 +246,13 @@ class Job:
         return cls(options, out, place, people, config, sources, found, talk, played)
 
     def done(self) -> dict[str, Any]:
-        """Do it; return its metrics."""
+        """Do it; return its metrics.
+
+        Raises
+        ------
+        Stopped
+            If a signal asked the run to end before all its steps were made; what was made is kept.
+        """
         options = self.options
         goes_on = self._goes_on()
         script = read_interventions(options.interventions) if options.interventions is not None else []
@@ -260,10 +266,16 @@ class Job:
             leg = self._begin(agents, every, goes_on=goes_on, control=control)
             report("setting the scene", 1, 1)
             while True:
-                metrics = self._go(leg, control, viewer, report)
-                if control is None or control.switch is None:
+                with stopped_between_steps(control.stop_soon if control is not None else lambda: None) as asked:
+                    metrics = self._go(leg, control, viewer, report, asked)
+                if asked or control is None or control.switch is None:
                     break
                 leg = self._switched(leg, control)
+            if metrics["steps"] < options.steps:
+                kept = self._told_of_rest(leg, metrics["steps"])
+                if asked:
+                    raise Stopped(asked.number, kept)
+                print(kept, file=sys.stderr)
             if viewer is not None and control is not None:
                 control.end()
                 wait_for_interrupt(f"the run is over; {viewer.url} still shows it (Ctrl+C ends)")
@@ -350,8 +362,25 @@ class Job:
         played = {} if self.played is None else {"played": self.played.agent}
         return how | {"notes": {"command": self._command()} | played}
 
-    def _go(self, leg: Leg, control: Control | None, viewer: LiveViewer | None, report: Report) -> dict[str, Any]:
-        """Run until the end, or until the run is to go on elsewhere; return the metrics."""
+    def _told_of_rest(self, leg: Leg, steps: int) -> str:
+        """Say of a run that was stopped how it is gone on with."""
+        out, options = leg.recorder.out, self.options
+        kept = checkpoint_steps(out)
+        told = f"{out}: stopped after step {steps} of {options.steps}"
+        if not kept:
+            return f"{told}; it has no checkpoint to go on from, and can be looked at: vico view {_quoted(out)}"
+        since = "" if kept[-1] == steps else f" from its last checkpoint, step {kept[-1]},"
+        if self.played is not None:
+            return f"{told}; go on{since} with: the same command, with --as {self.played.agent} --out {_quoted(out)}"
+        command = f"vico run --resume {_quoted(out)}"
+        command += f" --agent {shlex.quote(options.agent)}" if options.agent else ""
+        command += " --live" if options.live else ""
+        return f"{told}; go on{since} with: {command}"
+
+    def _go(
+        self, leg: Leg, control: Control | None, viewer: LiveViewer | None, report: Report, asked: StopRequest
+    ) -> dict[str, Any]:
+        """Run until the end, until it is to stop or to go on elsewhere; return the metrics."""
         steps, notes = self.options.steps, None if control is None else control.notes
         with leg.recorder as recorder:
             hooks: list[Hook] = [_Progress(report, steps), RecordedRun(recorder, leg.faults, notes=notes)]
@@ -361,18 +390,13 @@ class Job:
             runner = Runner(
                 leg.sim, leg.agents, hooks=hooks, states_every=leg.every, faults=leg.faults, director=control
             )
-            if control is not None:
-                runner.run(steps, until=lambda: control.over)
-                return recorder.close("complete" if leg.sim.metrics.steps >= steps else "stopped")
-            with taken_note_of() as asked:
-                runner.run(steps, until=lambda: bool(asked))
-                made = leg.sim.metrics.steps
-                if not asked or made >= steps:
-                    return recorder.close("complete")
-                kept = made > 0 and leg.every > 0 and (made % leg.every == 0 or runner.save())
-                recorder.close("stopped")
-        going_on = f"go on with: vico run --resume {shlex.quote(str(self.out))}" if kept else "no state was kept"
-        raise Stopped(f"{self.out}: stopped after step {made} of {steps}; {going_on}", asked.number)
+            runner.run(steps, until=lambda: bool(asked) or (control is not None and control.over))
+            elsewhere = control is not None and control.switch is not None and not asked
+            if leg.sim.metrics.steps < steps and not elsewhere and (leg.every or self.options.states_every == 0):
+                # Nothing that was simulated is simulated again when the run goes on.
+                leg.agents.wait_for_busy()
+                runner.save()
+            return recorder.close("complete" if leg.sim.metrics.steps >= steps else "stopped")
 
     def _agents(self) -> Gatherer:
         """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
@@ -446,6 +470,10 @@ class _Progress(Hook):
     def stepped(self, step: Step) -> None:
         """Show it."""
         self._report("simulating", step.number, self._steps)
+
+
+def _quoted(path: Path) -> str:
+    return shlex.quote(str(path))
 
 
 def _states_every(options: RunOptions, agents: Gatherer) -> int:

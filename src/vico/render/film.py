@@ -18,8 +18,16 @@ from vico.errors import EmptyInputError, InputError
 from vico.io.files import write_errors
 
 
+def partial_film(path: Path) -> Path:
+    """Return where a film is while it is written; what is there can be played at any time."""
+    return path.with_name(f"{path.stem}.partial.mp4")
+
+
 class FilmWriter:
     """An H.264 film that any browser plays; it takes its name only once it is whole.
+
+    Until then it is at `partial_film`, in fragments of a frame: a killed program leaves a film of what it had done, and
+    so does one that is interrupted. After an error nothing is left.
 
     Parameters
     ----------
@@ -38,7 +46,7 @@ class FilmWriter:
             raise InputError(f"{path}: films are .mp4 files")
         self.path = path
         self.frames = 0
-        self._temporary = path.with_name(f".{path.stem}.partial.mp4")
+        self._partial = partial_film(path)
         self._rate, self._crf, self._threads = rate, crf, threads
         self._container: Any = None
         self._stream: Any = None
@@ -55,7 +63,8 @@ class FilmWriter:
     def _open(self, height: int, width: int) -> None:
         if height % 2 or width % 2:
             raise InputError(f"{self.path}: frames of {width}x{height}; both sides must be even")
-        self._container = av.open(str(self._temporary), "w", options={"movflags": "+faststart"})
+        flags = {"movflags": "frag_every_frame+empty_moov+default_base_moof", "flush_packets": "1"}
+        self._container = av.open(str(self._partial), "w", options=flags)
         self._stream = self._container.add_stream("libx264", rate=self._rate)
         self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, "yuv420p"
         self._stream.time_base = Fraction(1, self._rate)
@@ -72,10 +81,14 @@ class FilmWriter:
         """
         if self._container is None:
             raise EmptyInputError(f"{self.path}: there is no frame to film")
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
-        self._container = None
-        os.replace(self._temporary, self.path)
+        self._finish()
+        _in_one_piece(self._partial)
+        os.replace(self._partial, self.path)
+
+    def keep(self) -> None:
+        """Finish what is there, under the name it has while it is written."""
+        if self._container is not None:
+            self._finish()
 
     def discard(self) -> None:
         """Give the film up; nothing stays on disk."""
@@ -83,7 +96,12 @@ class FilmWriter:
             with suppress(OSError):
                 self._container.close()
             self._container = None
-        self._temporary.unlink(missing_ok=True)
+        self._partial.unlink(missing_ok=True)
+
+    def _finish(self) -> None:
+        container, self._container = self._container, None
+        container.mux(self._stream.encode(None))
+        container.close()
 
     def __enter__(self) -> FilmWriter:
         return self
@@ -91,12 +109,38 @@ class FilmWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
         try:
-            if kind is None:
-                with write_errors(self.path):
+            with write_errors(self.path):
+                if interrupted:
+                    self.keep()
+                elif kind is None:
                     self.close()
+        except KeyboardInterrupt:
+            interrupted = True
+            raise
         finally:
-            self.discard()
+            if not interrupted:
+                self.discard()
+
+
+def _in_one_piece(path: Path) -> None:
+    """Write a film of fragments anew as the file that all players know, its table first; no picture is touched."""
+    whole = path.with_name(f".{path.name}")
+    try:
+        with (
+            av.open(str(path)) as fragments,
+            av.open(str(whole), "w", options={"movflags": "+faststart"}) as film,
+        ):
+            stream = fragments.streams.video[0]
+            copy = film.add_stream_from_template(stream)
+            for packet in fragments.demux(stream):
+                if packet.dts is not None:
+                    packet.stream = copy
+                    film.mux(packet)
+        os.replace(whole, path)
+    finally:
+        whole.unlink(missing_ok=True)
 
 
 def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], *, rate: int, crf: int = 23, threads: int = 1) -> int:

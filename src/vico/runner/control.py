@@ -156,6 +156,12 @@ class Control:
             self._attended = there
             self._something.notify_all()
 
+    def stop_soon(self) -> None:
+        """End the run before its next step; for handlers of signals, too."""
+        with self._something:  # may be taken twice by one thread: a handler interrupts whoever holds it
+            self.stopping = True
+            self._something.notify_all()
+
     # Asked by the runner.
 
     def before_step(self, runner: Runner) -> Mapping[str, Action]:

@@ -107,6 +107,10 @@ class Gatherer:
         """Whether an agent still works on an earlier step."""
         return name in self._busy and not self._busy[name].done()
 
+    def wait_for_busy(self) -> None:
+        """Give agents that still work on an earlier step their deadline once more."""
+        wait(self._busy.values(), timeout=self.deadline)
+
     def states(self) -> tuple[dict[str, AgentState], dict[str, Failure]]:
         """Return what every agent remembers, by name, and why there are some that did not say."""
         states: dict[str, AgentState] = {}

@@ -28,8 +28,10 @@ CHECKPOINTS = "checkpoints"
 VIEWS = "views"
 #: What of a run's folder replays and films make beside the recording, unless they are told where to.
 REPLAY, DEMO_FILM = "replay.html", "demo.mp4"
+# The film as far as it was made where making it was interrupted.
+_DEMO_SO_FAR = "demo.partial.mp4"
 _NAMES = (MANIFEST, AGENTS, CAST, METRICS, COMMUNITY, SETUP, SETUP_SHAPES, SEGMENTS, CHECKPOINTS, VIEWS)
-RUN_FOLDER = FolderKind("run", MANIFEST, lambda _: (*_NAMES, REPLAY, DEMO_FILM))
+RUN_FOLDER = FolderKind("run", MANIFEST, lambda _: (*_NAMES, REPLAY, DEMO_FILM, _DEMO_SO_FAR))
 
 
 class Column(NamedTuple):
