@@ -14,6 +14,7 @@ from vico.community.folder import COMMUNITY_FOLDER
 from vico.datasets.folder import DATASET_FOLDER
 from vico.errors import OutputExistsError
 from vico.io.folders import FolderKind
+from vico.sim import interventions
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.world.exports import EXPORT_FOLDER
 from vico.world.stored import WORLD_FOLDER
@@ -107,3 +108,19 @@ def test_folders_as_they_are_made_are_of_their_kinds(
     WORLD_FOLDER.require(corner_path)
     COMMUNITY_FOLDER.require(helsinki_people)
     RUN_FOLDER.require(helsinki_run[0])
+
+
+def test_a_run_that_was_shown_and_reached_into_is_still_a_run(
+    helsinki_run: tuple[Path, dict[str, object]], tmp_path: Path
+) -> None:
+    pytest.importorskip("uvicorn")
+    from vico.viewer.server.serve import ADDRESS, ViewerServer
+    from vico.viewer.server.state import ViewerState
+    from vico.viewer.sources.source import Source
+
+    run = shutil.copytree(helsinki_run[0], tmp_path / "run")
+    with ViewerServer(ViewerState(Source.recorded(run), lambda *_: ({}, "")), keep=run):
+        pass
+    (run / interventions.FILE).write_text("")
+    assert (run / ADDRESS).is_file()
+    RUN_FOLDER.require(run)

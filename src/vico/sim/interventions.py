@@ -20,12 +20,13 @@ from pydantic import Field, TypeAdapter, ValidationError
 from vico.errors import InputError, SchemaError
 from vico.io.files import write_bytes
 from vico.rules import EARSHOT, LONGEST_TEXT
+from vico.sim.recording.schema import INTERVENTIONS
 from vico.world.model import Record
 
 if TYPE_CHECKING:
     from vico.sim.simulation import Simulation
 
-FILE = "interventions.jsonl"
+FILE = INTERVENTIONS
 
 Action = dict[str, Any]
 _Name = Annotated[str, Field(min_length=1, max_length=200)]

@@ -28,10 +28,13 @@ CHECKPOINTS = "checkpoints"
 VIEWS = "views"
 #: What of a run's folder replays and films make beside the recording, unless they are told where to.
 REPLAY, DEMO_FILM = "replay.html", "demo.mp4"
+#: What was done to a run from outside; and where its page is, with the token that opens that.
+INTERVENTIONS, VIEWER_ADDRESS = "interventions.jsonl", "viewer.json"
 # The film as far as it was made where making it was interrupted.
 _DEMO_SO_FAR = "demo.partial.mp4"
-_NAMES = (MANIFEST, AGENTS, CAST, METRICS, COMMUNITY, SETUP, SETUP_SHAPES, SEGMENTS, CHECKPOINTS, VIEWS)
-RUN_FOLDER = FolderKind("run", MANIFEST, lambda _: (*_NAMES, REPLAY, DEMO_FILM, _DEMO_SO_FAR))
+_RECORDED = (MANIFEST, AGENTS, CAST, METRICS, COMMUNITY, SETUP, SETUP_SHAPES, SEGMENTS, CHECKPOINTS, VIEWS)
+_BESIDE = (REPLAY, DEMO_FILM, _DEMO_SO_FAR, INTERVENTIONS, VIEWER_ADDRESS)
+RUN_FOLDER = FolderKind("run", MANIFEST, lambda _: (*_RECORDED, *_BESIDE))
 
 
 class Column(NamedTuple):

@@ -21,6 +21,7 @@ from starlette.types import ASGIApp
 
 from vico.errors import OutputError
 from vico.io.files import json_bytes, read_json
+from vico.sim.recording.schema import VIEWER_ADDRESS
 from vico.viewer.server.gate import Gate
 from vico.viewer.server.hub import Hub
 from vico.viewer.server.routes import routes
@@ -30,7 +31,7 @@ from vico.viewer.sources.source import Source
 from vico.world.model import Record
 
 #: Where a run's folder keeps the server's port and token.
-ADDRESS = "viewer.json"
+ADDRESS = VIEWER_ADDRESS
 
 _STARTS_WITHIN, _ENDS_WITHIN = 20.0, 5.0
 
