@@ -223,3 +223,46 @@ def test_walls_cast_shadows_where_the_sun_does_not_come(page: BrowserPage) -> No
     assert found["up"] > 0.1
     assert found["behind"] > 0.6
     assert found["before"] < found["behind"] - 0.1
+
+
+def test_a_shape_stands_for_who_is_on_the_way(page: BrowserPage) -> None:
+    page.evaluate("vico.clock.seek(vico.clock.first), vico.page.setMode('orbit')")
+    page.wait_for("vico.view.people.drawn > 0 && !vico.view.people.pending", seconds=60)
+    shapes = page.evaluate("""(() => {
+      const { people, camera } = vico.view;
+      const known = people.known;
+      people.known = new Map();
+      people._fetch = () => {};
+      people.update(vico.state, camera);
+      const waiting = [people.standIns.count, people.drawn];
+      people.known = known;
+      delete people._fetch;
+      people.update(vico.state, camera);
+      return [...waiting, people.standIns.count, people.drawn];
+    })()""")
+    assert shapes[0] > 0
+    assert shapes == [shapes[0], 0, 0, shapes[0]]
+
+
+def test_lamps_of_rooms_light_whoever_is_in_one(page: BrowserPage) -> None:
+    lit = page.evaluate("""import('./page/person_material.js').then(({ lightBy }) => {
+      const { light, people } = vico.view;
+      const { material } = people.standIns;
+      return [true, false].map((indoors) => {
+        lightBy(light, material, indoors);
+        return material.uniforms.sky === light.sky;
+      });
+    })""")
+    assert lit == [False, True]
+
+
+def test_a_camera_that_follows_keeps_off_walls(page: BrowserPage) -> None:
+    distance = page.evaluate("""(() => {
+      const { cameras } = vico;
+      const { sight } = cameras;
+      cameras.sight = (from, way, reach) => Math.min(reach, 2);
+      const near = cameras._free(0, 7);
+      cameras.sight = sight;
+      return near;
+    })()""")
+    assert 1.5 < distance < 2.0

@@ -6,6 +6,11 @@ import { THREE } from "./three.js";
 export const MODES = ["orbit", "follow", "first", "bird"];
 
 const KEY_SPEED = 14;
+/** Metres between a camera and a wall, and to the side of its middle that are kept free. */
+const OFF_WALLS = 0.3;
+/** Where a camera that follows somebody looks for room, radians from behind them, and how much it wants, metres. */
+const TURNS = [0, 0.5, -0.5, 1, -1, 1.6, -1.6, 2.3, -2.3, 3.1];
+const [ROOMY, CRAMPED] = [2.2, 1.3];
 
 export class Cameras {
   /**
@@ -27,6 +32,8 @@ export class Cameras {
     this.distance = 160;
     /** Degrees across the shorter way up. */
     camera.fov = 55;
+    /** Radians from where a camera that follows would be to where there is room for it. */
+    this._aside = 0;
     /** Keys held down, by code. */
     this.down = new Set();
     this.enabled = true;
@@ -148,10 +155,9 @@ export class Cameras {
 
   /** Turn, and look down more steeply, until nothing stands between camera and target. */
   _findSight() {
-    const turns = [0, 0.5, -0.5, 1, -1, 1.6, -1.6, 2.3, -2.3, 3.1];
     for (const pitch of [this.pitch, 0.45, 0.65, 0.9]) {
       if (pitch < this.pitch) continue;
-      for (const turn of turns) {
+      for (const turn of TURNS) {
         if (this.sight(this.target, this._away(this.yaw + turn, pitch), this.distance) < this.distance) continue;
         this.yaw += turn;
         this.pitch = pitch;
@@ -164,6 +170,30 @@ export class Cameras {
   /** @param {number} yaw @param {number} pitch @returns {any} the way from the target to the camera */
   _away(yaw, pitch) {
     return new THREE.Vector3(Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch));
+  }
+
+  /**
+   * How far back a camera may go from its target without meeting a wall, with its middle or its sides.
+   * @param {number} yaw @param {number} distance metres wanted
+   */
+  _free(yaw, distance) {
+    const way = this._away(yaw, this.pitch);
+    const aside = new THREE.Vector3(-Math.sin(yaw), Math.cos(yaw), 0).multiplyScalar(OFF_WALLS);
+    const reaches = [-1, 0, 1].map((side) => {
+      const along = way.clone().multiplyScalar(distance).addScaledVector(aside, side);
+      const reach = along.length();
+      return (this.sight(this.target, along.normalize(), reach) / reach) * distance;
+    });
+    const free = Math.min(...reaches);
+    return free < distance ? Math.max(free - OFF_WALLS, 0.5) : distance;
+  }
+
+  /** Look for room indoors: not from behind whoever has a wall at their back. @param {number} behind yaw */
+  _findRoom(behind) {
+    if (this._free(behind + this._aside, ROOMY) >= CRAMPED) return;
+    const free = TURNS.map((turn) => this._free(behind + turn, ROOMY));
+    const most = Math.max(...free);
+    this._aside = TURNS[free.findIndex((reach) => reach > most - 0.2)];
   }
 
   /**
@@ -187,18 +217,21 @@ export class Cameras {
       );
       return;
     }
+    const isInside = Boolean(followed) && (followed?.room ?? -1) >= 0 && this.mode !== "bird";
     if (followed && this.mode === "follow") {
       const goal = new THREE.Vector3(followed.x, followed.y, followed.z + followed.height * 0.75);
       const share = this.target.distanceToSquared(goal) > 900 ? 1 : 1 - Math.exp(-8 * seconds);
       this.target.lerp(goal, share);
-      let turn = followed.yaw + (this._relative ?? Math.PI) - this.yaw;
+      const behind = followed.yaw + (this._relative ?? Math.PI);
+      if (isInside) this._findRoom(behind);
+      else this._aside = 0;
+      let turn = behind + this._aside - this.yaw;
       turn = Math.atan2(Math.sin(turn), Math.cos(turn));
       this.yaw += turn * (1 - Math.exp(-2.5 * seconds));
     }
-    const isInside = Boolean(followed) && (followed?.room ?? -1) >= 0 && this.mode !== "bird";
-    if (isInside && followed) this.target.set(followed.x, followed.y, followed.z + 1);
+    if (isInside && followed) this.target.set(followed.x, followed.y, followed.z + 1.2);
     let distance = isInside ? Math.min(this.distance, 11) : this.distance;
-    if (!isInside && this.mode === "follow") distance = Math.max(1.2, this.sight(this.target, this._away(this.yaw, this.pitch), distance) - 0.3);
+    if (this.mode === "follow") distance = this._free(this.yaw, distance);
     const pitch = isInside && this.mode === "orbit" ? Math.max(this.pitch, 0.55) : this.pitch;
     const flat = Math.cos(pitch) * distance;
     const z = this.target.z + Math.sin(pitch) * distance;

@@ -76,7 +76,7 @@ export class City {
     const all = () => [false, true].flatMap((both) => pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, false, both)));
     this.materials = all();
     this.instancedMaterials = all();
-    this.insideMaterials = [false, true].flatMap((both) => pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, true, both)));
+    this.insideMaterials = [false, true].flatMap((both) => pictures.map((/** @type {any} */ array, k) => cityMaterial(this.light, array, true, both, k === 0)));
     this._outlook(outlook, new THREE.CanvasTexture(picture));
     this._shapes(outlook);
     this._textures();
@@ -259,6 +259,12 @@ export class City {
     this.scene.add(group);
     this._roomFiles.set(wanted, group);
     this.arrived++;
+  }
+
+  /** Walls, floors and ceilings round the camera's target: those of the rooms one is in, or the far walls. */
+  get obstacles() {
+    if (this.inside < 0) return this.walls;
+    return (this._roomFiles.get(this.inside)?.children ?? []).filter((/** @type {any} */ mesh) => !mesh.isInstancedMesh);
   }
 
   /** Meshes to aim at: far walls, with the building of each vertex. */

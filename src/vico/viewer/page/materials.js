@@ -101,6 +101,9 @@ varying float vSnow;
 #ifdef CUTOUT
 flat varying float vHoles;
 #endif
+#ifdef PLAIN_LAYER
+uniform vec3 outdoors;
+#endif
 ${LIGHT_FRAGMENT}
 void main() {
   vec4 texel = texture(pictures, vec3(vUv, vLayer));
@@ -109,6 +112,11 @@ void main() {
   #endif
   vec3 base = mix(texel.rgb * vTint, SNOW, vSnow);
   vec3 colour = base * light();
+  #ifdef PLAIN_LAYER
+  // What is painted in a room and gives light is a window: it is as bright as the sky outside.
+  if (vGlow > 0.0 && vLayer > PLAIN_LAYER) colour *= mix(vec3(0.06, 0.07, 0.12), vec3(1.0), clamp((outdoors.b - 0.2) / 0.45, 0.0, 1.0));
+  else
+  #endif
   if (night > 0.0) colour = mix(colour, base * vec3(1.25, 1.05, 0.75) + vec3(0.16, 0.11, 0.04), vGlow * texel.a * night);
   gl_FragColor = vec4(mix(colour, fog, vFog), 1.0);
 }`;
@@ -199,11 +207,12 @@ export function setShaded(light, on) {
  * @param {{value: any}} pictures a texture array
  * @param {boolean} [inside] of rooms
  * @param {boolean} [both] whether it is seen from behind too
+ * @param {boolean} [white] whether its first layer is that of what has no texture
  */
-export function cityMaterial(light, pictures, inside = false, both = false) {
+export function cityMaterial(light, pictures, inside = false, both = false, white = false) {
   const options = {
-    uniforms: { ...lightUniforms(light), ...(inside ? insideLight() : {}), pictures },
-    defines: both ? { CUTOUT: 1 } : {},
+    uniforms: { ...lightUniforms(light), ...(inside ? { ...insideLight(), outdoors: light.sky } : {}), pictures },
+    defines: { ...(both ? { CUTOUT: 1 } : {}), ...(inside ? { PLAIN_LAYER: white ? "0.5" : "-0.5" } : {}) },
     vertexShader: CITY_VERTEX,
     fragmentShader: CITY_FRAGMENT,
     // Walls of rooms are seen from inside alone, so that one can look in from anywhere.

@@ -6,7 +6,7 @@ import { lampLight } from "./ground_meshes.js";
 import { HOLD, heldAt, holdUp } from "./holds.js";
 import { InHands } from "./in_hands.js";
 import { isGait, poseOf, strideOf } from "./motion.js";
-import { personMaterial } from "./person_material.js";
+import { lightBy, personMaterial, standInMaterial } from "./person_material.js";
 import { shadowAt, shadowMesh } from "./shadows.js";
 import { JOINTS, PersonFile, Pose, forwardKinematics, writeBones } from "./skeleton.js";
 
@@ -16,6 +16,8 @@ const WIDTH = 3 * JOINTS;
 const AT_ONCE = 3;
 const FARTHEST = 260;
 const TO_RADIANS = 1 / 10000;
+/** Metres that a stand-in is made for. */
+const STANDING = 1.7;
 
 export class People {
   /**
@@ -41,6 +43,10 @@ export class People {
     this.free = Array.from({ length: ROWS }, (_, k) => ROWS - 1 - k);
     this.fetching = 0;
     this.shadows = shadowMesh(scene, ROWS);
+    this.standIns = new THREE.InstancedMesh(new THREE.CapsuleGeometry(0.24, 1.22, 4, 12).rotateX(Math.PI / 2), standInMaterial(light), ROWS);
+    this.standIns.frustumCulled = false;
+    this.standIns.count = 0;
+    scene.add(this.standIns);
     this.pose = new Pose();
     /** @type {Map<number, {left: any, right: any}>} places of hands, for what is held */
     this.hands = new Map();
@@ -63,6 +69,7 @@ export class People {
     this._frustum.setFromProjectionMatrix(this._matrix.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
     for (const person of this.known.values()) if (person.group) person.group.visible = false;
     this.drawn = 0;
+    this.standIns.count = 0;
     this.hands.clear();
     this.inHands.begin();
     // Of everybody's bones those are handed on that are drawn now.
@@ -82,14 +89,26 @@ export class People {
       if ((room >= 0 ? (this.city.rooms?.rooms?.[room] ?? -2) : -1) !== this.city.inside) continue;
       const person = this.known.get(entity);
       if (!person) wanted.push([away, entity, row]);
-      else if (person.group && entity !== hidden) this._draw(person, between, row, body, away);
+      if (entity === hidden) continue;
+      if (person?.group) this._draw(person, between, row, body, away);
+      else this._standIn(entity, body);
     }
     this.pending = wanted.length + this.fetching;
     wanted.sort((a, b) => a[0] - b[0]);
     for (const [, entity] of wanted.slice(0, AT_ONCE - this.fetching)) this._fetch(entity);
     this.shadows.count = this.drawn;
     this.shadows.instanceMatrix.needsUpdate = true;
+    this.standIns.instanceMatrix.needsUpdate = true;
+    lightBy(this.light, this.standIns.material, this.city.inside >= 0);
     if (this.drawn) this.texture.needsUpdate = true;
+  }
+
+  /** Show where somebody is whose body is on its way. @param {number} entity @param {any} body */
+  _standIn(entity, body) {
+    if (this.standIns.count >= ROWS) return;
+    const height = this.source.cast.get(entity)?.size[2] || STANDING;
+    this._matrix.makeScale(1, 1, height / STANDING).setPosition(body.x, body.y, body.z + height / 2);
+    this.standIns.setMatrixAt(this.standIns.count++, this._matrix);
   }
 
   /** @param {any} person @param {any} between @param {number} row @param {any} body @param {number} away */
@@ -102,6 +121,7 @@ export class People {
     this.texture.addUpdateRange(4 * WIDTH * person.row, 4 * WIDTH);
     const { group } = person;
     group.visible = true;
+    lightBy(this.light, group.children[0].material, this.city.inside >= 0);
     group.children[0].material.uniforms.lamp.value = this.city.inside < 0 ? 0.75 * lampLight(this.city, body) : 0;
     const isNear = away < this.nearReach;
     group.children[0].visible = isNear;

@@ -1,7 +1,7 @@
 // How somebody on legs is painted: skinned by the bones of their row, in plain colours by vertex.
 
 import { THREE } from "./three.js";
-import { SHADE, lightUniforms, shadedMaterial } from "./materials.js";
+import { SHADE, insideLight, lightUniforms, shadedMaterial } from "./materials.js";
 
 const VERTEX = /* glsl */ `
 attribute vec4 colour, joints, weights;
@@ -44,6 +44,37 @@ uniform vec3 fog;
 varying vec3 vColour;
 varying float vFog;
 void main() { gl_FragColor = vec4(mix(vColour, fog, vFog), 1.0); }`;
+
+const STAND_IN_VERTEX = /* glsl */ `
+uniform vec3 sky, ground;
+varying vec3 vColour;
+void main() {
+  vec3 n = normalize(mat3(instanceMatrix) * normal);
+  vColour = vec3(0.72, 0.77, 0.82) * mix(ground, sky, n.z * 0.5 + 0.5);
+  gl_Position = projectionMatrix * viewMatrix * instanceMatrix * vec4(position, 1.0);
+}`;
+const STAND_IN_FRAGMENT = /* glsl */ `
+varying vec3 vColour;
+void main() { gl_FragColor = vec4(vColour, 0.6); }`;
+/** Lamps of rooms light whoever is in one, not the sun and the sky. */
+const INDOORS = insideLight();
+
+/**
+ * Light a material by the lamps of rooms, or by sun and sky.
+ * @param {import("./light.js").Light} light
+ * @param {any} material
+ * @param {boolean} indoors
+ */
+export function lightBy(light, material, indoors) {
+  const { uniforms } = material;
+  for (const key of /** @type {const} */ (["sun", "sunColour", "sky", "ground", "reach"])) uniforms[key] = indoors ? INDOORS[key] : light[key];
+}
+
+/** What stands for somebody whose body is on its way: a shape of their height. @param {import("./light.js").Light} light */
+export function standInMaterial(light) {
+  const { sun, sunColour, sky, ground, reach } = light;
+  return new THREE.ShaderMaterial({ uniforms: { sun, sunColour, sky, ground, reach }, vertexShader: STAND_IN_VERTEX, fragmentShader: STAND_IN_FRAGMENT, transparent: true });
+}
 
 /**
  * @param {import("./light.js").Light} light

@@ -299,7 +299,7 @@ class Play {
     let back = this.eyes ? -0.15 : this.you?.room >= 0 ? 1.8 : this.you?.kind === "person" ? 3.4 : 4.5;
     const Vector = camera.position.constructor;
     const from = new Vector(eye.x, eye.y, eye.z);
-    if (back > 0 && !(this.you?.room >= 0)) {
+    if (back > 0) {
       const way = new Vector(-ahead.x, -ahead.y, -ahead.z);
       back = Math.max(0.4, Math.min(back, cameras.sight(from, way, back) - 0.25));
     }

@@ -108,7 +108,7 @@ export class View {
   sight(from, way, reach) {
     this._ray.set(from, way);
     this._ray.far = reach;
-    return this._ray.intersectObjects(this.city.walls, false)[0]?.distance ?? reach;
+    return this._ray.intersectObjects(this.city.obstacles, false)[0]?.distance ?? reach;
   }
 
   /** @param {number} level */
