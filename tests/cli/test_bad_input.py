@@ -13,7 +13,7 @@ import pytest
 
 from command_line import vico
 from vico.cli.run import _MEANINGS
-from vico.community import read_community
+from vico.community import read_community, read_names
 from vico.worldgen.packaged import packaged_extract
 
 EMPTY_MAP = """<?xml version="1.0"?>
@@ -171,7 +171,7 @@ def test_people_of_another_world_are_refused(
     ("options", "says"),
     [
         (("--robots", "husky,frob", "--cars", 2), "robot 'frob' is not known; choose among"),
-        (("--observe", "resident_0,Bob", "--cars", 2), "nobody is called 'Bob'; there are resident_0"),
+        (("--observe", "resident_0,Bob", "--cars", 2), "run: --observe: nobody is called 'Bob'; there are "),
         (("--start", "25:00"), "no time of day"),
         (("--start", "8am"), "no time of day"),
         (("--steps", 0), "--steps 0"),
@@ -193,6 +193,23 @@ def test_a_run_that_cannot_be_is_refused(
 ) -> None:
     assert says in refused(capsys, "run", helsinki_path, helsinki_people, *options, "--out", tmp_path / "run")
     assert contents(tmp_path) == []
+
+
+def test_a_misspelt_person_is_told_before_the_world_is_read(
+    helsinki_people: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = read_names(helsinki_people)
+    agent, name = next(iter(names.items()))
+    head = tmp_path / "head.glb"
+    head.write_bytes(b"")
+    wrong, nowhere, out = f"{name[:-1]}x", tmp_path / "no_world_here", ("--out", tmp_path / "run")
+    meant = f"nobody is called {wrong!r}; did you mean {name} ({agent})?"
+    assert f"play: --as: {meant}" in refused(capsys, "play", nowhere, helsinki_people, "--as", wrong, *out)
+    for verb in ("run", "live"):
+        told = refused(capsys, verb, nowhere, helsinki_people, "--observe", f"resident_0,{wrong}", *out)
+        assert f"run: --observe: {meant}" in told
+    told = refused(capsys, "run", nowhere, helsinki_people, "--wear", f"{wrong}={head}", *out)
+    assert f"run: --wear: {meant}" in told
 
 
 @pytest.mark.parametrize(
@@ -353,7 +370,7 @@ def test_a_world_built_without_heights_says_that_it_is_flat(tmp_path: Path, caps
         (["rnu", "W", "P"], "no verb 'rnu'; did you mean vico run?"),
         (["world", "buidl"], "no verb 'world buidl'; did you mean vico world build?"),
         (["xyzzy"], "no verb 'xyzzy'; there are "),
-        (["run", "PEOPLE", "WORLD"], "is a community, and a world is wanted here; are two folders exchanged?"),
+        (["run", "PEOPLE", "WORLD"], "is a world, and a community is wanted here; are two folders exchanged?"),
         (["check", "community", "WORLD"], "is a world, and a community is wanted here"),
         (["world", "info", "FOLDER"], "is no finished world; make one with vico world build"),
         (["view", "WORLD"], "is a world, and a run is wanted here"),

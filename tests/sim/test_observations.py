@@ -129,6 +129,13 @@ def test_each_agent_sees_through_its_own_lens_what_was_asked_for() -> None:
     assert np.median(turned["flow"][..., 0]) == pytest.approx(2.0, abs=0.3)
 
 
+def test_views_are_asked_for_by_a_persons_name_too() -> None:
+    person = toy_city.community().residents[0]
+    config = SimConfig(observe=(person.name.lower(), "assistant_0"), assistants=1)
+    sim = Simulation(toy_city.world(), toy_city.community(), config)
+    assert [sim.state.names[k] for k in sim.seeing] == [person.id, "assistant_0"]
+
+
 def test_a_camera_of_nobody_is_refused() -> None:
     with pytest.raises(InputError, match="nobody is called 'robot_9'"):
         Simulation(toy_city.world(), None, SimConfig(cameras={"robot_9": {}}, assistants=1)).observe()

@@ -10,6 +10,7 @@ import pytest
 
 from command_line import vico
 from person_at_keys import Person, shown, stopped
+from vico.community import read_names
 from vico.io.files import read_json
 from vico.sim.recording import read_run
 from viewer_client import Stream, get_json, stream
@@ -77,7 +78,7 @@ def test_who_was_played_by_hand_is_played_on_by_hand(
 ) -> None:
     run = tmp_path / "run"
     words = [*FEW[2:], "--view", "none", "--out", run]
-    play = ["play", helsinki_path, helsinki_people, "--as", "resident_1", *words]
+    play = ["play", helsinki_path, helsinki_people, "--as", read_names(helsinki_people)["resident_1"], *words]
     with shown(*play) as page:
         with stream(page.url) as client:
             person = Person(client)

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 import toy_city
+from command_line import vico
 from vico.agents.schedule import followers_of
 from vico.assets.shapes import box, pose_matrix
+from vico.cli.film import followed
 from vico.errors import InputError, SchemaError
 from vico.io.files import write_json
 from vico.render import Scene
@@ -23,6 +25,7 @@ from vico.render.quality import PLAIN
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.recording import Run, read_run
+from vico.sim.recording.cast import CastMember
 from vico.sim.simulation import Simulation
 from vico.viewer.follow import FollowCamera
 from vico.viewer.repeat import RepeatedRun
@@ -137,6 +140,44 @@ def test_who_is_not_there_cannot_be_followed(run: Run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nobody is called 'Bob'"):
         write_run_film(tmp_path / "film.mp4", repeated(run), FilmSettings(follow="Bob"), first=0, last=2)
     assert not list(tmp_path.iterdir())
+
+
+def test_people_are_filmed_by_name(run: Run, tmp_path: Path) -> None:
+    agent, name = next((agent, name) for agent, name in run.names.items() if agent.startswith("resident"))
+    assert name != agent
+    assert followed(run, name.upper(), 0, run.last, option="film: --follow") == agent
+    by_name = FilmSettings(follow=name, width=64, height=64, samples=1, quality=PLAIN)
+    picture = still(repeated(run), by_name, 5)
+    assert np.array_equal(picture, still(repeated(run), replace(by_name, follow=agent), 5))
+
+
+def test_a_name_that_is_wrong_is_told_before_the_world_is_read(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = run.names["resident_0"]
+    wrong, out = f"{name[:-1]}x", tmp_path / "film.mp4"
+    shots = [{"start": "0", "stop": "2", "follow": wrong}]
+    write_json(tmp_path / "shots.json", {"schema_name": "vico.shots", "version": 1, "shots": shots})
+    for words, option in (
+        (("film", run.path, "--follow", wrong, "--out", out), "film: --follow"),
+        (("film", run.path, "--shots", tmp_path / "shots.json", "--out", out), "shot 1: follow"),
+        (("still", run.path, "--follow", wrong, "--out", tmp_path / "still.png"), "still: --follow"),
+    ):
+        assert vico(*words) == 2
+        told = capsys.readouterr().err
+        assert f"{option}: nobody is called {wrong!r}; did you mean {name} (resident_0)?" in " ".join(told.split())
+        assert "world" not in told
+
+
+def test_what_is_there_for_a_part_of_the_run_alone_is_told_with_its_times(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = CastMember(1, "car", "car 7", (4.0, 1.8, 1.5), None, None, ((2, 6), (9, None)))
+    monkeypatch.setattr(run, "cast", {1: car})
+    assert followed(run, "car 7", 2, 5, option="film: --follow") == "car 7"
+    assert followed(run, "car 7", 9, run.last, option="film: --follow") == "car 7"
+    with pytest.raises(InputError, match=r"car 7 is there from 07:59:42 to 07:59:45, 07:59:49 to 07:59:52 alone"):
+        followed(run, "car 7", 4, 10, option="film: --follow")
 
 
 def test_half_way_is_half_turned_and_as_large() -> None:

@@ -14,9 +14,10 @@ from vico.cli.live import city_of
 from vico.cli.output import Report, progress_bars
 from vico.cli.viewer_options import FilmOptions, StillOptions
 from vico.clock import seconds_of_day
-from vico.errors import InputError, MissingFileError, OutputExistsError
+from vico.errors import InputError, MissingFileError, OutputExistsError, some_of
 from vico.render.film import partial_film
 from vico.render.quality import RenderQuality
+from vico.sim.names import name_called
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, Span, write_film_of_shots, write_still
@@ -33,6 +34,9 @@ def film(options: FilmOptions) -> int:
         raise InputError("film: the page films one shot; leave out --headless, or --shots")
     _check(out, force=options.force)
     width, height = size_of(options.size)
+    recorded = read_run(options.run)
+    if options.headless:
+        return _film_of_page(options, recorded)
     settings = FilmSettings(
         follow=options.follow,
         view=options.view,
@@ -42,9 +46,6 @@ def film(options: FilmOptions) -> int:
         samples=options.samples,
         quality=RenderQuality.of(options.quality),
     )
-    recorded = read_run(options.run)
-    if options.headless:
-        return _film_of_page(options, recorded)
     spans = _spans(options, settings, recorded)
     with progress_bars() as report:
         report("reading the run", 0, 1)
@@ -57,36 +58,41 @@ def film(options: FilmOptions) -> int:
 
 
 def _spans(options: FilmOptions, settings: FilmSettings, run: Run) -> list[Span]:
-    """Return the shots that are asked for, and their steps."""
+    """Return the shots that are asked for, and their steps; whoever is followed is looked up."""
     if options.shots is None:
         first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
-        return [Span(settings, first, last)]
-    return [
-        Span(
-            replace(settings, follow=shot.follow, view=shot.view, angle=shot.angle, speed=shot.speed),
-            step_of(run, shot.start, default=0),
-            step_of(run, shot.stop, default=run.last),
-        )
-        for shot in read_shots(options.shots)
-    ]
+        follow = followed(run, options.follow, first, last, option="film: --follow")
+        return [Span(replace(settings, follow=follow), first, last)]
+    spans = []
+    for number, shot in enumerate(read_shots(options.shots), 1):
+        option = f"{options.shots}: shot {number}"
+        first, last = step_of(run, shot.start, default=0), step_of(run, shot.stop, default=run.last)
+        follow, angle = followed(run, shot.follow, first, last, option=f"{option}: follow"), shot.angle
+        if angle is not None and angle.ahead_of:
+            ahead_of = followed(run, angle.ahead_of, first, last, option=f"{option}: ahead_of")
+            angle = angle.model_copy(update={"ahead_of": ahead_of})
+        of_shot = replace(settings, follow=follow, view=shot.view, angle=angle, speed=shot.speed)
+        spans.append(Span(of_shot, first, last))
+    return spans
 
 
 def still(options: StillOptions) -> int:
     """Write a picture of a moment of a run."""
     _check(options.out, force=options.force)
     width, height = size_of(options.size)
+    recorded = read_run(options.run)
+    step = step_of(recorded, options.at, default=recorded.last)
+    follow = followed(recorded, options.follow, step, step, option="still: --follow")
+    if options.headless:
+        return _still_of_page(options, follow, step)
     settings = FilmSettings(
-        follow=options.follow,
+        follow=follow,
         view=options.view,
         width=width,
         height=height,
         samples=options.samples,
         quality=RenderQuality.of(options.quality),
     )
-    recorded = read_run(options.run)
-    if options.headless:
-        return _still_of_page(options, recorded)
-    step = step_of(recorded, options.at, default=recorded.last)
     write_still(
         options.out, RepeatedRun.of_folders(recorded, world=options.world, community=options.community), settings, step
     )
@@ -99,8 +105,9 @@ def _film_of_page(options: FilmOptions, run: Run) -> int:
     from vico.viewer.headless import shot_of, write_film
 
     width, height = size_of(options.size)
-    shot = shot_of(options.follow, options.view, width=width, height=height)
     first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
+    follow = followed(run, options.follow, first, last, option="film: --follow")
+    shot = shot_of(follow, options.view, width=width, height=height)
     with (
         _page_of(options.run, options.world) as address,
         progress_bars() as report,
@@ -111,13 +118,12 @@ def _film_of_page(options: FilmOptions, run: Run) -> int:
     return 0
 
 
-def _still_of_page(options: StillOptions, run: Run) -> int:
+def _still_of_page(options: StillOptions, follow: str, step: int) -> int:
     """Take a picture of what the page draws of a run."""
     from vico.viewer.headless import shot_of, write_still
 
     width, height = size_of(options.size)
-    shot = shot_of(options.follow, options.view, width=width, height=height)
-    step = step_of(run, options.at, default=run.last)
+    shot = shot_of(follow, options.view, width=width, height=height)
     with _page_of(options.run, options.world) as address:
         write_still(address, options.out, shot, step)
     print(options.out)
@@ -204,6 +210,27 @@ def step_of(run: Run, text: str, *, default: int) -> int:
     if not times[0] - 1e-6 <= second <= times[-1] + 1e-6:
         raise InputError(f"{text}: the run lasts from {_clock(times[0])} to {_clock(times[-1])}")
     return int(np.searchsorted(times, second - 1e-6))
+
+
+def followed(run: Run, text: str, first: int, last: int, *, option: str) -> str:
+    """Return the simulation's name of somebody or something that is there from a step to another.
+
+    Parameters
+    ----------
+    text
+        A name as `vico.sim.names.name_called` takes it.
+
+    Raises
+    ------
+    InputError
+        If nobody is called so, or is not there all the time.
+    """
+    name = name_called(text, run.names, option=option)
+    stays = [stay for one in run.cast.values() if name in (one.agent, one.name) for stay in one.intervals]
+    if not any(begin <= first and (until is None or last < until) for begin, until in stays):
+        there = [f"{_clock(run.times[a])} to {_clock(run.times[run.last if b is None else b - 1])}" for a, b in stays]
+        raise InputError(f"{option}: {name} is there from {some_of(there)} alone; give times in between")
+    return name
 
 
 def _clock(second: float) -> str:

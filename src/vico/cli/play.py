@@ -9,9 +9,11 @@ from typing import Literal
 from vico.cli.evaluation_options import AssistantOptions, EvaluationOptions
 from vico.cli.viewer_options import PlayOptions
 from vico.errors import InputError
+from vico.sim.names import name_called
 from vico.viewer.server import require_server
 
-_AGENT = re.compile(r"(resident|assistant|robot)_\d{1,4}")
+# There are as many assistants as it takes for the one who is played.
+_ASSISTANT = re.compile(r"assistant_\d{1,4}")
 
 
 def play(options: PlayOptions) -> int:
@@ -34,14 +36,14 @@ def play(options: PlayOptions) -> int:
 
 def _freely(options: PlayOptions, community: Path) -> int:
     from vico.agents.human import PERIOD, HumanAgent, Mailbox
-    from vico.cli.run import Job
+    from vico.cli.run import Job, names_of
     from vico.viewer.play import PlayedAgent
 
-    has_robots = options.robots not in ("", "none")
-    played = options.played or ("robot_0" if has_robots else "assistant_0")
-    if not _AGENT.fullmatch(played):
-        raise InputError(f"play: --as {played!r}; it has to be resident_N, assistant_N or robot_N")
-    human = HumanAgent(Mailbox(), steer=_steering(options, played))
+    robots = [name.strip() for name in options.robots.split(",") if name.strip() not in ("", "none")]
+    played = options.played or ("robot_0" if robots else "assistant_0")
+    if not _ASSISTANT.fullmatch(played):
+        played = name_called(played, names_of(community, robots, assistants=1), option="play: --as")
+    human = HumanAgent(Mailbox(), steer=_steering(robots, played))
     given = options.run_options(played, round(options.seconds / PERIOD))
     assert given.out is not None
     Job.of(given, options.world, community, given.out, played=PlayedAgent(played, human)).done()
@@ -49,18 +51,14 @@ def _freely(options: PlayOptions, community: Path) -> int:
     return 0
 
 
-def _steering(options: PlayOptions, played: str):  # type: ignore[no-untyped-def]
+def _steering(robots: list[str], played: str):  # type: ignore[no-untyped-def]
     """Return what keys and sticks mean to who is played."""
     from vico.agents.human import walk
     from vico.viewer.teleoperation import steering_of
 
     if not played.startswith("robot_"):
         return walk
-    names = [name.strip() for name in options.robots.split(",") if name.strip() not in ("", "none")]
-    number = int(played.removeprefix("robot_"))
-    if number >= len(names):
-        raise InputError(f"play: there is no {played}; say which robots there are, for example --robots husky,drone")
-    return steering_of(names[number])
+    return steering_of(robots[int(played.removeprefix("robot_"))])
 
 
 def _task(options: PlayOptions, category: Literal["carry", "delivery", "search"]) -> int:

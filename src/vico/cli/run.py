@@ -22,7 +22,7 @@ from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.clock import seconds_of_day
-from vico.community import Community, read_community
+from vico.community import Community, read_community, read_names
 from vico.errors import InputError, OutputExistsError, SchemaError
 from vico.io.files import read_json
 from vico.io.folders import check_replaceable, remove
@@ -37,6 +37,7 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun, go_on_from
 from vico.sim.config import SimConfig
 from vico.sim.interventions import Line, read_interventions
+from vico.sim.names import name_called
 from vico.sim.recorder import Recorder
 from vico.sim.recording.checkpoints import checkpoint_steps
 from vico.sim.recording.manifest import read_manifest
@@ -203,6 +204,11 @@ class Job:
             raise InputError(f"run: --{option} is for the page of a run that is shown; add --live, or leave it out")
         for name in _names(options.robots):
             robot_kind(name)
+        # A name that is not right is said before a large world is read.
+        names = names_of(community, _names(options.robots), options.assistants)
+        asked = () if options.observe == "all" else _names(options.observe)
+        observe = tuple(name_called(name, names, option="run: --observe") for name in asked)
+        worn = _worn(options.wear, names)
         found = None if options.force else _cut_short(out)
         kind = RUN_FOLDER if options.force else None
         check_output(out, world, community, force=options.force or found is not None, kind=kind)
@@ -226,13 +232,13 @@ class Job:
             pedestrians=_TRAFFIC if options.pedestrians is None else options.pedestrians,
             junctions=options.junctions,
             traffic=named_or_read(options.traffic),
-            observe=None if options.observe == "all" else _names(options.observe),
+            observe=None if options.observe == "all" else observe,
             outputs=_names(options.outputs),
             quality=options.quality,
             renderer=options.renderer,
             memory=options.memory,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
-            worn=_worn(options.wear),
+            worn=worn,
             periods={} if played is None else {played.agent: PERIOD},
         )
         people = read_community(community, place)
@@ -549,14 +555,24 @@ def _without_sources(command: Any) -> Any:
     return {n: v for n, v in command.items() if n not in ("world", "community")} if isinstance(command, dict) else None
 
 
-def _worn(text: str) -> dict[str, str]:
+def names_of(community: Path, robots: Sequence[str], assistants: int) -> dict[str, str]:
+    """Return what all who are to act are called, by agent's name: people, assistants, and robots by their models."""
+    beside = {f"assistant_{i}": f"assistant {i}" for i in range(assistants)}
+    return (
+        read_names(community)
+        | beside
+        | {f"robot_{k}": f"{model.partition(':')[0]} {k}" for k, model in enumerate(robots)}
+    )
+
+
+def _worn(text: str, names: Mapping[str, str]) -> dict[str, str]:
     """Return files by agent's name, of ``NAME=FILE,...``."""
     found = {}
     for entry in _names(text):
         name, is_pair, path = entry.partition("=")
         if not is_pair or not Path(path).is_file():
             raise InputError(f"run: --wear {entry!r}: give NAME=FILE.glb, a file that is there")
-        found[name] = str(Path(path).resolve())
+        found[name_called(name, names, option="run: --wear")] = str(Path(path).resolve())
     return found
 
 

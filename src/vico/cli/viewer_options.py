@@ -104,7 +104,8 @@ class PlayOptions:
     community
         Community folder, made for that world; tasks have people of their own and take none.
     played
-        Who you are: resident_3, assistant_0 or robot_0. Without it assistant_0, or robot_0 where robots are given.
+        Who you are: a resident by name ("Ann Lee", or Ann), resident_3, assistant_0 or robot_0. Without it
+        assistant_0, or robot_0 where robots are given.
     task
         A task for the assistant, which is judged at the end.
     advanced
@@ -192,7 +193,7 @@ class FilmOptions:
     run
         Run folder.
     follow
-        Name of the agent, thing or vehicle that the camera follows.
+        Whom the camera follows: a person by name ("Ann Lee", or Ann), resident_3, a robot, a thing, or "car 3".
     shots
         Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
     out
@@ -247,7 +248,7 @@ class StillOptions:
     run
         Run folder.
     follow
-        Name of the agent in its middle.
+        Who is in its middle, as for `vico film`: "Ann Lee", resident_3, "car 3".
     at
         HH:MM:SS, or seconds since the run began; without it, its end.
     out

@@ -3,7 +3,7 @@
 from vico.community.author import Author, build_community, procedural_author
 from vico.community.days import date_of
 from vico.community.findings import CommunityFinding
-from vico.community.folder import digest_of, read_community, read_manifest, world_of, write_community
+from vico.community.folder import digest_of, read_community, read_manifest, read_names, world_of, write_community
 from vico.community.model import (
     ActivityTag,
     Community,
@@ -45,6 +45,7 @@ __all__ = [
     "procedural_author",
     "read_community",
     "read_manifest",
+    "read_names",
     "with_tags",
     "world_of",
     "write_community",

@@ -179,6 +179,18 @@ def read_community(path: Path, world: World | None = None) -> Community:
     return with_tags(community, () if world is None else world.places)
 
 
+def read_names(path: Path) -> dict[str, str]:
+    """Read what residents of a community are called, by id, without the rest of it.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        As `read_community`.
+    """
+    path = Path(path)
+    return {resident.id: resident.name for resident in _records(path / "residents.json", Resident, read_manifest(path))}
+
+
 def world_of(path: Path) -> Path | None:
     """Folder of the world that a community was made for, if it is still where it was."""
     origin = Path(path) / "origin.json"

@@ -31,6 +31,7 @@ from vico.io.stores import FolderStore
 from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
+from vico.sim.names import name_called
 from vico.sim.recording import Run, read_run
 from vico.world.folder import is_world, read_world
 from vico.world.world import World
@@ -186,16 +187,12 @@ def chosen_agents(run: Run, contents: Contents) -> list[str]:
         If there is nobody of a name, or nobody at all.
     """
     known = {agent["name"]: agent["kind"] for agent in run.agents}
+    names = {name: called for name, called in run.names.items() if name in known}
     if contents.agents:
         found: list[str] = []
         for asked in contents.agents:
-            mine = [name for name, kind in known.items() if kind == _KINDS.get(asked)] or [asked]
-            if mine[0] not in known:
-                raise InputError(
-                    f"{run.path}: nobody is called {asked!r}; there are {', '.join(known)}, or residents, assistants, "
-                    "robots"
-                )
-            found += mine
+            of_kind = [name for name, kind in known.items() if kind == _KINDS.get(asked)]
+            found += of_kind or [name_called(asked, names, option=f"{run.path}: agents")]
         return list(dict.fromkeys(found))
     seen = [name for name in known if name in run.views] if contents.outputs else list(known)
     assistants = [name for name, kind in known.items() if kind == "assistant"]

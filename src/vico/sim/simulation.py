@@ -23,6 +23,7 @@ from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
 from vico.sim.lazy import ByAgent, Observations
 from vico.sim.metrics import Metrics, StopWatch
+from vico.sim.names import name_called
 from vico.sim.observations import ObservationRenderer, observe
 from vico.sim.overlaps import OverlapCheck
 from vico.sim.periods import TICKS_PER_SECOND, ControlPeriods, ticks_of
@@ -396,10 +397,14 @@ def _seeing(state: SimulationState, observe: Sequence[str] | None) -> list[int]:
     )
     if observe is None:
         return [i for i, name in enumerate(names) if name not in blind]
-    asked = [name for name in observe if name in blind]
-    if asked:
-        raise InputError(f"observe: {asked[0]} has no camera; leave it out")
-    return _indices(observe, names)
+    people = state.people
+    called = dict(zip(names, names, strict=True))
+    called |= {name: state.entities[k]["name"] for k, name in zip(people.entity.tolist(), people.names, strict=True)}
+    asked = [name_called(name, called, option="observe") for name in observe]
+    for name in asked:
+        if name in blind:
+            raise InputError(f"observe: {name} has no camera; leave it out")
+    return _indices(asked, names)
 
 
 def _indices(observe: Sequence[str], names: list[str]) -> list[int]:

@@ -31,7 +31,7 @@ class Shot:
     Attributes
     ----------
     agent
-        Name of who is followed; empty for nobody.
+        Who is followed: name of an agent or a person, or of something in traffic, such as ``car 3``; empty for nobody.
     mode
         ``orbit`` (round a point), ``follow`` (behind somebody), ``first`` (through their eyes) or ``bird``.
     target
@@ -67,7 +67,9 @@ class Stage:
     def __init__(self, page: BrowserPage) -> None:
         self._page = page
         run = page.evaluate("vico.source.run")
-        self._agents = {agent["name"]: agent["entity"] for agent in run["agents"]}
+        cast = page.evaluate("Array.from(vico.source.cast.values())")
+        self._entities = {member["name"]: member["entity"] for member in cast}
+        self._entities |= {agent["name"]: agent["entity"] for agent in run["agents"]}
         self.last = int(run["run"]["last"])
 
     def time_of(self, step: int) -> float:
@@ -103,9 +105,9 @@ class Stage:
     def _entity(self, agent: str) -> int:
         if not agent:
             return 0
-        if agent not in self._agents:
-            raise InputError(f"headless: nobody is called {agent!r}; there are {some_of(list(self._agents))}")
-        return int(self._agents[agent])
+        if agent not in self._entities:
+            raise InputError(f"headless: nobody is called {agent!r}; there are {some_of(list(self._entities))}")
+        return int(self._entities[agent])
 
 
 # Views of `vico.viewer.follow.VIEWS`: mode, degrees to the left of the face, degrees up, metres.

@@ -183,7 +183,6 @@ def _target(state: SimulationState, settings: FilmSettings) -> Target:
 
 
 def _frames(repeated: RepeatedRun, settings: FilmSettings, first: int, last: int) -> Iterator[NDArray[np.uint8]]:
-    _target(repeated.sim.state, settings)
     repeated.go_to(first)
     look = _watcher(repeated, settings)
     camera = FollowCamera(settings.view, settings.width, settings.height, settings.angle)

@@ -55,7 +55,7 @@ class Target(NamedTuple):
 
 
 def target_of(state: SimulationState, name: str) -> Target:
-    """Return how an agent stands, a thing lies, or a vehicle or passer-by is, by the cast's name for it (``car 3``).
+    """Return how somebody stands, a thing lies, or a vehicle is: ``resident_3``, ``Ann Lee``, ``red mug``, ``car 3``.
 
     Raises
     ------
@@ -64,6 +64,8 @@ def target_of(state: SimulationState, name: str) -> Target:
     """
     if name in state.objects.names:
         return _target_of_thing(state.objects, state.objects.names.index(name))
+    known = state.entities.values()
+    name = next((one["agent"] for one in known if one["name"] == name and "agent" in one), name)
     if name not in state.names:
         return _target_in_traffic(state, name)
     i = state.names.index(name)

@@ -194,6 +194,11 @@ class Run:
         """Everybody and everything that was there at some step, by entity."""
         return read_cast(self.path, self.last)
 
+    @property
+    def names(self) -> dict[str, str]:
+        """What everybody and everything that was there is called, by the name a simulation has for it."""
+        return {member.agent or member.name: member.name for member in self.cast.values()}
+
     @cached_property
     def metrics(self) -> dict[str, Any]:
         """Counts and seconds; empty if the run was cut short before they were written."""
