@@ -43,8 +43,8 @@ class Toy:
     methods: Sequence[str] = (*SKILL, "llm")
 
     def metrics(self, category: str) -> Sequence[Metric]:
-        rate = Metric("SR", "SR", "%", "higher", 0.0, 100.0)
-        time = Metric("Ts", "Ts", "s", "lower", 0.0, LIMIT, digits=0)
+        rate = Metric("SR", "SR", "%", "higher", 0.0, 100.0, about="episodes that were done")
+        time = Metric("Ts", "Ts", "s", "lower", 0.0, LIMIT, digits=0, about="steps until they were")
         return (rate, time) if category == "fetch" else (rate,)
 
     def causes(self, category: str) -> Sequence[str]:

@@ -125,6 +125,8 @@ def test_the_page_has_every_table_and_marks_what_was_not_played() -> None:
     assert "| good | 100.0 (100.0 to 100.0) | 80 (80 to 80) | 2 | 1 | 4 of 4 | 6 | 0.50 | 0 |" in lines
     assert "| good | **+100.0 (+100.0 to +100.0)** | **-20 (-20 to -20)** | 2 |" in lines
     assert "| bad | 4 | 4 |" in lines
+    assert "- SR: episodes that were done (more is better)" in lines
+    assert "- Ts: steps until they were (less is better)" in lines
     assert "- fetch, a, seed 0, bad: assistant_0 crashed at step 3 (no plan); 7 times in the episode" in lines
     assert "- fetch, b, seed 1, good: 2 of 9 places | can be reached" in lines
     assert "as published: A paper" in page

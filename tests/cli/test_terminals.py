@@ -45,6 +45,13 @@ def test_letters_that_a_terminal_cannot_show_are_replaced(tmp_path: Path) -> Non
     assert "??d? ?? ?" in done.stdout
 
 
+def test_a_table_with_words_shows_a_long_value_whole_below_it(tmp_path: Path) -> None:
+    rows, words = {"steps": 5, "hash": "0123456789abcdef" * 4}, {"steps": "that were made", "hash": "of the state"}
+    done = told(printing(tmp_path, f"print_table('t', {rows}, {words})"), COLUMNS="60")
+    assert f"hash: {rows['hash']} (of the state)" in done.stdout.splitlines()
+    assert "│ steps │ 5 │ that were made │" in done.stdout
+
+
 def test_json_in_seven_bits_has_whole_names(tmp_path: Path) -> None:
     done = told(printing(tmp_path, f"print_json(dict(name='{NAME}'))"), **SEVEN_BITS)
     assert done.stdout.isascii()

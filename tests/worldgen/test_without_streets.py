@@ -84,7 +84,9 @@ def test_people_live_there_and_cars_are_refused_in_one_sentence(
     write_community(build_community(world, residents=2), tmp_path / "people", world=folder)
     common = ("run", folder, tmp_path / "people", "--steps", 2, "--observe", "none", "--pedestrians", 0)
     assert vico(*common, "--cars", 5, "--out", tmp_path / "cars") == 2
-    assert "the world has no street for cars; use --cars 0" in capsys.readouterr().err
+    assert (
+        "the world has no street for cars; take a larger world, or ask for 0 cars: --cars 0" in capsys.readouterr().err
+    )
     assert vico(*common, "--cars", 0, "--out", tmp_path / "none") == 0
     capsys.readouterr()
     # Nobody asked for cars: there are as many as there is room for.

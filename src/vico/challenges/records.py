@@ -41,6 +41,8 @@ class Metric:
         Bounds that no mean and no interval leaves.
     digits
         After the point.
+    about
+        The column in words, below the table.
     """
 
     key: str
@@ -50,6 +52,7 @@ class Metric:
     low: float = float("-inf")
     high: float = float("inf")
     digits: int = 1
+    about: str = field(kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ def bench(what: str, *, table: Path | None = None, json: bool = False, options: 
         (measured,) = tables_of(speeds)
         print_json({"benchmark": what, "tables": tables_of(text), "machine": measured["rows"]})
     else:
-        print(f"{text}\n{speeds}")
+        print(f"{text}\nSeconds and megabytes: less is better. Times real time: more is better.\n\n{speeds}")
     return 0
 
 

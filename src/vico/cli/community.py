@@ -33,6 +33,16 @@ _LONGEST_ANSWER = 4096
 _MOST_TROUBLES = 8
 # So many residents are shown in a table.
 _TOLD = 40
+# What is told of a community, in words.
+_MEANINGS = {
+    "digest": "the same for the same community",
+    "author": "procedural: by rules; or the language model that wrote it",
+    "date": "of the first day that is planned",
+    "days": "that are planned; a run begins with one of them",
+    "groups": "circles of people with something in common, such as a choir",
+    "relations": "pairs of people who know each other, and how",
+    "seconds": "that it took to build",
+}
 
 
 def build(options: CommunityBuildOptions) -> int:
@@ -65,7 +75,7 @@ def build(options: CommunityBuildOptions) -> int:
     if options.json:
         print_json({**facts, "people": people, **({} if told is None else {"llm": told})})
         return 0
-    print_table("Community", facts)
+    print_table("Community", facts, _MEANINGS)
     rows = {
         str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
         for p in people[:_TOLD]

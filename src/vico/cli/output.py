@@ -31,6 +31,8 @@ Report = Callable[[str, int, int], None]
 
 # The longest time without a line of a stage that is going on, seconds.
 _SILENCE = 30.0
+# Letters of the longest value that stands in a table beside words.
+_SHORT = 20
 
 
 @contextmanager
@@ -147,14 +149,29 @@ def print_json(content: Any) -> None:
 
 
 def print_table(title: str, rows: Mapping[str, Any], words: Mapping[str, str] | None = None) -> None:
-    """Print names and values as a table on stdout, with a third column where `words` say what they mean."""
+    """Print names and values as a table on stdout.
+
+    Parameters
+    ----------
+    words
+        What they mean, by name: a third column. Long values, such as hashes, are told below then, and whole.
+    """
     table = Table(title=title, title_justify="left", show_header=False)
     for _ in range(0 if words is None else 2):
-        table.add_column(no_wrap=True)  # a hash that is cut is of no use: the words give way
+        table.add_column(no_wrap=True)
+    below = []
     for name, value in rows.items():
         shown = f"{value:,.2f}" if isinstance(value, float) else f"{value}"
-        table.add_row(name, shown, *([] if words is None else [words.get(name, "")]))
-    Console().print(table)
+        if words is None:
+            table.add_row(name, shown)
+        elif len(shown) <= _SHORT:
+            table.add_row(name, shown, words.get(name, ""))
+        else:
+            below.append(f"{name}: {shown}" + (f" ({words[name]})" if name in words else ""))
+    console = Console()
+    console.print(table)
+    for line in below:
+        console.print(line, soft_wrap=True, markup=False, highlight=False)
 
 
 def print_export(out: Path, to: str, counts: Mapping[str, int], *, json: bool) -> None:

@@ -348,7 +348,7 @@ class Job:
                 break
             except NoRoomError as error:
                 if getattr(self.options, error.kind) is not None:
-                    raise
+                    raise InputError(f"{error}: --{error.kind} {error.room}") from None
                 # Nobody asked for so many: a small window has as many as it has room for.
                 print(f"{self.options.world}: there is room for {error.room} {error.kind}", file=sys.stderr)
                 room: dict[str, Any] = {error.kind: error.room}

@@ -26,6 +26,30 @@ from vico.worldgen.request import BuildOptions
 from vico.worldgen.sources import Sources
 
 _DEFAULTS = BuildOptions()
+_DROPPED = "features of the map left out; manifest.json says which and why"
+# What `world info` tells, in words.
+_MEANINGS = {
+    "half": "metres from the middle to each side",
+    "seed": "decides what the map leaves open",
+    "digest": "the same for the same world",
+    "accessible_buildings": "buildings that people can go into",
+    "amenity_objects": "lamps, benches, bins and the like in the streets",
+    "barrier_pieces": "pieces of fences, hedges and walls",
+    "collision_faces": "triangles of walls and roofs that bodies can touch",
+    "crossings": "where people cross streets",
+    "entrances": "street doors",
+    "indoor_objects": "furniture and things in rooms",
+    "junctions": "where streets meet",
+    "kinds": "kinds of objects out of doors",
+    "natural_objects": "trees, bushes and rocks",
+    "places": "flats, shops, offices: where people can be",
+    "roads": "stretches of street between junctions",
+    "transit": "stops and lines of buses and trams, and stations of bicycles",
+    "walkways": "stretches of sidewalk, path and crossing",
+    "watertight_buildings": "buildings whose surface is closed; all should be",
+    "megabytes": "on disk",
+    "seconds": "that it took to build; --json says how many each stage",
+}
 
 
 def build(
@@ -234,9 +258,11 @@ def info(path: Path, *, json: bool = False) -> int:
     rows |= {f"places: {kind}": number for kind, number in content["places_by_type"].items()}
     for what in ("footprint", "height", "roof"):
         rows |= {f"{what} from {name}": number for name, number in content.get(f"{what}_from", {}).items()}
-    rows |= {f"seconds: {stage}": value for stage, value in content["seconds"].items()}
+    rows |= {f"dropped: {stage}": number for stage, number in content["dropped"].items()}
+    rows |= {"seconds": content["seconds"]["total"]}
     rows |= {f"source: {source['name']}": source["attribution"] for source in content["sources"]}
-    print_table(f"world {path}", rows)
+    dropped = {f"dropped: {stage}": _DROPPED for stage in list(content["dropped"])[:1]}
+    print_table(f"world {path}", rows, _MEANINGS | dropped)
     return 0
 
 

@@ -15,10 +15,18 @@ from vico.challenges.assistant.thresholds import STEPS, SUBTASKS
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.errors import InputError
 
-_SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0)
-_TS = Metric("Ts", "Ts", "steps", "lower", 0.0)
-_HR = Metric("HR", "HR", "%", "higher", 0.0, 100.0)
-_HR_ESCORT = Metric("HR_escort", "HR from hand-over to arrival", "%", "higher", 0.0, 100.0)
+_SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0, about="success rate: subtasks that were done")
+_TS = Metric(
+    "Ts", "Ts", "steps", "lower", 0.0, about="step at which the last subtask was done; the limit if not all were"
+)
+_HR = Metric(
+    "HR", "HR", "%", "higher", 0.0, 100.0,
+    about="human following rate: steps within 5 m of a person who walks home, of all steps of the limit",
+)  # fmt: skip
+_HR_ESCORT = Metric(
+    "HR_escort", "HR from hand-over to arrival", "%", "higher", 0.0, 100.0,
+    about="the same, of the steps from hand-over to arrival",
+)  # fmt: skip
 
 
 class AssistantChallenge:

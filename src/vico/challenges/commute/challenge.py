@@ -19,10 +19,10 @@ from vico.world.world import World
 CATEGORY = "commute"
 
 _METRICS = (
-    Metric("late_rate", "Late Rate", "%", "lower", 0.0, 100.0, 1),
-    Metric("travel_time", "Travel Time", "min", "lower", 0.0, digits=2),
-    Metric("price", "Price", "a day", "lower", 0.0, digits=2),
-    Metric("walk_distance", "Walk Distance", "km", "lower", 0.0, digits=2),
+    Metric("late_rate", "Late Rate", "%", "lower", 0.0, 100.0, about="commutes that were late or missed"),
+    Metric("travel_time", "Travel Time", "min", "lower", 0.0, digits=2, about="minutes a day from leaving to arrival"),
+    Metric("price", "Price", "a day", "lower", 0.0, digits=2, about="fares, rents, and fees for bicycles left about"),
+    Metric("walk_distance", "Walk Distance", "km", "lower", 0.0, digits=2, about="kilometres a day on foot"),
 )
 
 

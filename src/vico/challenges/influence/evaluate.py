@@ -141,17 +141,25 @@ def _cause(verdict: Verdict, member: str, *, supported: bool) -> str:
 def columns(variants: Sequence[str]) -> list[Metric]:
     """Return the columns of a table."""
 
-    def share(key: str, label: str) -> Metric:
-        return Metric(key, label, "%", "higher", 0.0, 100.0)
+    def share(key: str, label: str, about: str) -> Metric:
+        return Metric(key, label, "%", "higher", 0.0, 100.0, about=about)
+
+    def of_visits(ending: Ending) -> Metric:
+        about = f"visits that ended so: {ending}"
+        return Metric(_key(ending), ending.capitalize(), "a day", "lower", 0.0, about=about)
 
     return [
-        share("win", "Win"),
-        share("conv", "Conv"),
-        *(share(f"win_{name}", f"Win, {name}") for name in variants),
-        *(share(f"conv_{name}", f"Conv, {name}") for name in variants),
-        Metric("talks", "Talks", "a day", "higher", 0.0),
-        Metric("visits", "Visits", "a day", "higher", 0.0),
-        *(Metric(_key(ending), ending.capitalize(), "a day", "lower", 0.0) for ending in FAILURES),
+        share("win", "Win", "members who rank the agent first at the end of the day"),
+        share(
+            "conv",
+            "Conv",
+            "conversions: of those who first ranked the rival first, who rank the agent first at the end",
+        ),
+        *(share(f"win_{name}", f"Win, {name}", f"the same, by the opinion model {name}") for name in variants),
+        *(share(f"conv_{name}", f"Conv, {name}", f"the same, by the opinion model {name}") for name in variants),
+        Metric("talks", "Talks", "a day", "higher", 0.0, about="conversations in which a member was spoken with"),
+        Metric("visits", "Visits", "a day", "higher", 0.0, about="times that the agent went to see a member"),
+        *map(of_visits, FAILURES),
     ]
 
 

@@ -12,11 +12,14 @@ from vico.challenges.robot.model import CATEGORIES, Category, RobotTask
 from vico.challenges.robot.policy_files import LEARNED
 from vico.challenges.robot.thresholds import PERIOD, RESIDENTS, STEPS
 
-_SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0)
-_TS = Metric("Ts", "Ts", "s", "lower", 0.0)
-_TOGETHER = Metric("together", "With the person on the way home", "%", "higher", 0.0, 100.0)
-_FORCE = Metric("force", "Grip on the weaker finger", "N", "higher", 0.0)
-_DROPS = Metric("drops", "Drops", "an episode", "lower", 0.0, digits=2)
+_SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0, about="success rate: episodes in which the thing was brought")
+_TS = Metric("Ts", "Ts", "s", "lower", 0.0, about="seconds until it was; the limit where it was not")
+_TOGETHER = Metric(
+    "together", "With the person on the way home", "%", "higher", 0.0, 100.0,
+    about="share of the person's way home on which a robot was near",
+)  # fmt: skip
+_FORCE = Metric("force", "Grip on the weaker finger", "N", "higher", 0.0, about="force that held the thing")
+_DROPS = Metric("drops", "Drops", "an episode", "lower", 0.0, digits=2, about="times that the thing was let fall")
 # Robots act 10 to 100 times a second.
 _PERIODS = (0.01, 0.1)
 

@@ -13,6 +13,13 @@ from vico.version import __version__
 
 _NOTHING = "-"
 _ARROWS = {"higher": "↑", "lower": "↓"}
+_BETTER = {"higher": "more is better", "lower": "less is better"}
+# Columns of every challenge, in words.
+_COUNTED = {
+    "Done": "parts of episodes that were done, of all",
+    "Tokens, Cost": "spent on language models",
+    "Faults": "actions that could not be taken, or came too late; 0 is best",
+}
 
 
 def results_page(
@@ -52,7 +59,7 @@ def category_section(
     metrics = challenge.metrics(category)
     rows = [row for row in summary.rows if row.category == category]
     theirs = [row for row in published if row.of(category)]
-    lines = [f"## {category}", "", *_results(metrics, rows, theirs), ""]
+    lines = [f"## {category}", "", *_results(metrics, rows, theirs), "", *_legend(metrics), ""]
     differences = [one for one in summary.differences if one.category == category]
     if differences:
         lines += [
@@ -136,6 +143,12 @@ def _results(metrics: Sequence[Metric], rows: Sequence[Row], published: Sequence
             ]
         )  # fmt: skip
     return table(head, body)
+
+
+def _legend(metrics: Sequence[Metric]) -> list[str]:
+    """Say what the columns are."""
+    told = [f"- {metric.label}: {metric.about} ({_BETTER[metric.better]})" for metric in metrics]
+    return [*told, *(f"- {name}: {about}" for name, about in _COUNTED.items())]
 
 
 def _differences(metrics: Sequence[Metric], differences: Sequence[Difference]) -> list[str]:

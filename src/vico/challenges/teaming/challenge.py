@@ -11,10 +11,12 @@ from vico.challenges.teaming.judge import CAUSES
 from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask
 from vico.challenges.teaming.thresholds import PERIOD, PERIODS, RESIDENTS, STEPS
 
-_SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0)
-_TS = Metric("Ts", "Ts", "s", "lower", 0.0)
-_TOGETHER = Metric("together", "Together on the way", "%", "higher", 0.0, 100.0)
-_SEEN = Metric("seen", "Thing first in view", "s", "lower", 0.0)
+_SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0, about="success rate: episodes whose task was done")
+_TS = Metric("Ts", "Ts", "s", "lower", 0.0, about="seconds until it was; the limit where it was not")
+_TOGETHER = Metric(
+    "together", "Together on the way", "%", "higher", 0.0, 100.0, about="share of the way on which they were near"
+)
+_SEEN = Metric("seen", "Thing first in view", "s", "lower", 0.0, about="seconds until the drone had the thing in view")
 
 #: A humanoid, a quadruped and a drone at work with a person or another robot; see `vico.challenges.teaming`.
 #:

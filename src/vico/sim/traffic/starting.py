@@ -39,7 +39,7 @@ class NoRoomError(InputError):
 
 
 def _no_room(kind: str, room: int, sentence: str) -> NoRoomError:
-    error = NoRoomError(f"traffic: {sentence}; use --{kind} {room}")
+    error = NoRoomError(f"traffic: {sentence}; take a larger world, or ask for {room} {kind}")
     error.kind, error.room = kind, room
     return error
 
