@@ -109,15 +109,15 @@ _rectangles = st.tuples(*[st.integers(-150, -10)] * 2, *[st.integers(10, 150)] *
 
 
 def _within(edges: tuple[float, float, float, float], corners: list[tuple[float, float]]) -> tuple[float, int]:
-    """Metres of a line within a rectangle and runs of it there; segments that only pass through have no node in it."""
+    """Metres of a line within a rectangle, and at most how many pieces of it lie there."""
     box = shapely.box(*edges)
     inside = [bool(box.covers(shapely.Point(xy))) for xy in corners]
-    metres = sum(
-        shapely.LineString([a, b]).intersection(box).length
-        for a, b, here, there in zip(corners, corners[1:], inside, inside[1:], strict=False)
-        if here or there
-    )
-    return metres, sum(here and not before for before, here in zip([False, *inside], inside, strict=False))
+    metres, runs = 0.0, sum(here and not before for before, here in zip([False, *inside], inside, strict=False))
+    for a, b, here, there in zip(corners, corners[1:], inside, inside[1:], strict=False):
+        within = shapely.LineString([a, b]).intersection(box).length
+        metres += within
+        runs += bool(within) and not (here or there)  # through without a node
+    return metres, runs
 
 
 @given(_corners, _rectangles)
@@ -202,11 +202,12 @@ def test_ways_are_closed_for_a_reason_that_the_report_names() -> None:
         _street(3, [(-90, 40), (-20, 40)], tunnel="yes"),
         _street(4, [(0, -90), (0, 90)]),
         _street(5, [(-40, -50), (40, -50)], bridge="yes", layer="1"),
-        _street(6, [(20, 60), (90, 60)], layer="-1"),
+        _street(6, [(20, 60), (90, 60)], location="underground"),
+        _street(7, [(20, 80), (90, 80)], layer="-1"),
     )
     house = shapely.box(-60, 10, -40, 30)
     open_ = [street.way for street in streets_from_osm(site_facts(osm), [house]) if is_traffic_street(street)]
-    assert open_ == [1, 4]
+    assert open_ == [1, 4, 7]
     assert {d.id: d.reason for d in closed_roads(roads_of(osm, [house]))} == {
         "w2": THROUGH_A_BUILDING,
         "w3": UNDERGROUND,

@@ -23,14 +23,17 @@ def is_underground(tags: Mapping[str, str]) -> bool:
 
 
 def on_the_ground(tags: Mapping[str, str]) -> bool:
-    """Whether a way or area lies at ground level outdoors: not in a tunnel, indoors or on a lower layer."""
+    """Whether a way or area lies at ground level outdoors: not in a tunnel, indoors or on a level below the ground.
+
+    A layer below 0 alone does not say so: a stream or a street under a bridge has one. A level below the ground does,
+    unless the layer says that it is not below.
+    """
     if tags.get("tunnel", "no") not in ("no", "building_passage") or tags.get("indoor", "no") != "no":
         return False
     if tags.get("location") == "underground" or tags.get("highway") == "corridor":
         return False
-    layer = quantity(tags, "layer")
-    level = number(tags.get("level"))
-    return (layer is None or layer >= 0) and (level is None or level >= 0 or layer is not None)
+    layer, level = quantity(tags, "layer"), number(tags.get("level"))
+    return level is None or level >= 0 or (layer is not None and layer >= 0)
 
 
 def level_of(tags: Mapping[str, str]) -> int:
