@@ -212,6 +212,12 @@ def _cut(way: OsmWay, osm: OsmData, new_id: int) -> tuple[list[tuple[list[int], 
             points.append(_crossing(way.line[i - 1], way.line[i], osm.box))
             new_id -= 1
             close()
+        elif i > 0:
+            # A long segment may lead through the window without a node in it.
+            through = shapely.clip_by_rect(shapely.LineString(way.line[i - 1 : i + 1]), *osm.box)
+            if through.length > 0.0:
+                pieces.append(([new_id, new_id - 1], np.array(through.coords)))
+                new_id -= 2
     close()
     return pieces, new_id
 
