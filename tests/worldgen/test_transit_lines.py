@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -9,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from road_city import HALF, RoadCity, lanes_of, road_city
+from road_city import HALF, RoadCity, lanes_of, network_of, road_city
+from vico.geo.frame import LocalFrame
 from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, GtfsStop, Pattern
 from vico.geo.gtfs.reader import read_gtfs
-from vico.geo.osm import OsmNode, OsmRelation
+from vico.geo.osm import OsmData, OsmNode, OsmRelation, read_osm
 from vico.sim.transit import DWELL, departure, plan_buses
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
@@ -199,3 +201,39 @@ def test_what_is_left_out_names_the_lines_that_serve_its_stops() -> None:
     assert served
     names = [name for line in transit.lines for name in line.name.split("/")]
     assert all(any(name in reason for name in names) for reason in served)
+
+
+@pytest.fixture(scope="module")
+def one_street(tmp_path_factory: pytest.TempPathFactory) -> tuple[OsmData, LaneGraph]:
+    """A village along one street from west to east, which ends at both edges of the window."""
+    path = tmp_path_factory.mktemp("street") / "street.osm"
+    ends = "".join(f'<node id="{k}" lat="0" lon="{x / 111_200:.7f}"/>' for k, x in ((1, -150.0), (2, 150.0)))
+    way = '<way id="1"><nd ref="1"/><nd ref="2"/><tag k="highway" v="secondary"/></way>'
+    path.write_text(f'<osm version="0.6">{ends}{way}</osm>')
+    osm = read_osm(path, LocalFrame(0.0, 0.0), 120.0, need_buildings=False)
+    return osm, lanes_of(network_of(osm))
+
+
+def _in_a_row(order: Sequence[int]) -> Feed:
+    """A timetable with two buses along the village's street, past its stops in some order, 15 m south of the middle."""
+    stops = tuple(GtfsStop(f"s{k}", f"Halt {k}", (-90.0 + 60.0 * k, -5.0)) for k in range(4))
+    pattern = Pattern("r", "0", tuple(f"s{k}" for k in order), (8 * 3600, 9 * 3600), (0, 60, 120, 180))
+    return Feed("f.zip", "0" * 64, "2024-01-02", stops, (GtfsRoute("r", "7", "", "bus", "", ""),), (pattern,), "")
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0)])
+def test_a_bus_of_a_village_along_one_street_turns_at_its_ends(
+    one_street: tuple[OsmData, LaneGraph], order: tuple[int, ...]
+) -> None:
+    osm, lanes = one_street
+    transit = transit_from_osm(site_facts(osm), lanes, HeightField.flat(120.0), feeds=[_in_a_row(order)])
+    (line,) = transit.lines
+    _driveable(transit, lanes)
+    assert line.name == "7"
+    names = {stop.id: stop.name for stop in transit.stops}
+    # A round: where the list begins is nobody's business, but the order is the timetable's.
+    called = [int(names[stop].split()[1]) for stop in line.stops]
+    first = called.index(order[0])
+    assert [*called[first:], *called[:first]] == list(order)
+    at = line.departures[0] + line.travel[first]
+    assert at == pytest.approx(8 * 3600, abs=60)

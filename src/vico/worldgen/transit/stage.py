@@ -385,10 +385,14 @@ def _fit(
         return "fewer than two of its stops lie on streets that buses can go round"
     best: tuple[float, list[Berth]] = (math.inf, [])
     most, longest = round(MAX_STOPS * wide), MAX_LOOP * wide
-    for rows in ([*there, *back][:most], there[:most], [*back, *there[::-1]][:most]):
+    orders = [[*there, *back], there]
+    if route.origin != "gtfs":
+        orders.append([*back, *there[::-1]])  # a map's members may be listed backwards; a timetable is not
+    for rows in (order[:most] for order in orders):
         loop = list(dict.fromkeys(drive.best_round(rows)[1]))
-        if len(loop) >= 2 and drive.round(loop) < min(longest, best[0]):
-            best = (drive.round(loop), loop)
+        cost = drive.round(loop)
+        if cost < best[0] and drive.metres_round(loop) < longest:
+            best = (cost, loop)
             if not drive.driven(loop)[1]:
                 break
     if not best[1]:
