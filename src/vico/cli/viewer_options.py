@@ -40,9 +40,12 @@ class LiveOptions:
         Of the city: none, "changing", or a file of events (.json).
     steps
         Seconds to simulate at most.
-    cars, cyclists, pedestrians
-        How many drive, ride and walk around that nobody plays; unset: 30 cars and 30 pedestrians, or as many as there
-        is room for.
+    cars
+        How many cars drive around; unset: 30, or as many as there is room for.
+    cyclists
+        How many people nobody plays ride bicycles in the streets.
+    pedestrians
+        How many people nobody plays walk around; unset: 30, or as many as there is room for.
     observe
         Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
     speed
@@ -122,9 +125,12 @@ class PlayOptions:
         A kind of weather, "changing", or a weather file (.json).
     seconds
         To simulate at most.
-    cars, cyclists, pedestrians
-        How many drive, ride and walk around that nobody plays; unset: 30 cars and 30 pedestrians, or as many as there
-        is room for.
+    cars
+        How many cars drive around; unset: 30, or as many as there is room for.
+    cyclists
+        How many people nobody plays ride bicycles in the streets.
+    pedestrians
+        How many people nobody plays walk around; unset: 30, or as many as there is room for.
     view
         What whom you play sees is rendered and recorded, which a demonstration needs.
     port
