@@ -8,7 +8,19 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "vico"
 
 # What lies below all rooms: single modules, and the room `io`, which uses nothing of ours but these.
-GROUND = {"errors", "version", "seeds", "threads", "exact", "rules", "clock", "crowd", "pixels", "quaternions"}
+GROUND = {
+    "errors",
+    "version",
+    "seeds",
+    "threads",
+    "exact",
+    "rules",
+    "clock",
+    "crowd",
+    "pixels",
+    "quaternions",
+    "english",
+}
 
 # Room -> the rooms (or single modules) of ours it may import. docs/architecture.md explains the order.
 ALLOWED = {

@@ -15,6 +15,7 @@ from vico.community.model import ItemType, Personality, ScheduleItem
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import GUEST_KINDS, PlaceIndex, kind_of
 from vico.community.relations import describe_household
+from vico.english import with_article
 from vico.world.model import Place
 
 # When one rises early, rises late, and goes to bed late, seconds of the day.
@@ -116,10 +117,13 @@ class Biographer:
                 (
                     "{name}, {age}, studies {subject} at {place}.",
                     "{name} is {age} and reads {subject} at {place}.",
-                    "{name}, a {age}-year-old student of {subject}, spends most weekdays at {place}.",
+                    "{name}, {a_student} of {subject}, spends most weekdays at {place}.",
                 )
-            ).replace("a 18", "an 18")
-            return first.format(name=name, age=draft.age, subject=draft.subject, place=self._name(draft.workplace))
+            )
+            return first.format(
+                name=name, age=draft.age, a_student=with_article(f"{draft.age}-year-old student"),
+                subject=draft.subject, place=self._name(draft.workplace),
+            )  # fmt: skip
         if draft.status == "retired":
             told = next(former.told for former in ways_of_life().retired if former.title == draft.subject)
             return f"{name}, {draft.age}, a {draft.occupation}, {told}."
@@ -224,9 +228,3 @@ def honest_character(draft: ResidentDraft, measures: DayMeasures) -> Personality
 def join(parts: Sequence[str]) -> str:
     """Join words with commas and a final "and"."""
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def with_article(noun: str) -> str:
-    """Put "a" or "an" before a noun."""
-    an = noun[0].lower() in "aeio" or (noun[0] == "u" and not noun.startswith("uni"))
-    return f"{'an' if an else 'a'} {noun}"

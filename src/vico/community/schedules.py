@@ -18,6 +18,7 @@ from vico.community.outings import Outings
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
 from vico.community.school_days import SchoolDays
+from vico.english import uncapitalized
 from vico.world.model import Category
 from vico.world.opening_hours import Span
 
@@ -103,7 +104,7 @@ class DayWriter:
         lunch_group = None
         for group in groups:
             kind = ItemType.MEAL if group.circle.meal else ItemType.MAIN
-            text = f"{group.circle.name}: {_lower(group.circle.activity)}"
+            text = f"{group.circle.name}: {uncapitalized(group.circle.activity)}"
             self._outings.put(day, Block(group.start, group.end, kind, text, group.place.id, "group", group.circle.tag))
             if draft.shift and draft.shift[0] < group.start and group.end < draft.shift[1]:
                 lunch_group = day.blocks[-1]
@@ -235,12 +236,12 @@ class DayWriter:
             assert draft.job is not None
             first = second = draft.job.task
             if draft.job.shift in ("office", "bank"):
-                first = f"Answer the morning's mail, then {_lower(first)}"
+                first = f"Answer the morning's mail, then {uncapitalized(first)}"
             elif (
                 index.place_by_id[place].category != Category.OFFICE
                 and start < min(index.hours(index.place_by_id[place]))[0]
             ):
-                first = f"Open up, then {_lower(first)}"
+                first = f"Open up, then {uncapitalized(first)}"
         return first, second, tag
 
     def _over_midday(self, day: Day, shift: Span, closed: Span, work: tuple[str, ActivityTag]) -> None:
@@ -282,8 +283,3 @@ def _eat_together(members: Sequence[Party]) -> None:
             ]
             if others:
                 block.activity += f" with {' and '.join(others)}"
-
-
-def _lower(text: str) -> str:
-    """Start in lower case, but leave abbreviations."""
-    return text if text[:2].isupper() else text[0].lower() + text[1:]
