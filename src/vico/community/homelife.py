@@ -155,7 +155,7 @@ def _stay_longer(day: Day, before: Block, after: Block, minutes: tuple[int, int]
     if stay:
         _stay_on(day, before, stay)
     if come:
-        text = "Arrive early and look around"
+        text = "Wait and look around"
         start = after.start - come
         day.blocks.append(Block(start, after.start, ItemType.MAIN, text, after.place, "stay", ActivityTag.VISIT))
 
