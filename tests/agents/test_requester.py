@@ -10,8 +10,9 @@ import pytest
 
 import toy_city
 from vico.agents.base import Agent
-from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, WAITS_FOR, Requester, is_called
+from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, WAITS_FOR, Requester
 from vico.agents.schedule import followers_of
+from vico.agents.talk.address import is_called
 from vico.challenges.assistant import thresholds
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig

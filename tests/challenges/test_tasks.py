@@ -10,7 +10,7 @@ import pytest
 import toy_city
 from assistant_by_hand import Truth
 from vico.agents.assistant import METHODS
-from vico.agents.requester import first_name
+from vico.agents.talk.address import first_name
 from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.challenges.assistant.generate import generate_task
 from vico.challenges.assistant.model import CATEGORIES, Category, Region, Subtask, Task

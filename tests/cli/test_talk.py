@@ -32,7 +32,7 @@ def answered(out: Path, *more: object) -> tuple[int, list[str]]:
         "--pedestrians", 0, "--observe", "none", "--out", out, *more,
     )  # fmt: skip
     messages = [event for event in read_run(out).events if event["kind"] == "message"]
-    assert [one["text"][:23] for one in messages if one["agent"] == "resident_0"] == ["Good morning, Bo! I'm h"]
+    assert [one["text"][:23] for one in messages if one["agent"] == "resident_0"] == ["Good morning, Bo! I'm g"]
     return code, [one["text"] for one in messages if one["agent"] == "resident_1"]
 
 

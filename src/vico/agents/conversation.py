@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,7 +12,10 @@ import numpy as np
 from vico.agents.base import Action, Info, Observation
 from vico.agents.state import AgentState
 from vico.agents.talk.acquaintance import Acquaintance
+from vico.agents.talk.address import GROWN_UP, address_of, called_by, calls_somebody_nearer, is_called
+from vico.agents.talk.phrases import vocation_of
 from vico.clock import DAY
+from vico.english import uncapitalized
 
 # People greet within this distance, metres, and not twice within this time, seconds.
 GREETING_DISTANCE = 6.0
@@ -18,10 +23,10 @@ GREETING_PAUSE = 1200.0
 # A chat in passing ends after this many lines of one's own.
 _LINES = 2
 _RANGE = 8.0
-# Who is younger talks of other things, years.
-_GROWN_UP = 18
 # From this hour on one asks how school was.
 _SCHOOL_IS_OUT = 13
+# What those say who go on.
+_GOES = re.compile(r"\b(?:on my way|have to go|must go|bye|goodbye|see you|take care|have a good one)\b", re.I)
 
 
 class Speaker(Protocol):
@@ -48,6 +53,22 @@ class Speaker(Protocol):
         """What they like to do."""
 
 
+@dataclass(frozen=True)
+class Errand:
+    """What one is about.
+
+    Attributes
+    ----------
+    words
+        Follow "I'm ", such as "on my way to work" or "having lunch".
+    leaves
+        Whether one is on the way, and says goodbye.
+    """
+
+    words: str
+    leaves: bool
+
+
 class Conversation:
     """Decides whether to speak, and what to say.
 
@@ -63,6 +84,8 @@ class Conversation:
 
     def __init__(self, resident: Speaker, known: Sequence[Acquaintance], generator: np.random.Generator) -> None:
         self._me = resident
+        # Not everybody's author said these.
+        self._gender, self._household = (str(getattr(resident, field, None) or "") for field in ("gender", "household"))
         self._known = {person.agent: person for person in known}
         self._rng = generator
         self._greeted: dict[str, float] = {}
@@ -94,27 +117,41 @@ class Conversation:
         self._greeted[agent] = time
         self.encounters += 1
 
-    def line(self, observation: Observation, info: Info, errand: Callable[[], str]) -> Action | None:
+    def line(self, observation: Observation, info: Info, errand: Callable[[], Errand]) -> Action | None:
         """Return something to say now, or None.
 
         Parameters
         ----------
         errand
-            Says what one is about, to follow "I'm ", such as "on my way to work".
+            Tells what one is about.
         """
         time = observation["state"]["time"]
         for message in observation["events"]:
-            reply = self._reply(message, time, errand)
-            if reply is not None:
-                return reply
+            if self._is_for_me(message, observation, info):
+                reply = self._reply(message, time, errand)
+                if reply is not None:
+                    return reply
         return self._greet(info, time, errand)
 
-    def _reply(self, message: dict[str, Any], time: float, errand: Callable[[], str]) -> Action | None:
+    def _is_for_me(self, message: Mapping[str, Any], observation: Observation, info: Info) -> bool:
+        """Whether one is called, as oneself or as who one is to the speaker, and nobody else of the same name is."""
+        me, person = self._me, self._known.get(message["speaker"])
+        also: tuple[str, ...] = ()
+        if person is not None:
+            also = (called_by(person, name=me.name, age=me.age, gender=self._gender, household=self._household),)
+        if not is_called(me.name, message["text"], gender=self._gender, also=also):
+            return False
+        x, y = (float(value) for value in observation["pose"][:2])
+        bodies = info["in_view"].within(2 * _RANGE) if "in_view" in info else ()
+        return not calls_somebody_nearer(message, (x, y), bodies, self._name_and_gender)
+
+    def _name_and_gender(self, agent: str) -> tuple[str, str | None] | None:
+        person = self._known.get(agent)
+        return None if person is None else (person.name, person.gender)
+
+    def _reply(self, message: Mapping[str, Any], time: float, errand: Callable[[], Errand]) -> Action | None:
         speaker, text = message["speaker"], message["text"]
         person = self._known.get(speaker)
-        mine = self._me.name.split()[0]
-        if mine.lower() not in text.lower():
-            return None
         if time - self._greeted.get(speaker, -1e9) > GREETING_PAUSE:
             self._said[speaker] = 0
         self._greeted[speaker] = time
@@ -122,11 +159,14 @@ class Conversation:
         if self._said.get(speaker, 0) >= _LINES:
             return None
         self._said[speaker] = self._said.get(speaker, 0) + 1
+        about = errand()
         if person is None:
-            return _say(f"Hello! I'm {mine}. Sorry, I'm {errand()}.")
-        return _say(self._choose(self._answers(person, errand(), last="?" not in text)))
+            return _say(f"Hello! I'm {self._me.name.split()[0]}. Sorry, I'm {about.words}.")
+        if "?" in text:
+            return _say(self._choose(self._answers(person, about)))
+        return _say(self._choose(self._last_words(person, about, they_go=_GOES.search(text) is not None)))
 
-    def _greet(self, info: Info, time: float, errand: Callable[[], str]) -> Action | None:
+    def _greet(self, info: Info, time: float, errand: Callable[[], Errand]) -> Action | None:
         # Residents are told who is in view; others who live by a schedule greet nobody, but answer.
         for agent in info["in_view"].agents_within(GREETING_DISTANCE) if "in_view" in info else ():
             person = self._known.get(agent)
@@ -138,14 +178,19 @@ class Conversation:
             return _say(self._choose(self._greetings(person, time, errand())))
         return None
 
-    def _greetings(self, person: Acquaintance, time: float, errand: str) -> list[str]:
-        other = person.first_name
-        if min(self._me.age, person.age) < _GROWN_UP:
-            return self._greetings_with_children(person, errand, time % DAY / 3600)
+    def _called(self, person: Acquaintance) -> tuple[str, bool]:
+        """Return what one calls somebody, and whether that is formal."""
+        other = address_of(person, age=self._me.age, household=self._household)
+        return other, person.kind != "family" and other != person.first_name
+
+    def _greetings(self, person: Acquaintance, time: float, errand: Errand) -> list[str]:
+        other, _ = self._called(person)
         hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
+        if min(self._me.age, person.age) < GROWN_UP:
+            return self._greetings_with_children(person, errand, hour, hello)
         lines = [
-            f"{hello}, {other}! I'm {errand}. And you?",
+            f"{hello}, {other}! I'm {errand.words}. And you?",
             f"Hi {other}, how are you today?",
             f"{hello}, {other}! Where are you off to?",
         ]
@@ -157,41 +202,61 @@ class Conversation:
             lines.append(f"{hello}, {other}! Is everything all right at home?")
         return lines
 
-    def _greetings_with_children(self, person: Acquaintance, errand: str, hour: float) -> list[str]:
+    def _greetings_with_children(self, person: Acquaintance, errand: Errand, hour: float, hello: str) -> list[str]:
         """Return what children say, and what is said to them."""
-        other = person.first_name
-        if self._me.age >= _GROWN_UP:
+        other, formal = self._called(person)
+        if self._me.age >= GROWN_UP:
             school = "How was school?" if hour >= _SCHOOL_IS_OUT else "Have you got everything for school?"
             lines = [f"Hello, {other}! {school}", f"Hi {other}! Where are you off to?"]
             if person.kind != "family":
                 lines.append(f"Hello, {other}! You have grown again.")
             return lines
-        lines = [f"Hi {other}! I'm {errand}.", f"Hello, {other}! Guess what: I'm {errand}!"]
-        if person.age < _GROWN_UP:
+        if formal:
+            return [f"{hello}, {other}!", f"{hello}, {other}! I'm {errand.words}.", f"{hello}, {other}! How are you?"]
+        lines = [f"Hi {other}! I'm {errand.words}.", f"Hello, {other}! Guess what: I'm {errand.words}!"]
+        if person.age < GROWN_UP:
             lines.append(f"Hey {other}! Are you coming out to play later?")
             if self._me.hobbies:
-                lines.append(f"{other}! Shall we do some {self._hobby()} after school?")
+                lines.append(f"{other}! Do you feel like {self._hobby()} after school?")
         return lines
 
-    def _answers(self, person: Acquaintance, errand: str, *, last: bool) -> list[str]:
-        other = person.first_name
-        if last and self._me.age < _GROWN_UP:
+    def _last_words(self, person: Acquaintance, errand: Errand, *, they_go: bool) -> list[str]:
+        """Return how a chat ends: with a goodbye if either goes, else with something kind.
+
+        Parameters
+        ----------
+        they_go
+            Whether the other one said that they go on.
+        """
+        other, formal = self._called(person)
+        if not errand.leaves and not they_go:
+            lines = [f"Nice to see you, {other}!", f"Good to hear, {other}."]
+            return lines if self._me.age < GROWN_UP else [*lines, f"It's good to have you about, {other}."]
+        if formal:
+            return [f"Goodbye, {other}!", f"Bye, {other}!"]
+        if not errand.leaves:
+            return [f"See you later, {other}!", f"Bye, {other}! See you soon."]
+        if self._me.age < GROWN_UP:
             return [f"Bye, {other}!", f"See you, {other}!", f"Bye bye, {other}!"]
-        if last:
-            return [f"See you, {other}!", f"Take care, {other}.", f"Have a good one, {other}!"]
-        lines = [
-            f"Hi {other}! I'm {errand}.",
-            f"Fine, thanks, {other}. I'm {errand}.",
-            f"Good to see you, {other}. I'm {errand}, a little in a hurry.",
-        ]
+        return [f"See you, {other}!", f"Take care, {other}.", f"Have a good one, {other}!"]
+
+    def _answers(self, person: Acquaintance, errand: Errand) -> list[str]:
+        other, formal = self._called(person)
+        hi = f"Hello, {other}" if formal else f"Hi {other}"
+        lines = [f"{hi}! I'm {errand.words}.", f"Fine, thanks, {other}. I'm {errand.words}."]
+        if self._me.age < GROWN_UP:
+            return lines
+        hurry = ", a little in a hurry" if errand.leaves else ""
+        lines.append(f"Good to see you, {other}. I'm {errand.words}{hurry}.")
         if self._me.hobbies:
-            lines.append(f"All well, {other}. Looking forward to some {self._hobby()} later.")
-        if self._me.occupation and self._me.age >= _GROWN_UP:
-            lines.append(f"Busy as ever, {other}: the life of a {self._me.occupation.lower()}.")
+            lines.append(f"All well, {other}. Looking forward to {self._hobby()} later.")
+        work = vocation_of(self._me.occupation)
+        if work.startswith(("a ", "an ")):
+            lines.append(f"Busy as ever, {other}: the life of {work}.")
         return lines
 
     def _hobby(self) -> str:
-        return self._choose(self._me.hobbies).lower()
+        return uncapitalized(self._choose(self._me.hobbies))
 
     def _choose(self, options: Sequence[str]) -> str:
         return options[int(self._rng.integers(len(options)))]

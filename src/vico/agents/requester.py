@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -11,7 +10,7 @@ from typing import Any, Protocol
 from vico.agents.base import Action, Info, Observation, Plan
 from vico.agents.schedule import Scheduled, ScheduleFollower
 from vico.agents.state import AgentState
-from vico.agents.talk.grammar import read_grammar
+from vico.agents.talk.address import is_called
 from vico.clock import DAY, clock_of
 from vico.rules import WALK_SPEED, walk_speed
 from vico.world.public import PublicMap
@@ -194,31 +193,12 @@ def _way_to(
     return ScheduleFollower(_WayHome(resident, plan), public_map, seed=seed, paces=(own, own))
 
 
-def first_name(name: str) -> str:
-    """Return what somebody is called by, in small letters."""
-    return name.split()[0].casefold()
-
-
-def is_called(name: str, text: str) -> bool:
-    """Whether a text calls somebody: their first name is in it, and not as that of somebody who is asked for.
-
-    The name is a word of its own: Ida is not called by "Aida!", nor Ida Roth by "Have you seen Ida Roth?".
-    """
-    first = first_name(name)
-    question = read_grammar().question_in(text, names=(name, name.split()[0]))
-    if question is not None and first in question.what.casefold().split():
-        return first in question.to.casefold().split()
-    return re.search(rf"(?<![\w-]){re.escape(first)}(?![\w-])", text.casefold()) is not None
-
-
 __all__ = [
     "CALL_DISTANCE",
     "HAND_OVER_DISTANCE",
     "HELPERS",
     "WAITS_FOR",
     "Requester",
-    "first_name",
-    "is_called",
     "way_home",
     "way_to",
 ]

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from vico.agents.base import Action, Info, Observation, Plan
 from vico.agents.buying import Buyer
 from vico.agents.change_of_plans import ChangeOfPlans
-from vico.agents.conversation import Conversation, Speaker
+from vico.agents.conversation import Conversation, Errand, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.plans import plan_of_day
 from vico.agents.residents import Residents
@@ -23,6 +23,7 @@ from vico.agents.strides import Stride, pace_in_time, paces_of
 from vico.agents.talk.acquaintance import Acquaintance, acquaintances_of
 from vico.agents.talk.facts import Knowledge, moment_of, person_of
 from vico.agents.talk.memory import ResidentMemory
+from vico.agents.talk.phrases import activity_of
 from vico.agents.talk.talker import RANGE, Talk, Talker
 from vico.agents.travel import Traveller
 from vico.agents.wayfinding import Walker
@@ -57,6 +58,8 @@ _STIRS, _ON_FEET_FOR = 0.2, (10, 40)
 # Others are too near who stands without need, metres, middle to middle.
 _TOO_NEAR = 0.8
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
+# One is not at home there, though one sleeps there.
+_LODGINGS = ("hotel", "hostel", "motel", "guest_house")
 
 
 class Scheduled(Speaker, Protocol):
@@ -111,6 +114,8 @@ class ScheduleFollower:
         self._ease, self._haste = paces or paces_of(resident.age)
         self._map = public_map
         self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map, self._ease)
+        nights = (stay.place for stay in self._stays if stay.type == "sleep")
+        self._home = str(getattr(resident, "home", None) or next(nights, ""))
         self._rng = generator
         self._walker = Walker(public_map, generator)
         self._traveller = Traveller(public_map, generator)
@@ -248,7 +253,8 @@ class ScheduleFollower:
             return self._travel(observation, info, stay, place)
         if self._posture != "lying":
             errand = partial(self._errand, observation, stay, place)
-            line = self._answer(observation, info, errand) or self._conversation.line(observation, info, errand)
+            answer = self._answer(observation, info, lambda: errand().words)
+            line = answer or self._conversation.line(observation, info, errand)
             if line is not None:
                 return line
         if self._is_there(observation, place):
@@ -506,14 +512,27 @@ class ScheduleFollower:
             return action
         return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}
 
-    def _errand(self, observation: Observation, stay: Stay, place: PublicPlace) -> str:
-        """Return what one is about, to follow "I'm "."""
-        doing = stay.activity.split(": ")[-1]
-        doing = doing[:1].lower() + doing[1:]
-        home = place.kind == "apartments"
-        if self._is_there(observation, place):
-            return f"at home, about to {doing}" if home else f"here to {doing}"
-        return "on my way home" if home else f"on my way to {place.name}, to {doing}"
+    def _errand(self, observation: Observation, stay: Stay, place: PublicPlace) -> Errand:
+        """Return what one is about."""
+        leaves = not self._is_there(observation, place)
+        if leaves and place.id == self._home:
+            back = f"back to {place.name}" if place.kind in _LODGINGS else "home"
+            return Errand(f"on my way {back}", leaves)
+        if place.id != stay.place and place.kind != self._map.place_by_id[stay.place].kind:
+            # Elsewhere than planned: in a shelter from the rain, at what is on.
+            return Errand(f"on my way to {place.name}" if leaves else "here for a while", leaves)
+        activity = activity_of(stay.activity if stay.type != "sleep" else self._awake_in(stay, observation))
+        if not leaves:
+            return Errand(activity.doing, leaves)
+        if place.kind == "apartments" or not place.name:
+            return Errand(f"on my way {activity.going}", leaves)
+        return Errand(f"on my way to {place.name}, {activity.going}", leaves)
+
+    def _awake_in(self, stay: Stay, observation: Observation) -> str:
+        """Return what one who speaks in the hours of sleep is about: getting up if most of them is over."""
+        k = self._stays.index(stay)
+        end = self._stays[k + 1].leave if k + 1 < len(self._stays) else 2 * DAY - stay.due
+        return "Get up" if observation["state"]["time"] % DAY > (stay.due + end) / 2 else "Go to bed"
 
 
 def followers_of(

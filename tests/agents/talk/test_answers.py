@@ -120,9 +120,9 @@ def test_ones_own_day() -> None:
     knows.memory.arrive(7 * 3600.0, 0, CAFE)
     knows.memory.arrive(29520.0, 1, SHOP)
     assert ask(knows, "did") == (
-        "I was at Corner Café from 07:00 to 08:12 (sleep). I have been at Hat Shop since 08:12 (the new ones)."
+        "I was at Corner Café from 07:00 to 08:12 (sleeping). I have been at Hat Shop since 08:12 (selling hats)."
     )
-    assert ask(knows, "plans") == "I'm going to be at Corner Café from 12:12 to 23:59 (eat soup)."
+    assert ask(knows, "plans") == "I'm going to be at Corner Café from 12:12 to 23:59 (eating soup)."
     assert ask(knows, "plans", when=moment(13 * 3600.0)) == "I have no more plans for today."
     assert ask(knows, "doing") == "I'm here to sell hats, as you see."
     assert ask(knows, "who") == "My name is Mia Holm, and I am a baker."

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.agents.conversation import Conversation
+from vico.agents.conversation import Conversation, Errand
 from vico.agents.talk.acquaintance import Acquaintance
 from vico.agents.talk.grammar import Question, read_grammar
 from vico.errors import SchemaError
@@ -51,10 +51,12 @@ def test_no_greeting_and_no_reply_is_taken_for_a_question() -> None:
             for kind in ("friend", "family", "colleague", "neighbour"):
                 other = Acquaintance("resident_2", "Bo Dahl", kind, "", age)
                 talk = Conversation(Me(), [other], np.random.default_rng(1))
-                for hour in (8, 15, 20):
-                    lines |= set(talk._greetings(other, hour * 3600.0, "here to eat lunch"))
-                for last in (True, False):
-                    lines |= set(talk._answers(other, "here to eat lunch", last=last))
+                for errand in (Errand("having lunch", leaves=False), Errand("on my way home", leaves=True)):
+                    for hour in (8, 15, 20):
+                        lines |= set(talk._greetings(other, hour * 3600.0, errand))
+                    lines |= set(talk._answers(other, errand))
+                    for they_go in (True, False):
+                        lines |= set(talk._last_words(other, errand, they_go=they_go))
     assert len(lines) > 25
     grammar = read_grammar()
     assert [line for line in lines if grammar.question_in(line, names=("Bo Dahl", "Bo")) is not None] == []

@@ -57,7 +57,7 @@ def test_facts_and_message_go_as_data() -> None:
     assert data["message"] == {"speaker": "assistant 0", "text": HEARD.text}
     assert data["facts"]["sentence_that_answers"] == template()
     assert data["facts"]["person"]["name"] == "Mia Holm"
-    assert data["facts"]["plans"] == "I'm going to be at Corner Café from 12:12 to 23:59 (eat soup)."
+    assert data["facts"]["plans"] == "I'm going to be at Corner Café from 12:12 to 23:59 (eating soup)."
     assert talk.usage.calls == 1
 
 

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from vico.agents.base import Action, Info, Observation
-from vico.agents.requester import CALL_DISTANCE, Dweller, is_called, way_home
+from vico.agents.requester import CALL_DISTANCE, Dweller, way_home
 from vico.agents.schedule import ScheduleFollower
 from vico.agents.state import AgentState
+from vico.agents.talk.address import is_called
 from vico.world.public import PublicMap
 
 #: Names of those who may help begin so.

@@ -48,6 +48,10 @@ class Acquaintance:
         Id of the place; empty if one doesn't know it.
     habits
         What one knows of their usual day.
+    gender
+        ``female`` or ``male``; empty if one doesn't know.
+    household
+        Id, the same for those who live together; empty if nobody said.
     """
 
     agent: str
@@ -57,6 +61,8 @@ class Acquaintance:
     age: int = 35
     home: str = ""
     habits: tuple[Habit, ...] = ()
+    gender: str = ""
+    household: str = ""
 
     @property
     def first_name(self) -> str:
@@ -87,7 +93,8 @@ def acquaintance_of(resident: Any, kind: str, note: str, *, day: tuple[Habit, ..
         work = getattr(resident, "workplace", None)
         habits = tuple(one for one in habits if one.place == work and not one.travels)
     home = str(getattr(resident, "home", "") or "") if kind in _WHERE_THEY_LIVE else ""
-    return Acquaintance(resident.id, resident.name, kind, note, resident.age, home, habits)
+    gender, household = (str(getattr(resident, field, None) or "") for field in ("gender", "household"))
+    return Acquaintance(resident.id, resident.name, kind, note, resident.age, home, habits, gender, household)
 
 
 def acquaintances_of(residents: Mapping[str, Any], relations: Iterable[Any]) -> dict[str, list[Acquaintance]]:

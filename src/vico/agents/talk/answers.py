@@ -8,6 +8,7 @@ from vico.agents.talk.directions import rounded, way_in_words
 from vico.agents.talk.facts import Knowledge, Moment
 from vico.agents.talk.grammar import Question
 from vico.agents.talk.memory import SeenPerson
+from vico.agents.talk.phrases import activity_of, vocation_of
 from vico.agents.talk.sentences import Sentences, read_sentences
 from vico.clock import DAY, clock_of
 from vico.world.public import PublicPlace
@@ -16,7 +17,6 @@ from vico.world.public import PublicPlace
 MOST_TOLD, _WORTH_TELLING = 4, 60.0
 # Who stands so near a place is there already, metres.
 _THERE = 3.0
-_MOST_ACTIVITY = 80
 
 
 def answer_to(question: Question, knows: Knowledge, moment: Moment) -> str:
@@ -116,7 +116,7 @@ def _towards(point: tuple[float, float], moment: Moment, sentences: Sentences) -
 def _did(knows: Knowledge, sentences: Sentences) -> str:
     said = []
     for visit, stay, place in knows.visits():
-        activity = _activity(stay.activity)
+        activity = activity_of(stay.activity).about
         if visit.until is None:
             said.append(sentences.say("since", place=place.name, time=_clock(visit.since), activity=activity))
         elif visit.until - visit.since >= _WORTH_TELLING:
@@ -128,7 +128,11 @@ def _did(knows: Knowledge, sentences: Sentences) -> str:
 def _plans(knows: Knowledge, moment: Moment, sentences: Sentences) -> str:
     said = [
         sentences.say(
-            "plan", place=place.name, time=_clock(stay.due), until=_clock(end), activity=_activity(stay.activity)
+            "plan",
+            place=place.name,
+            time=_clock(stay.due),
+            until=_clock(end),
+            activity=activity_of(stay.activity).about,
         )
         for stay, end, place in knows.plans(moment.time)[:MOST_TOLD]
     ]
@@ -136,19 +140,10 @@ def _plans(knows: Knowledge, moment: Moment, sentences: Sentences) -> str:
 
 
 def _who(knows: Knowledge, sentences: Sentences) -> str:
-    work = knows.me.occupation.strip().rstrip(".").replace("?", "")
+    work = vocation_of(knows.me.occupation)
     if not work:
         return sentences.say("who_only", person=knows.me.name)
-    article = (
-        "" if work.lower().startswith(("a ", "an ", "the ", "retired")) else "an " if work[0] in "AEIOaeio" else "a "
-    )
-    return sentences.say("who", person=knows.me.name, occupation=article + work[0].lower() + work[1:])
-
-
-def _activity(words: str) -> str:
-    """Return an activity in a few words, without what would break a sentence's form."""
-    plain = words.split(": ")[-1].replace("?", "").replace("(", "").replace(")", "").strip().rstrip(".")
-    return plain[:1].lower() + plain[1:_MOST_ACTIVITY] or "..."
+    return sentences.say("who", person=knows.me.name, occupation=work)
 
 
 def _clock(time: float) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from vico.agents.base import Info, Observation
 from vico.agents.stays import Stay
 from vico.agents.talk.acquaintance import Acquaintance, Habit
+from vico.agents.talk.address import names_of
 from vico.agents.talk.grammar import read_grammar
 from vico.agents.talk.memory import HeardMessage, ResidentMemory, SeenPerson, Visit
 from vico.agents.talk.understanding import Claim, claims_in, place_named
@@ -33,6 +34,10 @@ class Person:
     ----------
     places
         Ids of places it knows well.
+    gender
+        ``female`` or ``male``; empty if nobody said.
+    household
+        Id, the same for those who live together; empty if nobody said.
     """
 
     agent: str
@@ -41,11 +46,13 @@ class Person:
     occupation: str
     hobbies: tuple[str, ...] = ()
     places: frozenset[str] = frozenset()
+    gender: str = ""
+    household: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
         """What others call it."""
-        return self.name, self.name.split()[0]
+        return names_of(self.name, self.gender)
 
 
 @dataclass(frozen=True)
@@ -79,7 +86,9 @@ def person_of(resident: Any) -> Person:
     places = {getattr(resident, "home", None), getattr(resident, "workplace", None)}
     places |= {*getattr(resident, "known_places", ()), *(item.place for item in resident.schedule)}
     known = frozenset(place for place in places if place)
-    return Person(resident.id, resident.name, resident.age, resident.occupation, tuple(resident.hobbies), known)
+    gender, household = (str(getattr(resident, field, None) or "") for field in ("gender", "household"))
+    hobbies = tuple(resident.hobbies)
+    return Person(resident.id, resident.name, resident.age, resident.occupation, hobbies, known, gender, household)
 
 
 def moment_of(observation: Observation, info: Info, public_map: PublicMap, errand: Callable[[], str]) -> Moment:
@@ -134,12 +143,23 @@ class Knowledge:
         about = dict.fromkeys([*self.known, *self.memory.people, *seen])
         called = {agent: self.name_of(agent) for agent in about if agent != self.me.agent}
         whole = [agent for agent, name in called.items() if wanted in (name.lower(), agent.lower())]
-        return whole or [agent for agent, name in called.items() if name.lower().split()[0] == wanted]
+        return whole or [agent for agent, name in called.items() if wanted in self._names_of(agent, name)]
+
+    def _names_of(self, agent: str, name: str) -> set[str]:
+        person = self.known.get(agent)
+        return {one.lower() for one in names_of(name, "" if person is None else person.gender)}
 
     def name_of(self, agent: str) -> str:
         """Return the name of somebody one knows or sees."""
         person = self.known.get(agent)
         return person.name if person is not None else self.names.get(agent, agent.replace("_", " "))
+
+    def name_and_gender(self, agent: str) -> tuple[str, str | None] | None:
+        """Return both of somebody one knows or sees; the gender is None for strangers. None for who has no name."""
+        person = self.known.get(agent)
+        if person is not None:
+            return person.name, person.gender
+        return (self.names[agent], None) if agent in self.names else None
 
     def is_me(self, what: str) -> bool:
         """Whether somebody asks for oneself."""

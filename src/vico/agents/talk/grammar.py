@@ -21,6 +21,8 @@ Kind = Literal["seen", "way", "where", "doing", "did", "plans", "who"]
 ABOUT = ("seen", "way", "where")
 # Longer messages are no questions, characters; and so long may be what is asked for.
 _MOST, _MOST_WHAT = 400, 100
+# The dot of a title ends no sentence.
+_TITLE = re.compile(r"\b(mrs?|ms|mx|dr|prof)\.(?=\s)", re.IGNORECASE)
 
 
 class QuestionForms(DataRecord):
@@ -94,6 +96,7 @@ class Grammar:
         if len(text) > _MOST:
             return None
         for said in " ".join(text.split()).split("?"):
+            said = _TITLE.sub(r"\1", said)
             found = self._read(said, names)
             if found is not None:
                 return found

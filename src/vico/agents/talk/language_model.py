@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from vico.agents.talk.address import address_of
 from vico.agents.talk.answers import about_person, answer_to
 from vico.agents.talk.facts import Knowledge, Moment
 from vico.agents.talk.grammar import Question
@@ -99,6 +100,7 @@ def facts_of(question: Question | None, knows: Knowledge, moment: Moment) -> dic
     people = [
         {
             "name": one.name,
+            "called": address_of(one, age=me.age, household=me.household),
             "tie": one.kind,
             "note": one.note,
             "what_they_know": about_person(one.agent, knows, moment),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any, Protocol
 
 from vico.agents.base import Info, Observation
 from vico.agents.state import AgentState
+from vico.agents.talk.address import calls_somebody_nearer, is_called
 from vico.agents.talk.answers import answer_to
 from vico.agents.talk.facts import Knowledge, Moment
 from vico.agents.talk.grammar import Question, read_grammar
@@ -59,8 +59,6 @@ class Talker:
         self.knows = knows
         self._talk: Talk = talk or TemplateTalk()
         self._names = [name.lower() for name in knows.me.names]
-        first = re.escape(knows.me.names[-1])
-        self._called = re.compile(rf"\b{first}\b", re.I)
         # By speaker: how many questions were answered since when.
         self._answered: dict[str, tuple[int, float]] = {}
 
@@ -110,11 +108,20 @@ class Talker:
 
     def _is_meant(self, text: str, question: Question | None, message: Mapping[str, Any], moment: Moment) -> bool:
         """Whether one is asked: by name, for oneself, or because one stands nearest to who asks nobody by name."""
+        me = self.knows.me
         if question is None:
-            return "?" in text and self._called.search(text) is not None
-        if question.to.lower() in self._names or (question.what and self.knows.is_me(question.what)):
+            called = "?" in text and is_called(me.name, text, gender=me.gender)
+            return called and not self._calls_another(message, moment)
+        if question.what and self.knows.is_me(question.what):
             return True
+        if question.to.lower() in self._names:
+            return not self._calls_another(message, moment)
         return not question.to and self._stands_nearest(message, moment)
+
+    def _calls_another(self, message: Mapping[str, Any], moment: Moment) -> bool:
+        """Whether another of the same name is meant, who stands nearer to who speaks."""
+        bodies = () if moment.view is None else moment.view.within(2 * RANGE)
+        return calls_somebody_nearer(message, moment.stands, bodies, self.knows.name_and_gender)
 
     def _stands_nearest(self, message: Mapping[str, Any], moment: Moment) -> bool:
         if moment.view is None:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.requester import CALL_DISTANCE, is_called
+from vico.agents.requester import CALL_DISTANCE
+from vico.agents.talk.address import is_called
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.requester import first_name
+from vico.agents.talk.address import first_name
 from vico.assets.models.movable import kinds_for
 from vico.assets.people.words import looks_in_words
 from vico.challenges.assistant.choose import Chooser, Question, choose, seeded_chooser

@@ -9,7 +9,8 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.requester import PACE_HOME, first_name
+from vico.agents.requester import PACE_HOME
+from vico.agents.talk.address import first_name
 from vico.challenges.assistant.model import Region
 from vico.challenges.assistant.regions import Neighbourhood
 from vico.challenges.assistant.thresholds import APART, CARRY_REACH, REACH, SOURCE_RADIUS, STEPS, SUBTASKS
