@@ -162,7 +162,7 @@ def _stay_longer(day: Day, before: Block, after: Block, minutes: tuple[int, int]
 
 def _stay_on(day: Day, block: Block, minutes: int) -> None:
     """Stay some minutes longer."""
-    text = {"work": "Finish up and put things away", "group": "Stay on and chat"}.get(block.role)
+    text = {"work": "Finish up and put things away", "group": "Chat a little longer"}.get(block.role)
     if block.role == "group" and minutes < CHAT:
         return
     if text is None or (block.role == "work" and minutes < 10):

@@ -278,7 +278,7 @@ class _Means:
             return [item]
         if (item.place, item.start, item.end) not in self.meetings:
             return [item.model_copy(update={"end": until})]
-        chat = {"type": ItemType.MAIN, "start": item.end, "end": until, "activity": "Stay on and chat"}
+        chat = {"type": ItemType.MAIN, "start": item.end, "end": until, "activity": "Chat a little longer"}
         return [item, item.model_copy(update=chat | {"tag": ActivityTag.GROUP})]
 
 
