@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,8 +25,17 @@ _LINES = 2
 _RANGE = 8.0
 # From this hour on one asks how school was.
 _SCHOOL_IS_OUT = 13
-# What those say who go on.
-_GOES = re.compile(r"\b(?:on my way|have to go|must go|bye|goodbye|see you|take care|have a good one)\b", re.I)
+# What those say who go on; what ends a chat; how somebody says how they are.
+_GOES = re.compile(
+    r"\bon my way\b|\b(?:have|need|must) (?:to )?go\b|\b(?:good)?bye\b|(?:^|[.!] )(?:see you|take care|have a good)\b",
+    re.I,
+)
+_ENDS = re.compile(r"^(?:nice to see you|good to hear)\b", re.I)
+_TELLS = re.compile(r"\b(?:I'm|I am|fine|well|busy)\b", re.I)
+# What is asked for: how one is; something to do together; school.
+_HOW = re.compile(r"\b(?:how are you|how do you do|all right|are you well)\b", re.I)
+_INVITES = re.compile(r"\b(?:any time for|feel like|coming out|would you like|shall we)\b", re.I)
+_SCHOOL = re.compile(r"\bschool\b", re.I)
 
 
 class Speaker(Protocol):
@@ -131,7 +140,7 @@ class Conversation:
                 reply = self._reply(message, time, errand)
                 if reply is not None:
                     return reply
-        return self._greet(info, time, errand)
+        return self._greet(observation["state"], info, errand)
 
     def _is_for_me(self, message: Mapping[str, Any], observation: Observation, info: Info) -> bool:
         """Whether one is called, as oneself or as who one is to the speaker, and nobody else of the same name is."""
@@ -158,15 +167,17 @@ class Conversation:
         self.encounters += 1
         if self._said.get(speaker, 0) >= _LINES:
             return None
+        if person is not None and _ENDS.search(text):
+            return None
         self._said[speaker] = self._said.get(speaker, 0) + 1
         about = errand()
         if person is None:
             return _say(f"Hello! I'm {self._me.name.split()[0]}. Sorry, I'm {about.words}.")
-        if "?" in text:
-            return _say(self._choose(self._answers(person, about)))
-        return _say(self._choose(self._last_words(person, about, they_go=_GOES.search(text) is not None)))
+        options = self._answers if "?" in text else self._last_words
+        return _say(self._choose(options(person, self._told(about, person), text)))
 
-    def _greet(self, info: Info, time: float, errand: Callable[[], Errand]) -> Action | None:
+    def _greet(self, state: Mapping[str, Any], info: Info, errand: Callable[[], Errand]) -> Action | None:
+        time = state["time"]
         # Residents are told who is in view; others who live by a schedule greet nobody, but answer.
         for agent in info["in_view"].agents_within(GREETING_DISTANCE) if "in_view" in info else ():
             person = self._known.get(agent)
@@ -175,25 +186,34 @@ class Conversation:
             self._greeted[person.agent] = time
             self.encounters += 1
             self._said[person.agent] = 1
-            return _say(self._choose(self._greetings(person, time, errand())))
+            about = self._told(errand(), person)
+            return _say(self._choose(self._greetings(person, time, about, indoors=bool(state["room"]))))
         return None
+
+    def _told(self, errand: Errand, person: Acquaintance) -> Errand:
+        """Return what one is about as one tells a person: "having lunch with you", "with Dad"."""
+        words = errand.words
+        for one in self._known.values():
+            called = "you" if one is person else address_of(one, age=self._me.age, household=self._household)
+            if one is person or one.kind == "family":
+                words = re.sub(rf"(?<![\w-]){re.escape(one.first_name)}(?![\w-])", called, words)
+        return replace(errand, words=words)
 
     def _called(self, person: Acquaintance) -> tuple[str, bool]:
         """Return what one calls somebody, and whether that is formal."""
         other = address_of(person, age=self._me.age, household=self._household)
         return other, person.kind != "family" and other != person.first_name
 
-    def _greetings(self, person: Acquaintance, time: float, errand: Errand) -> list[str]:
+    def _greetings(self, person: Acquaintance, time: float, errand: Errand, *, indoors: bool) -> list[str]:
         other, _ = self._called(person)
         hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
         if min(self._me.age, person.age) < GROWN_UP:
             return self._greetings_with_children(person, errand, hour, hello)
-        lines = [
-            f"{hello}, {other}! I'm {errand.words}. And you?",
-            f"Hi {other}, how are you today?",
-            f"{hello}, {other}! Where are you off to?",
-        ]
+        ask = "" if re.search(r"\byou\b", errand.words) else " And you?"
+        lines = [f"{hello}, {other}! I'm {errand.words}.{ask}", f"Hi {other}, how are you today?"]
+        if not indoors:
+            lines.append(f"{hello}, {other}! Where are you off to?")
         if person.kind == "colleague":
             lines.append(f"{hello}, {other}! Are you working today, too?")
         if person.kind in ("friend", "family") and self._me.hobbies:
@@ -220,18 +240,11 @@ class Conversation:
                 lines.append(f"{other}! Do you feel like {self._hobby()} after school?")
         return lines
 
-    def _last_words(self, person: Acquaintance, errand: Errand, *, they_go: bool) -> list[str]:
-        """Return how a chat ends: with a goodbye if either goes, else with something kind.
-
-        Parameters
-        ----------
-        they_go
-            Whether the other one said that they go on.
-        """
+    def _last_words(self, person: Acquaintance, errand: Errand, text: str) -> list[str]:
+        """Return how a chat ends after what the other said: with a goodbye if either goes, else with something kind."""
         other, formal = self._called(person)
-        if not errand.leaves and not they_go:
-            lines = [f"Nice to see you, {other}!", f"Good to hear, {other}."]
-            return lines if self._me.age < GROWN_UP else [*lines, f"It's good to have you about, {other}."]
+        if not errand.leaves and not _GOES.search(text):
+            return [f"Nice to see you, {other}!", *([f"Good to hear, {other}."] if _TELLS.search(text) else [])]
         if formal:
             return [f"Goodbye, {other}!", f"Bye, {other}!"]
         if not errand.leaves:
@@ -240,20 +253,25 @@ class Conversation:
             return [f"Bye, {other}!", f"See you, {other}!", f"Bye bye, {other}!"]
         return [f"See you, {other}!", f"Take care, {other}.", f"Have a good one, {other}!"]
 
-    def _answers(self, person: Acquaintance, errand: Errand) -> list[str]:
+    def _answers(self, person: Acquaintance, errand: Errand, text: str) -> list[str]:
+        """Return what may be said to what the other asked."""
         other, formal = self._called(person)
-        hi = f"Hello, {other}" if formal else f"Hi {other}"
-        lines = [f"{hi}! I'm {errand.words}.", f"Fine, thanks, {other}. I'm {errand.words}."]
-        if self._me.age < GROWN_UP:
+        child = self._me.age < GROWN_UP
+        if _HOW.search(text):
+            lines = [f"Fine, thanks, {other}. I'm {errand.words}."]
+            if self._me.hobbies:
+                lines.append(f"All well, {other}. Looking forward to {self._hobby()} later.")
+            work = vocation_of(self._me.occupation)
+            if work.startswith(("a ", "an ")) and not child:
+                lines.append(f"Busy as ever, {other}: the life of {work}.")
             return lines
-        hurry = ", a little in a hurry" if errand.leaves else ""
-        lines.append(f"Good to see you, {other}. I'm {errand.words}{hurry}.")
-        if self._me.hobbies:
-            lines.append(f"All well, {other}. Looking forward to {self._hobby()} later.")
-        work = vocation_of(self._me.occupation)
-        if work.startswith(("a ", "an ")):
-            lines.append(f"Busy as ever, {other}: the life of {work}.")
-        return lines
+        if _INVITES.search(text):
+            return [f"Yes, gladly, {other}!", f"Maybe, {other}! I'm {errand.words}."]
+        if child and _SCHOOL.search(text):
+            was = "was" in text
+            return [f"It was all right, {other}.", f"Fine, {other}!"] if was else [f"Yes, {other}, everything!"]
+        hi = f"Hello, {other}" if formal else f"Hi {other}"
+        return [f"{hi}! I'm {errand.words}.", f"Good to see you, {other}. I'm {errand.words}."]
 
     def _hobby(self) -> str:
         return uncapitalized(self._choose(self._me.hobbies))

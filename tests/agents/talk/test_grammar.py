@@ -44,7 +44,8 @@ def test_no_greeting_and_no_reply_is_taken_for_a_question() -> None:
     class Me:
         id, name, age, occupation, hobbies = "resident_1", "Mia Holm", 30, "Baker", ["chess"]
 
-    lines = set()
+    lines: set[str] = set()
+    new: set[str] = set()
     for age in (8, 35):
         for mine in (9, 40):
             Me.age = mine
@@ -52,11 +53,11 @@ def test_no_greeting_and_no_reply_is_taken_for_a_question() -> None:
                 other = Acquaintance("resident_2", "Bo Dahl", kind, "", age)
                 talk = Conversation(Me(), [other], np.random.default_rng(1))
                 for errand in (Errand("having lunch", leaves=False), Errand("on my way home", leaves=True)):
-                    for hour in (8, 15, 20):
-                        lines |= set(talk._greetings(other, hour * 3600.0, errand))
-                    lines |= set(talk._answers(other, errand))
-                    for they_go in (True, False):
-                        lines |= set(talk._last_words(other, errand, they_go=they_go))
+                    for hour, indoors in ((8, True), (15, False), (20, True)):
+                        lines |= set(talk._greetings(other, hour * 3600.0, errand, indoors=indoors))
+                    for text in (*lines, "Hello, Mia!", "I'm on my way home, Mia."):
+                        new |= set(talk._answers(other, errand, text) + talk._last_words(other, errand, text))
+                    lines |= new
     assert len(lines) > 25
     grammar = read_grammar()
     assert [line for line in lines if grammar.question_in(line, names=("Bo Dahl", "Bo")) is not None] == []
