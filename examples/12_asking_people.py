@@ -8,14 +8,14 @@ python examples/12_asking_people.py --world out/demo/world --community out/demo/
 
 import argparse
 import math
+import sys
 from pathlib import Path
-
-import numpy as np
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.schedule import followers_of
 from vico.agents.talk.understanding import claims_in, place_named, whereabouts
 from vico.agents.wayfinding import Walker
+from vico.clock import seconds_of_day
 from vico.community import read_community
 from vico.seeds import rng
 from vico.sim.config import SimConfig
@@ -25,6 +25,10 @@ from vico.world.public import PublicMap
 
 # Seconds that an answer takes, and until the same people are asked again.
 ANSWER, AGAIN = 2, 40
+# Starts of the day that are tried, and seconds until two have come to where they can be asked.
+TRIES, PATIENCE = 8, 240
+# Who knows most of somebody's day; metres that others count as farther away.
+CLOSE, FAR = ("family", "friend"), 1e4
 
 
 class Asker:
@@ -84,21 +88,39 @@ def main() -> None:
     parser.add_argument("--community", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--steps", type=int, default=900)
-    parser.add_argument("--start", type=float, default=12.0, help="hour of the day")
+    parser.add_argument("--start", type=float, default=12.0, help="hour of the day; as near to it as people meet")
     arguments = parser.parse_args()
 
     world = read_world(arguments.world)
     community = read_community(arguments.community, world)
     public_map = PublicMap.from_world(world)
-    config = SimConfig(seed=arguments.seed, start=int(arguments.start * 3600), assistants=1, observe=())
-    sim = Simulation(world, community, config)
-    residents = followers_of(community, public_map, seed=arguments.seed)
 
-    # Who asks stands before somebody who is out of doors and has a friend who is indoors.
-    observations, infos = sim.observe()
-    friend, person = pair_of(community, observations)
-    x, y = observations[friend.id]["pose"][:2]
-    sim.scenario.place_agent("assistant_0", (float(x), float(y) - 2.0))
+    # Who asks stands before somebody who is out of doors and knows somebody who is indoors.
+    for start in starts(community, arguments.start * 3600)[:TRIES]:
+        config = SimConfig(seed=arguments.seed, start=start, assistants=1, observe=())
+        sim = Simulation(world, community, config)
+        residents = followers_of(community, public_map, seed=arguments.seed)
+        observations, infos = sim.observe()
+        pair = None
+        for _ in range(PATIENCE):
+            pair = pair_of(community, observations, infos)
+            if pair is not None:
+                break
+            actions = {name: agent.act(observations[name], infos[name]) for name, agent in residents.items()}
+            result = sim.step(actions)
+            observations, infos = result.observations, result.infos
+        if pair is not None:
+            break
+    else:
+        print(
+            "asking: nobody in this community walks by who knows somebody indoors: make a larger one", file=sys.stderr
+        )
+        sys.exit(2)
+
+    friend, person = pair
+    near = observations[friend.id]["pose"][:2]
+    beside = public_map.walkable.random_point(rng(arguments.seed, "beside"), near=near, radius=3.0)
+    sim.scenario.place_agent("assistant_0", (float(beside[0]), float(beside[1])))
     print(f"{person.name} is looked for; {friend.name} comes by")
     asker = Asker(person.name, public_map, seed=arguments.seed)
     observations, infos = sim.observe()
@@ -117,22 +139,44 @@ def main() -> None:
     print(f"found: {asker.found} after {lasted:.0f} s, {away:.0f} m away")
 
 
-def pair_of(community, observations):
-    """Return two friends, the first out of doors on foot, the second indoors; those nearest to each other."""
-    people, best = community.resident_by_id, (np.inf, None, None)
+def starts(community, wanted):
+    """Return when people set out on foot while somebody they know is indoors and awake, the nearest to a time first.
+
+    Seconds of the day; friends and family come before other acquaintances, who know less of each other's day.
+    """
+    people, found = community.resident_by_id, {}
+    for relation in community.relations:
+        for one, other in (relation.between, relation.between[::-1]):
+            for item in people[one].schedule:
+                time = seconds_of_day(item.start)
+                theirs = people[other].item_at(time)
+                if (
+                    item.type == "commute"
+                    and item.mode in (None, "walk")
+                    and theirs.building
+                    and theirs.type != "sleep"
+                ):
+                    found[time] = min(found.get(time, True), relation.kind not in CLOSE)
+    return sorted(found, key=lambda time: (found[time], abs(time - wanted), time))
+
+
+def pair_of(community, observations, infos):
+    """Return two who know each other, the first out of doors on foot, the second indoors; None if there are none.
+
+    Friends and family come first, then those nearest to each other.
+    """
+    people, best = community.resident_by_id, (math.inf, None)
     for relation in community.relations:
         for one, other in (relation.between, relation.between[::-1]):
             states = observations[one]["state"], observations[other]["state"]
-            outdoors = not states[0]["room"] and not states[0]["vehicle"]
+            outdoors = not states[0]["room"] and not states[0]["vehicle"] and not infos[one].get("coming_out")
             # In the first room behind the street door, where one can be spoken to.
-            outdoors = outdoors and any(door["to"] == "outside" for door in states[1].get("doors", ()))
-            if relation.kind in ("friend", "family") and outdoors:
+            if outdoors and any(door["to"] == "outside" for door in states[1].get("doors", ())):
                 away = math.dist(observations[one]["pose"][:2], observations[other]["pose"][:2])
+                away += 0.0 if relation.kind in CLOSE else FAR
                 if away < best[0]:
-                    best = away, people[one], people[other]
-    if best[1] is None:
-        raise SystemExit("nobody is out of doors who has a friend indoors at that hour: try another --start")
-    return best[1:]
+                    best = away, (people[one], people[other])
+    return best[1]
 
 
 if __name__ == "__main__":

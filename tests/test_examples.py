@@ -117,14 +117,23 @@ def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> N
     assert printed.endswith("film.mp4: 17 s\n")
 
 
-def test_people_are_asked_and_answer(helsinki: World, helsinki_path: Path, tmp_path: Path) -> None:
-    # Among thirty somebody is out of doors at noon who knows somebody indoors.
-    write_community(build_community(helsinki, residents=30), tmp_path / "people", world=helsinki_path)
+@pytest.mark.parametrize("residents", [2, 30])
+def test_people_are_asked_and_answer(residents: int, helsinki: World, helsinki_path: Path, tmp_path: Path) -> None:
+    write_community(build_community(helsinki, residents=residents), tmp_path / "people", world=helsinki_path)
     printed = run(
         "12_asking_people.py", "--world", str(helsinki_path), "--community", str(tmp_path / "people"), "--steps", "60"
     )
     assert "assistant: Excuse me, have you seen" in printed
     assert "   understood: " in printed
+
+
+def test_in_a_community_of_one_nobody_can_be_asked(helsinki: World, helsinki_path: Path, tmp_path: Path) -> None:
+    write_community(build_community(helsinki, residents=1), tmp_path / "people", world=helsinki_path)
+    where = ("--world", str(helsinki_path), "--community", str(tmp_path / "people"))
+    command = [sys.executable, str(EXAMPLES / "12_asking_people.py"), *where]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
+    assert done.returncode == 2
+    assert done.stderr == ("asking: nobody in this community walks by who knows somebody indoors: make a larger one\n")
 
 
 def test_an_arm_is_scored_on_lifting_a_box() -> None:
