@@ -11,7 +11,7 @@ _SILENT_H = re.compile(r"(?:hour|honest|honou?r|heir)")
 _SPOKEN_AS_VOWEL = "AEFHILMNORSX"
 # Of longer verbs those stressed at the end double their last letter, and in British spelling those in -l and -p.
 _DOUBLED = frozenset([
-    "abet", "abhor", "acquit", "admit", "allot", "begin", "bedim", "befit", "commit", "compel", "concur",
+    "abet", "abhor", "babysit", "acquit", "admit", "allot", "begin", "bedim", "befit", "commit", "compel", "concur",
     "confer", "control", "defer", "demur", "deter", "dispel", "embed", "emit", "equip", "excel", "expel",
     "forget", "forgot", "format", "handicap", "impel", "incur", "infer", "kidnap", "occur", "omit", "outfit",
     "outrun", "overcut", "overrun", "patrol", "permit", "prefer", "propel", "rebut", "recap", "recur", "refer",

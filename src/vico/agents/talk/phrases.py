@@ -30,6 +30,10 @@ _PARTICLES = frozenset([
 _DETERMINERS = frozenset([
     "a", "an", "another", "my", "one's", "our", "some", "that", "the", "this",
 ])  # fmt: skip
+# Meals that take an article.
+_KINDS = frozenset(["big", "brief", "early", "hearty", "late", "light", "long", "packed", "quick", "short", "simple"])
+# After these two things may be named: "have a meal and rest", "study music and dance".
+_TAKES = frozenset(["attend", "discuss", "enjoy", "have", "study", "take", "watch"])
 _ADVERBS = frozenset([
     "also", "always", "just", "now", "often", "still",
 ])  # fmt: skip
@@ -43,7 +47,7 @@ _OF_ONESELF = (
     (re.compile(r"\b(?:each other|one another)'s\b"), "the others'"),
     (re.compile(r"\b(?:each other|one another)\b"), "the others"),
     (re.compile(r"\btogether with\b"), "with"),
-    (re.compile(r"(?<=\w) together$"), " with the others"),
+    (re.compile(r"(?<=\w) together(?=$| (?:after|at|before|for|in|on|over)\b)"), " with the others"),
     (re.compile(r"\b(?:himself|herself|themselves|themself)\b"), "myself"),
 )
 # Right after the verb it is one's own: "walk their dog", but "help neighbours with their shopping".
@@ -140,27 +144,43 @@ def activity_of(words: str) -> Activity:
     """
     verbs = read_verbs()
     plain = uncapitalized(_bare(words, verbs)) or "something"
-    first = plain.split(" ", 1)[0]
-    if first in verbs.participles:
-        plain = verbs.participles[first] + plain[len(first) :]
     for pattern, mine in _OF_ONESELF:
         plain = pattern.sub(mine, plain)
-    if not _begins_with_verb(plain, verbs):
-        words_of = plain.lower().split(" ")
-        if words_of[0] not in _DETERMINERS and verbs.occasions.intersection(words_of):
-            plain = f"the {plain}"
-        return Activity(f"here for {plain}", f"for {plain}")
     parts = _JOINS.split(plain)
+    if parts[0].split(" ", 1)[0] in verbs.participles:
+        parts[::2] = [_infinitive(part, verbs) for part in parts[::2]]
+    if not _begins_with_verb(parts[0], verbs):
+        occasion = _occasion("".join(parts), verbs)
+        return Activity(f"here for {occasion}", f"for {occasion}")
     doing, going, infinitive = "", "", False
     for k, part in enumerate(parts):
-        is_verb = k == 0 or (k % 2 == 0 and not infinitive and _is_verb(part, parts[k - 2], verbs))
-        if is_verb:
+        follows = k > 0 and k % 2 == 0 and not infinitive
+        if k == 0 or (follows and ("then" in parts[k - 1] or _is_verb(part, parts[k - 2], verbs))):
             part = _THEIRS.sub(r"\1 my ", part)
             # "Get ready to go out and play": what follows an infinitive is one.
             found = _INFINITIVE.search(part)
             infinitive = found is not None and found[1] in verbs.verbs
-        doing, going = doing + (_turned(part, verbs) if is_verb else part), going + part
+            doing += _turned(part, verbs)
+        else:
+            doing += part
+        going += part
     return Activity(doing.removeprefix("being "), f"to {going}")
+
+
+def _infinitive(part: str, verbs: Verbs) -> str:
+    first, space, rest = part.partition(" ")
+    return f"{verbs.participles.get(first, first)}{space}{rest}"
+
+
+def _occasion(words: str, verbs: Verbs) -> str:
+    """Return an activity without a verb as one says it: "the team meeting", "a quick lunch", "breakfast"."""
+    first, *_ = listed = words.split(" ")
+    if first in _DETERMINERS:
+        return words
+    if first in _KINDS and not words.endswith("s"):
+        return with_article(words)
+    upto = next((k for k, word in enumerate(listed) if word in _PARTICLES or word == "and"), len(listed))
+    return f"the {words}" if listed[max(0, upto - 1)] in verbs.occasions else words
 
 
 def vocation_of(occupation: str) -> str:
@@ -173,7 +193,7 @@ def vocation_of(occupation: str) -> str:
 
 def _bare(words: str, verbs: Verbs) -> str:
     """Return an activity without the name of the group that does it, and without what would break a sentence's form."""
-    plain = " ".join(words.split())
+    plain = re.sub(r"^(?:I am|I'm|I) (?=\w)", "", " ".join(words.split()))
     head, colon, tail = plain.rpartition(": ")
     # "Chess table: play chess"; but not "Enjoy a cake at Cafe Engel: the new one", nor "Work at M. A. D: Micro Design".
     if colon and (_begins_with_verb(tail, verbs) or not _begins_with_verb(head, verbs)):
@@ -212,7 +232,9 @@ def _is_verb(part: str, before: str, verbs: Verbs) -> bool:
     bare = all(word in verbs.verbs or word in _PARTICLES for word in before.split(" "))
     if bare or first not in verbs.nouns or second in _DETERMINERS:
         return True
-    return bool(second) and not (first in verbs.dishes and second in _PARTICLES)
+    if first in verbs.dishes:
+        return bool(second) and second not in _PARTICLES
+    return bool(second) or before.split(" ", 1)[0] not in _TAKES
 
 
 def _turned(part: str, verbs: Verbs) -> str:

@@ -14,6 +14,7 @@ from vico.community.model import ActivityTag, Group, ItemType, Resident, Schedul
 from vico.community.place_index import PlaceIndex
 from vico.community.tags import tag_of
 from vico.community.validator import check_resident
+from vico.english import with_article
 
 # Somebody whose working hours nobody has said works so long, from this time on if the place is open, minutes.
 _WORKING_DAY, _USUAL_START, _EARLIEST = 8 * 60, 9 * 60, 6 * 60
@@ -153,7 +154,7 @@ def _work(index: PlaceIndex, person: Resident) -> list[Stay]:
     place = index.place_by_id[person.workplace]
     student = person.occupation.startswith("student")
     tag = ActivityTag.STUDY if student else ActivityTag.WORK
-    words = f"Study at {place.name}" if student else f"Work as {person.occupation}"
+    words = f"Study at {place.name}" if student else f"Work as {with_article(person.occupation)}"
     if end - start < _LONG_DAY:
         return [Stay(start, end, ItemType.MAIN, words, place.id, tag)]
     noon = (start + end) // 2 // 5 * 5
