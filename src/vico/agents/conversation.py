@@ -209,7 +209,7 @@ class Conversation:
         hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
         if min(self._me.age, person.age) < GROWN_UP:
-            return self._greetings_with_children(person, errand, hour, hello)
+            return self._greetings_with_children(person, errand, hour, hello, indoors=indoors)
         ask = "" if re.search(r"\byou\b", errand.words) else " And you?"
         lines = [f"{hello}, {other}! I'm {errand.words}.{ask}", f"Hi {other}, how are you today?"]
         if not indoors:
@@ -222,12 +222,16 @@ class Conversation:
             lines.append(f"{hello}, {other}! Is everything all right at home?")
         return lines
 
-    def _greetings_with_children(self, person: Acquaintance, errand: Errand, hour: float, hello: str) -> list[str]:
+    def _greetings_with_children(
+        self, person: Acquaintance, errand: Errand, hour: float, hello: str, *, indoors: bool
+    ) -> list[str]:
         """Return what children say, and what is said to them."""
         other, formal = self._called(person)
         if self._me.age >= GROWN_UP:
             school = "How was school?" if hour >= _SCHOOL_IS_OUT else "Have you got everything for school?"
-            lines = [f"Hello, {other}! {school}", f"Hi {other}! Where are you off to?"]
+            lines = [f"Hello, {other}! {school}"]
+            if not indoors:
+                lines.append(f"Hi {other}! Where are you off to?")
             if person.kind != "family":
                 lines.append(f"Hello, {other}! You have grown again.")
             return lines
@@ -237,7 +241,8 @@ class Conversation:
         if person.age < GROWN_UP:
             lines.append(f"Hey {other}! Are you coming out to play later?")
             if self._me.hobbies:
-                lines.append(f"{other}! Do you feel like {self._hobby()} after school?")
+                when = "later" if hour >= _SCHOOL_IS_OUT else "after school"
+                lines.append(f"{other}! Do you feel like {self._hobby()} {when}?")
         return lines
 
     def _last_words(self, person: Acquaintance, errand: Errand, text: str) -> list[str]:
