@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vico.english import participle, uncapitalized, with_article
+from vico.english import participle, split_name, uncapitalized, with_article
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,14 @@ def test_abbreviations_stay_capitals() -> None:
     assert [uncapitalized(text) for text in ("Write code", "UX designer", "F1 races", "I")] == [
         "write code", "UX designer", "F1 races", "I",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("Ada Berg", ("", "Ada", "Berg")), ("Dr. Amina van der Berg", ("Dr", "Amina", "van der Berg")),
+        ("Prof Dr. Ivo Ek", ("Dr", "Ivo", "Ek")), ("Cher", ("", "Cher", "")), ("Dr.", ("", "Dr.", "")),
+    ],
+)  # fmt: skip
+def test_a_title_is_no_first_name(name: str, parts: tuple[str, str, str]) -> None:
+    assert split_name(name) == parts

@@ -1,4 +1,4 @@
-"""Forms of English words, by rules and their exceptions: articles, participles, and words within a sentence."""
+"""Forms of English words and names, by rules and their exceptions: articles, participles, first names."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 # Vowels that are spoken as consonants, and the other way round, at the beginning of a word.
 _LIKE_YOU = re.compile(r"(?:eu|ewe|one(?!i)|once|u(?:ni(?!n|m)|se|su|ti|ro|k|fo)|ukr)")
 _SILENT_H = re.compile(r"(?:hour|honest|honou?r|heir)")
+_TITLES = re.compile(r"(?:mr|mrs|ms|miss|mx|dr|prof|professor|doctor|sir|rev|father|sister)\.?", re.IGNORECASE)
 # Letters whose names begin with a vowel: an MRI technician, an HR manager, but a UX designer.
 _SPOKEN_AS_VOWEL = "AEFHILMNORSX"
 # Of longer verbs those stressed at the end double their last letter, and in British spelling those in -l and -p.
@@ -43,6 +44,15 @@ def uncapitalized(text: str) -> str:
     return text if re.match(r"[A-Z]{2}|I\b|[A-Z]\d", text) else text[:1].lower() + text[1:]
 
 
+def split_name(name: str) -> tuple[str, str, str]:
+    """Return the title, the first name and the rest of a name: Dr, Jan, van der Berg; titles without their dot."""
+    words = name.split()
+    title = ""
+    while len(words) > 1 and _TITLES.fullmatch(words[0]):
+        title = words.pop(0).rstrip(".")
+    return title, words[0] if words else name, " ".join(words[1:])
+
+
 def participle(verb: str) -> str:
     """Return the present participle of a verb: lie, lying; sit, sitting; bake, baking. Compounds turn at their end."""
     head, hyphen, verb = verb.rpartition("-")
@@ -59,4 +69,4 @@ def participle(verb: str) -> str:
     return f"{head}{hyphen}{turned}"
 
 
-__all__ = ["participle", "uncapitalized", "with_article"]
+__all__ = ["participle", "split_name", "uncapitalized", "with_article"]

@@ -15,7 +15,7 @@ from vico.agents.talk.acquaintance import Acquaintance
 from vico.agents.talk.address import GROWN_UP, address_of, called_by, calls_somebody_nearer, is_called
 from vico.agents.talk.phrases import vocation_of
 from vico.clock import DAY
-from vico.english import uncapitalized
+from vico.english import split_name, uncapitalized
 
 # People greet within this distance, metres, and not twice within this time, seconds.
 GREETING_DISTANCE = 6.0
@@ -172,7 +172,7 @@ class Conversation:
         self._said[speaker] = self._said.get(speaker, 0) + 1
         about = errand()
         if person is None:
-            return _say(f"Hello! I'm {self._me.name.split()[0]}. Sorry, I'm {about.words}.")
+            return _say(f"Hello! I'm {split_name(self._me.name)[1]}. Sorry, I'm {about.words}.")
         options = self._answers if "?" in text else self._last_words
         return _say(self._choose(options(person, self._told(about, person), text)))
 

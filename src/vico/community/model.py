@@ -16,6 +16,7 @@ from typing_extensions import TypedDict
 
 from vico.clock import DAY, clock_of
 from vico.community.authorship import Authorship
+from vico.english import split_name
 from vico.errors import InputError
 from vico.world.model import Point2, Record
 
@@ -193,7 +194,7 @@ class Resident(Record):
     @property
     def first_name(self) -> str:
         """What friends call them."""
-        return self.name.split()[0]
+        return split_name(self.name)[1]
 
     def item_at(self, seconds: int) -> ScheduleItem:
         """Return the schedule item of a second of the day; at a boundary, the one that starts."""

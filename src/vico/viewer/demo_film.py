@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from vico.clock import seconds_of_day
+from vico.english import split_name
 from vico.render.film import write_film
 from vico.threads import in_order
 from vico.viewer.map_picture import MapPicture
@@ -163,5 +164,5 @@ def _draw_talk(frame: Image.Image, recording: Recording, step: int) -> None:
     for k, event in enumerate(said):
         name = recording.people.get(event.agent, {}).get("name", event.agent)
         y = HEIGHT - 86 + 28 * k
-        line = f"{name.split()[0]}: {event.text}"
+        line = f"{split_name(name)[1]}: {event.text}"
         draw.text((_LEFT, y), line if len(line) < 78 else line[:77] + "…", _INK, _font(14))

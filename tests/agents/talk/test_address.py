@@ -35,6 +35,8 @@ def person(name: str = "Neha Dornfeldt", age: int = 40, kind: str = "neighbour",
         (17, person("Jan van der Berg", gender="male", kind="colleague"), "Mr van der Berg"),
         (10, person(), "Neha Dornfeldt"),
         (10, person("Cher", gender="female"), "Cher"),
+        (10, person("Dr. Amina Patel", gender="female"), "Dr Patel"),
+        (40, person("Dr. Amina Patel", gender="female"), "Amina"),
         (18, person(gender="female"), "Neha"),
         (10, person(age=17, gender="female"), "Neha"),
         (10, person(gender="female", household="household_1", kind="friend", note="flatmates"), "Neha"),
@@ -85,6 +87,12 @@ def test_a_surname_has_its_particles() -> None:
 )
 def test_who_is_called_and_who_is_only_spoken_of(text: str, called: bool) -> None:
     assert is_called("Ann Berg", text, gender="female") is called
+
+
+@pytest.mark.parametrize("text", ["Hello, Amina!", "Dr. Patel, wait!", "Amina Patel, wait!", "Ms Patel, wait!"])
+def test_a_doctor_is_called_by_title_and_by_name(text: str) -> None:
+    assert is_called("Dr. Amina Patel", text, gender="female")
+    assert not is_called("Dr. Amina Patel", "Hello, Dr. Who!", gender="female")
 
 
 def said(me: Me, other: Acquaintance, text: str, errand: Errand, *bodies: Body, at: tuple[float, float]) -> str | None:

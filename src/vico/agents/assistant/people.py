@@ -14,6 +14,7 @@ from vico.agents.assistant.skills import WALK, Action, AssistantSkills, Observat
 from vico.agents.perception import Sighting
 from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, PACE_HOME
 from vico.agents.state import AgentState
+from vico.english import split_name
 
 Region = Mapping[str, Any]
 
@@ -90,7 +91,7 @@ class Meet:
         away = self._pursuit.away(view)
         if self._unseen == 0 and away <= _SPEAK and self._steps - self._spoke_at >= _AGAIN:
             self._spoke_at = self._steps
-            return {"type": "communicate", "text": _OFFER.format(self._person.split()[0])}
+            return {"type": "communicate", "text": _OFFER.format(split_name(self._person)[1])}
         self._skills.pace = WALK if away > _SPEAK else PACE_HOME
         step = self._pursuit.step(view, near=_STAND)
         self._skills.pace = WALK

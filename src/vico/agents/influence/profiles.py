@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from vico.english import split_name
+
 #: The big five, in the order of `Profile.five`.
 FIVE = ("openness", "conscientiousness", "extraversion", "agreeableness", "neuroticism")
 
@@ -52,7 +54,7 @@ class Profile:
     @property
     def first_name(self) -> str:
         """What one calls them."""
-        return self.name.split()[0]
+        return split_name(self.name)[1]
 
     def trait(self, name: str) -> float:
         """Return one of the big five, 0..1."""

@@ -21,6 +21,7 @@ from vico.agents.robot.team import Team, heard_from, told_seen
 from vico.agents.robot.thing_search import ThingSearch, side_of_try
 from vico.agents.robot.worker import ArmWorker
 from vico.agents.state import AgentState
+from vico.english import split_name
 
 Array = NDArray[np.float64]
 
@@ -118,7 +119,7 @@ class Manipulator:
         self._said += self.period
         if self._said >= _CALLS_EVERY:
             self._said = 0.0
-            name = str(self.told["person"]["name"]).split()[0]
+            name = split_name(str(self.told["person"]["name"]))[1]
             return {"type": "communicate", "text": f"{name}, we are here to carry it for you."}
         return self._turn()
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vico.clock import seconds_of_day
+from vico.english import split_name
 
 # What one knows of somebody's day, by what ties one to them.
 _WHOLE_DAY, _WORK, _WHERE_THEY_LIVE = ("family", "friend"), ("colleague",), ("family", "friend", "neighbour")
@@ -67,7 +68,7 @@ class Acquaintance:
     @property
     def first_name(self) -> str:
         """What one calls them."""
-        return self.name.split()[0]
+        return split_name(self.name)[1]
 
     def usual_at(self, second: float) -> Habit | None:
         """Return where they usually are at a second of the day, as far as one knows."""

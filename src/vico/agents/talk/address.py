@@ -10,6 +10,7 @@ from typing import Any
 
 from vico.agents.talk.acquaintance import Acquaintance
 from vico.agents.talk.grammar import read_grammar
+from vico.english import split_name
 
 #: Who is younger calls grown-ups of other families by title and surname, years.
 GROWN_UP = 18
@@ -45,12 +46,12 @@ _WORD = re.compile(r"[\w'’-]+")
 
 def first_name(name: str) -> str:
     """Return what somebody is called by, in small letters."""
-    return name.split()[0].casefold()
+    return split_name(name)[1].casefold()
 
 
 def surname(name: str) -> str:
     """Return the last name, with what belongs to it: van der Berg; empty for a single name."""
-    _, *rest = name.split()
+    rest = split_name(name)[2].split()
     k = len(rest) - 1
     while k > 0 and rest[k - 1].islower():
         k -= 1
@@ -66,8 +67,9 @@ def names_of(name: str, gender: str | None = "") -> tuple[str, ...]:
         ``female``, ``male``, empty for any title, or None for no title.
     """
     last = "" if gender is None else surname(name)
-    titled = [f"{title} {last}" for title in _TITLES.get(gender or "", ())] if last else []
-    return tuple(dict.fromkeys([name, name.split()[0], *titled]))
+    title, first, rest = split_name(name)
+    titles = [*_TITLES.get(gender or "", ()), *([title] if title else [])]
+    return tuple(dict.fromkeys([f"{first} {rest}".strip(), first, *(f"{one} {last}" for one in titles if last)]))
 
 
 def address_of(person: Acquaintance, *, age: int, household: str = "") -> str:
@@ -82,7 +84,7 @@ def address_of(person: Acquaintance, *, age: int, household: str = "") -> str:
         return _kin(person, age) or person.first_name
     if age >= GROWN_UP or person.age < GROWN_UP or (household and household == person.household):
         return person.first_name
-    last, title = surname(person.name), _TITLE.get(person.gender)
+    last, title = surname(person.name), split_name(person.name)[0] or _TITLE.get(person.gender)
     return f"{title} {last}" if title and last else person.name
 
 

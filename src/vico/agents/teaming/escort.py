@@ -17,6 +17,7 @@ from vico.agents.state import AgentState
 from vico.agents.teaming.visitor import LETS_GO
 from vico.agents.teaming.walking import apart, turn_towards
 from vico.agents.teaming.words import heard_from
+from vico.english import split_name
 from vico.exact import dot
 from vico.world.public import PublicMap
 from vico.world.walkable import OPEN, SIDEWALK
@@ -93,7 +94,7 @@ class Escort:
         if self._said > 0.0:
             return {"type": "wait"}
         self._said = _CALLS_EVERY
-        name = str(self.told["person"]["name"]).split()[0]
+        name = split_name(str(self.told["person"]["name"]))[1]
         return {"type": "communicate", "text": f"{name}, I am here to walk with you."}
 
     def _along(self, observation: Observation) -> Action:

@@ -17,6 +17,7 @@ from vico.agents.state import AgentState
 from vico.agents.teaming.newcomer import I_FOLLOW
 from vico.agents.teaming.walking import apart, sight_of, turn, turn_towards
 from vico.agents.teaming.words import heard_from
+from vico.english import split_name
 from vico.world.public import PublicMap
 
 Array = NDArray[np.float64]
@@ -99,7 +100,7 @@ class Leader:
         if self._said > 0.0:
             return {"type": "wait"}
         self._said = _CALLS_EVERY
-        name = str(self.told["person"]["name"]).split()[0]
+        name = split_name(str(self.told["person"]["name"]))[1]
         return {"type": "communicate", "text": f"{name}, please follow me, I know the way."}
 
     def _lead(self, observation: Observation, info: Info) -> Action:

@@ -18,6 +18,7 @@ from vico.challenges.assistant.thresholds import (
     SEEN_DISTANCE,
     SEEN_PIXELS,
 )
+from vico.english import split_name
 from vico.runner.loop import Hook, Step
 
 #: Every cause, in the order in which a table lists them.
@@ -217,7 +218,7 @@ class Chronicle(Hook):
         if not near or float(np.hypot(*apart)) > _MET:
             return
         # Others may be asked something in their hearing.
-        first = next(s.person.name for s in self.judge.task.subtasks if s.person.agent == person).split()[0]
+        first = split_name(next(s.person.name for s in self.judge.task.subtasks if s.person.agent == person))[1]
         if action.get("type") == "communicate" and first.casefold() in str(action.get("text", "")).casefold():
             story.spoke = True
         shown = np.asarray(observation["segmentation"]) == state.agent_entity(person)

@@ -21,6 +21,7 @@ from vico.challenges.assistant.thresholds import STEPS
 from vico.challenges.learning.env import Moment
 from vico.clock import seconds_of_day
 from vico.community.model import Community
+from vico.english import split_name
 from vico.envs import CommunityEnv, StepResult, make
 from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
 from vico.envs.arrays.surroundings import PEOPLE, THINGS, surroundings_of
@@ -170,7 +171,9 @@ class AssistantTask:
         """Return what is said to those who want help with carrying, one a subtask."""
         if self.category != "carry":
             return []
-        return [f"Hello {subtask.person.name.split()[0]}! May I help?" for subtask in self._task.subtasks[:SUBTASKS]]
+        return [
+            f"Hello {split_name(subtask.person.name)[1]}! May I help?" for subtask in self._task.subtasks[:SUBTASKS]
+        ]
 
     def told(self) -> Mapping[str, Any]:
         """Return the instructions, as planners get them."""
