@@ -21,6 +21,7 @@ def _toy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the toy city stand for any folders, and name no model."""
     monkeypatch.setattr(verb, "read_world", lambda path: toy_city.world())
     monkeypatch.setattr(verb, "read_community", lambda path, world: toy_city.community())
+    monkeypatch.setattr(verb, "read_names", lambda path: {one.id: one.name for one in toy_city.community().residents})
     for name in ("VICO_LLM_BASE_URL", "VICO_LLM_MODEL", "VICO_LLM_KEY", "OPENAI_BASE_URL", "OPENAI_API_KEY"):
         monkeypatch.delenv(name, raising=False)
 
