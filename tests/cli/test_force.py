@@ -79,6 +79,39 @@ def test_a_run_is_replaced_but_not_with_what_else_lies_in_it(
     assert (out / "notes.txt").exists()
 
 
+@pytest.mark.parametrize("name", ["segments/mine.txt", "views/resident_0/mine.png", "community/.git/HEAD"])
+def test_what_lies_deeper_in_a_run_survives_too(
+    name: str,
+    helsinki_run: tuple[Path, dict[str, object]],
+    verbs: dict[str, Words],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = shutil.copytree(helsinki_run[0], tmp_path / "run")
+    (out / name).parent.mkdir(parents=True, exist_ok=True)
+    (out / name).write_text("years of work")
+    assert vico(*verbs["run"], "--out", out, "--force") == 2
+    assert f"holds {name!r}, which no run does" in capsys.readouterr().err
+    assert (out / name).exists()
+
+
+@pytest.mark.parametrize("name", ["previews/my_photo.png", "meshes/notes.txt", "mine/a.txt"])
+def test_what_lies_deeper_in_a_world_survives_too(name: str, corner_path: Path, tmp_path: Path) -> None:
+    world = shutil.copytree(corner_path, tmp_path / "world")
+    (world / "meshes" / ".ground.glb.a1b2c3d4.glb").write_bytes(b"")  # of a build that was killed
+    WORLD_FOLDER.require(world)
+    (world / name).parent.mkdir(exist_ok=True)
+    (world / name).write_text("years of work")
+    with pytest.raises(OutputExistsError, match=f"holds '{name}', which no world does"):
+        WORLD_FOLDER.require(world)
+
+
+def test_a_link_to_a_run_is_said_to_be_one(helsinki_run: tuple[Path, dict[str, object]], tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(helsinki_run[0])
+    with pytest.raises(OutputExistsError, match="is a link, and --force replaces no links"):
+        RUN_FOLDER.require(tmp_path / "link")
+
+
 def test_an_export_is_replaced_and_a_world_is_not_by_an_export(
     verbs: dict[str, Words], corner_path: Path, tmp_path: Path
 ) -> None:

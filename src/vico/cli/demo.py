@@ -28,7 +28,7 @@ from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
 
 #: A run with the film of it.
-EVENING = replace(RUN_FOLDER, names=lambda folder: (*RUN_FOLDER.names(folder), _FILM))
+EVENING = replace(RUN_FOLDER, patterns=lambda folder: (*RUN_FOLDER.patterns(folder), _FILM))
 _FILM = "film.mp4"
 #: Folders that the demo makes, in the order in which it makes them.
 PARTS = ("world", "community", "run", "evening")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterator
@@ -24,6 +25,8 @@ _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 
 # What file managers leave in folders: nobody's work.
 _LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+# How `vico.io.files` names a file until it is whole.
+_HALF_WRITTEN = re.compile(r"^\.(.+)\.[a-z0-9_]{8}(?:\.[^.]+)?$")
 
 
 @dataclass(frozen=True)
@@ -36,13 +39,14 @@ class FolderKind:
         What to call one in errors: ``run``.
     manifest
         File that each of them has.
-    names
-        Returns the names that a folder of this kind may hold directly, given one with its manifest.
+    patterns
+        Returns the files that a folder of this kind may hold, given one with its manifest: paths relative to it, in
+        which ``*`` stands for any part of a name and ``**`` for any part of a path.
     """
 
     name: str
     manifest: str
-    names: Callable[[Path], Collection[str]]
+    patterns: Callable[[Path], Collection[str]]
 
     def require(self, folder: Path) -> None:
         """Make sure that a folder is of this kind, with nothing of anybody else's in it, or empty.
@@ -52,29 +56,56 @@ class FolderKind:
         OutputExistsError
             If it is not.
         """
-        if folder.is_symlink() or not folder.is_dir():
-            raise OutputExistsError(f"{folder}: is no folder, and --force replaces a {self.name} alone; choose another")
-        # A file that was being written when the program was killed has the name of the manifest within its own.
-        there = {path.name for path in folder.iterdir() if not path.name.startswith(f".{self.manifest}.")} - _LITTER
+        if folder.is_symlink():
+            raise OutputExistsError(f"{folder}: is a link, and --force replaces no links; give the folder it leads to")
+        if not folder.is_dir():
+            article = "an" if self.name[0] in "aeiou" else "a"
+            raise OutputExistsError(
+                f"{folder}: is no folder, and --force replaces {article} {self.name} alone; choose another"
+            )
+        there = _files_in(folder)
         if there and self.manifest not in there:
             raise OutputExistsError(
                 f"{folder}: holds {min(there)!r} and no {self.manifest}, so it is no {self.name}, and --force replaces "
                 "nothing else; choose another --out, or take it away yourself"
             )
-        if others := there - set(self.names(folder) if there else ()) - {self.manifest}:
+        if not there:
+            return
+        ours = re.compile("|".join(map(_expression, {self.manifest, *self.patterns(folder)})))
+        if others := [name for name in there if not ours.fullmatch(name)]:
             raise OutputExistsError(
                 f"{folder}: holds {min(others)!r}, which no {self.name} does; --force would delete it: choose another "
                 "--out, or take it away yourself"
             )
 
 
+def _files_in(folder: Path) -> set[str]:
+    """Return the files in a folder and below it, and what else is no folder, by their paths relative to it.
+
+    A file that was being written when the program was killed has its own name within a hidden one: it counts as that.
+    Empty folders of anybody's count, too.
+    """
+    found = set()
+    for here, folders, files in os.walk(folder):
+        inside = Path(here).relative_to(folder)
+        links = [name for name in folders if (Path(here) / name).is_symlink()]
+        names = [_HALF_WRITTEN.sub(r"\1", name) for name in (*files, *links) if name not in _LITTER]
+        found |= {(inside / name).as_posix() for name in names}
+    return found
+
+
+def _expression(pattern: str) -> str:
+    """Return a pattern of paths as a regular expression."""
+    parts = re.split(r"(\*\*|\*)", pattern)
+    return "".join({"*": "[^/]*", "**": ".*"}.get(part, re.escape(part)) for part in parts)
+
+
 def listed_in(manifest: str, key: str = "files") -> Callable[[Path], Collection[str]]:
-    """Return what finds the names directly in a folder whose manifest lists its files by relative path."""
+    """Return what finds the files of a folder whose manifest lists them by relative path."""
 
     def names(folder: Path) -> Collection[str]:
         content = read_json(folder / manifest)
-        listed = content.get(key, ()) if isinstance(content, dict) else ()
-        return {str(name).partition("/")[0] for name in listed}
+        return [str(name) for name in content.get(key, ())] if isinstance(content, dict) else []
 
     return names
 

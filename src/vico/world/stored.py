@@ -95,7 +95,9 @@ REQUIRED = (
 
 
 #: What a build makes.
-WORLD_FOLDER = FolderKind("world", "world.json", lambda folder: {*listed_in("world.json")(folder), *UNHASHED, STAGES})
+WORLD_FOLDER = FolderKind(
+    "world", "world.json", lambda folder: {*listed_in("world.json")(folder), *UNHASHED, f"{STAGES}/**"}
+)
 
 
 def world_files(folder: Path) -> list[str]:

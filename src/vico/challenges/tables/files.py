@@ -19,6 +19,7 @@ from vico.challenges.tables.summary import Summary, summarise
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_bytes, write_json
 from vico.io.folders import FolderKind
+from vico.sim.recording.schema import RUN_FOLDER
 from vico.version import __version__
 
 SCHEMA = "vico.results"
@@ -73,9 +74,15 @@ def timing_content(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
+# Recordings of episodes; of a day of influence there may be one an assignment, and its talks lie beside it.
+_RUNS = [
+    f"{run}/{name}"
+    for run in ("runs/*", "runs/*/*")
+    for name in (RUN_FOLDER.manifest, *RUN_FOLDER.patterns(Path()), "talks.json")
+]
 #: What an evaluation makes, in which its episodes lie.
 EVALUATION_FOLDER = FolderKind(
-    "evaluation", "results.json", lambda _: ("results.md", "timing.json", "episodes", "tasks", "runs")
+    "evaluation", "results.json", lambda _: ("results.md", "timing.json", "episodes/*.json", "tasks/*.json", *_RUNS)
 )
 
 

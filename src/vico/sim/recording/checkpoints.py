@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from vico.errors import MissingFileError
 from vico.io.files import read_json, write_json
 from vico.io.plain_data import read_plain, write_plain
-from vico.sim.recording.schema import CHECKPOINTS
+from vico.sim.recording.schema import AGENT_STATES, CHECKPOINTS, CLOCK, SIMULATION_STATE
 from vico.sim.recording.segments import written_folder
 from vico.sim.snapshot import read_snapshot, write_snapshot
 
 _NAME = re.compile(r"\d{8,}")
-_SIMULATION, _AGENTS, _CLOCK = "simulation.npz", "agents.bin", "clock.json"
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,9 @@ class Checkpoint:
 def write_checkpoint(run: Path, checkpoint: Checkpoint, *, owner: str) -> None:
     """Write a checkpoint, whole or not at all; `owner` is the identity of its simulation."""
     with written_folder(run / CHECKPOINTS / f"{checkpoint.step:08d}") as folder:
-        write_snapshot(folder / _SIMULATION, checkpoint.arrays, owner=owner)
-        write_plain(folder / _AGENTS, {"agents": checkpoint.agents, "notes": checkpoint.notes})
-        write_json(folder / _CLOCK, checkpoint.clock)
+        write_snapshot(folder / SIMULATION_STATE, checkpoint.arrays, owner=owner)
+        write_plain(folder / AGENT_STATES, {"agents": checkpoint.agents, "notes": checkpoint.notes})
+        write_json(folder / CLOCK, checkpoint.clock)
 
 
 def checkpoint_steps(run: Path) -> list[int]:
@@ -81,9 +80,9 @@ def read_checkpoint(run: Path, step: int, *, owner: str) -> Checkpoint:
     if not folder.is_dir():
         steps = ", ".join(map(str, checkpoint_steps(run))) or "none"
         raise MissingFileError(f"{run}: no checkpoint of step {step}; there are: {steps}")
-    arrays = read_snapshot(folder / _SIMULATION, owner=owner)
-    kept = read_plain(folder / _AGENTS)
-    return Checkpoint(step, arrays, kept["agents"], kept["notes"], read_json(folder / _CLOCK))
+    arrays = read_snapshot(folder / SIMULATION_STATE, owner=owner)
+    kept = read_plain(folder / AGENT_STATES)
+    return Checkpoint(step, arrays, kept["agents"], kept["notes"], read_json(folder / CLOCK))
 
 
 def drop_checkpoints_after(run: Path, step: int) -> None:

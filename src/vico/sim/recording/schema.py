@@ -32,7 +32,13 @@ REPLAY, DEMO_FILM = "replay.html", "demo.mp4"
 INTERVENTIONS, VIEWER_ADDRESS = "interventions.jsonl", "viewer.json"
 # The film as far as it was made where making it was interrupted.
 _DEMO_SO_FAR = "demo.partial.mp4"
-_RECORDED = (MANIFEST, AGENTS, CAST, METRICS, COMMUNITY, SETUP, SETUP_SHAPES, SEGMENTS, CHECKPOINTS, VIEWS)
+#: Of a checkpoint: the arrays of the simulation, what agents remember, and the clock and notes.
+SIMULATION_STATE, AGENT_STATES, CLOCK = "simulation.npz", "agents.bin", "clock.json"
+_RECORDED = (
+    *(MANIFEST, AGENTS, CAST, METRICS, SETUP, SETUP_SHAPES, f"{COMMUNITY}/*.json", f"{SEGMENTS}/*/*.parquet"),
+    *(f"{CHECKPOINTS}/*/{name}" for name in (SIMULATION_STATE, AGENT_STATES, CLOCK)),
+    *(f"{VIEWS}/*/*.mp4", f"{VIEWS}/*/*.npz"),
+)
 _BESIDE = (REPLAY, DEMO_FILM, _DEMO_SO_FAR, INTERVENTIONS, VIEWER_ADDRESS)
 RUN_FOLDER = FolderKind("run", MANIFEST, lambda _: (*_RECORDED, *_BESIDE))
 
