@@ -45,6 +45,13 @@ def test_letters_that_a_terminal_cannot_show_are_replaced(tmp_path: Path) -> Non
     assert "??d? ?? ?" in done.stdout
 
 
+def test_the_c_locale_shows_what_it_can(tmp_path: Path) -> None:
+    plain = {key: value for key, value in SEVEN_BITS.items() if key != "PYTHONIOENCODING"}
+    done = told(printing(tmp_path, f"print_table('t', dict(name='{NAME}'))"), **plain)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "??d? ?? ?" in done.stdout
+
+
 def test_a_table_with_words_shows_a_long_value_whole_below_it(tmp_path: Path) -> None:
     rows, words = {"steps": 5, "hash": "0123456789abcdef" * 4}, {"steps": "that were made", "hash": "of the state"}
     done = told(printing(tmp_path, f"print_table('t', {rows}, {words})"), COLUMNS="60")

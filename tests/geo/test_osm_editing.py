@@ -1,5 +1,6 @@
 """Files that map editors save: what is deleted in them, and drafts with negative ids."""
 
+import bz2
 import gzip
 from pathlib import Path
 
@@ -110,3 +111,46 @@ def test_a_history_of_objects_is_pointed_out(tmp_path: Path) -> None:
             writer.add_node(osmium.osm.mutable.Node(id=1, version=version, location=(0.0, 0.0), visible=True))
     with pytest.raises(SchemaError, match="osmium time-filter"):
         read_osm(path, FRAME, 100.0)
+
+
+@pytest.mark.parametrize("value", ["proposed", "planned", "demolished", "razed", "removed"])
+def test_a_building_that_is_planned_or_gone_is_not_there(tmp_path: Path, value: str) -> None:
+    gone = f'<tag k="building" v="{value}"/>'
+    data = read(tmp_path, NODES + way(11, [1, 2, 3, 4, 1], HOUSE) + way(12, [5, 6, 7, 8, 5], gone))
+    assert [area.id for area in data.areas if "building" in area.tags] == ["w11"]
+    assert ("w12", f"building={value}: it is not there") in data.broken
+
+
+REMARK = "<remark> runtime error: Query timed out in &quot;query&quot; at line 3 after 26 seconds. </remark>"
+
+
+@pytest.mark.parametrize("name", ["a.osm", "a.osm.gz"])
+def test_an_answer_of_overpass_that_is_not_whole_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SchemaError, match=r"Overpass stopped before its answer was whole .runtime error: Query timed"):
+        read(tmp_path, NODES + way(11, [1, 2, 3, 4, 1], HOUSE) + REMARK, name)
+    text = f"<osm version='0.6'>{REMARK}</osm>".encode()
+    (tmp_path / name).write_bytes(gzip.compress(text) if name.endswith(".gz") else text)
+    with pytest.raises(SchemaError, match="Overpass stopped"):
+        extract_centre(tmp_path / name)
+
+
+def test_an_answer_of_overpass_without_nodes_is_said_to_be_one(tmp_path: Path) -> None:
+    refs = "".join(f'<nd ref="{k}" lat="0.000{k}" lon="0.0001"/>' for k in (1, 2, 3, 1))
+    with pytest.raises(SchemaError, match=r"its nodes are not in it .Overpass's out geom."):
+        read(tmp_path, f'<way id="11">{refs}{HOUSE}</way>')
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b'{"version": 0.6, "elements": []}', "is JSON, which is not read"),
+        (gzip.compress(b"<osm/>"), "is packed with gzip; give it a name that ends in .osm.gz"),
+        (bz2.compress(b"<osm/>"), "is packed with bzip2"),
+        (b"PK\x03\x04rest", "is a ZIP archive; unpack it"),
+        (b"<!DOCTYPE html><html>", "is a web page, not a map"),
+    ],
+)
+def test_another_file_by_the_name_of_a_map_is_told_apart(tmp_path: Path, content: bytes, says: str) -> None:
+    (tmp_path / "a.osm").write_bytes(content)
+    with pytest.raises(SchemaError, match=says):
+        read_osm(tmp_path / "a.osm", FRAME, 100.0)

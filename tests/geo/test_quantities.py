@@ -28,6 +28,14 @@ from vico.geo.quantities import QUANTITIES, Kind, numbers, quantity, read
         ("40 ft 6 in", 12.3444),
         ("12’6”", 3.81),
         ("12½", 12.5),
+        ("½", 0.5),
+        ("1/2 m", 0.5),
+        ("12.m", 12.0),
+        ("12\u200b", 12.0),
+        ("10ft6in", 3.2004),
+        ("1m80", 1.8),
+        ("8 m 50 cm", 8.5),
+        ("12 Metern", 12.0),
         ("12 1/2 ft", 3.81),
         ("１２", 12.0),
         ("12\u00a0m", 12.0),
@@ -55,6 +63,8 @@ def test_plain_lengths_need_no_rule(text: str, metres: float) -> None:
         ("10 – 12 m", 12.0, "the highest of several values"),
         ("30-40 ft", 12.192, "the highest of several values"),
         ("7:90", 7.9, "a colon as the decimal point"),
+        ("1,250 ft", 381.0, "a comma between its thousands"),
+        ("ungefähr 12 m", 12.0, "an approximate value"),
     ],
 )
 def test_a_length_read_by_a_rule_names_it(text: str, metres: float, rule: str) -> None:
@@ -82,6 +92,10 @@ def test_what_is_no_length_is_not_read(text: str) -> None:
         (">4", 4.0),
         ("2;3", 3.0),
         ("1,2", 2.0),
+        ("1,75", 1.75),
+        ("2,50", 2.5),
+        ("½", 0.5),
+        ("3-storey", 3.0),
         ("3,4,5", 5.0),
         ("10-12", 12.0),
         ("G+4", 5.0),
@@ -106,6 +120,7 @@ def test_storeys(text: str, storeys: float | None) -> None:
         ("50 km/h", 50.0),
         ("30 mph", 48.28),
         ("20mph", 32.19),
+        ("30 (mph)", 48.28),
         ("DE:urban", 50.0),
         ("FI:zone30", 30.0),
         ("DE:zone:30", 30.0),
@@ -114,6 +129,11 @@ def test_storeys(text: str, storeys: float | None) -> None:
 )
 def test_speeds(text: str, kmh: float) -> None:
     assert (read(text, Kind.SPEED).value or 0.0) * 3.6 == pytest.approx(kmh, abs=0.01)
+
+
+@pytest.mark.parametrize(("text", "lanes"), [("2", 2.0), ("2 lanes", 2.0), ("1+1", 2.0), ("2;3", 3.0), ("1/2", 2.0)])
+def test_lanes(text: str, lanes: float) -> None:
+    assert read(text, Kind.LANES).value == lanes
 
 
 def test_a_value_that_cannot_be_is_as_good_as_none() -> None:

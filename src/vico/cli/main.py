@@ -312,7 +312,7 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
     Args:
         out: Folder to make; refused if it exists, unless --force.
         seed: Decides everything that is left to chance.
-        force: Replace what this verb made there before; refused if the folder holds anything else.
+        force: Replace the folders world, community, run and evening there; what else lies beside them stays.
     """
     from vico.cli import demo as verb
 
@@ -439,7 +439,8 @@ def _configure_logging(given: list[str]) -> list[str]:
 def _replace_what_cannot_be_shown() -> None:
     """Let a terminal of seven bits show what it can of a name, where Python would end the program."""
     for stream, errors in ((sys.stdout, "replace"), (sys.stderr, "backslashreplace")):
-        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
+            # In the C locale Python lets through what it could not read, and no more.
             stream.reconfigure(errors=errors)
 
 

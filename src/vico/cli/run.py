@@ -36,6 +36,7 @@ from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun, go_on_from
 from vico.sim.config import SimConfig
+from vico.sim.environment.sky import first_date
 from vico.sim.interventions import Line, read_interventions
 from vico.sim.names import name_called
 from vico.sim.recorder import Recorder
@@ -242,7 +243,7 @@ class Job:
             periods={} if played is None else {played.agent: PERIOD},
         )
         people = read_community(community, place)
-        if options.date is not None and config.on_day(None).date != people.date.isoformat():
+        if options.date is not None and first_date(options.date) != people.date:
             print(
                 f"{community}: its schedules are of {people.weekday} {people.date}; the run is on {options.date}, as "
                 "--date says",

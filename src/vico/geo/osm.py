@@ -17,7 +17,7 @@ from shapely import LineString, MultiPolygon, Polygon
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.multipolygons import GAP, MemberWay, area_of_members, role_meant
-from vico.geo.osm_editing import FIRST_DRAFT, deleted_objects, draft_places, own_id
+from vico.geo.osm_editing import FIRST_DRAFT, deleted_objects, draft_places, overpass_remark, own_id, places_in_ways
 from vico.geo.outlines import check_size, mended, simplified
 from vico.geo.overlay import OverlayError
 from vico.geo.overlay import polygons_of as polygons_of
@@ -201,7 +201,25 @@ def checked_extract(path: Path) -> Path:
         )
     if path.stat().st_size == 0:
         raise SchemaError(f"{path}: the file is empty; download it again")
+    with path.open("rb") as file:
+        start = file.read(512).lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    for mark, (ends, sentence) in _OTHER_FILES.items():
+        if start.startswith(mark) and not path.name.endswith(ends):
+            raise SchemaError(f"{path}: {sentence}")
     return path
+
+
+# How files begin that are another thing than their names say: which names are right, and what to do.
+_OTHER_FILES: Mapping[bytes, tuple[tuple[str, ...], str]] = {
+    b"{": ((), "is JSON, which is not read; ask Overpass for XML with [out:xml]"),
+    b"\x1f\x8b": ((".gz",), "is packed with gzip; give it a name that ends in .osm.gz"),
+    b"bzh": ((".bz2",), "is packed with bzip2; give it a name that ends in .osm.bz2"),
+    b"pk\x03\x04": ((), "is a ZIP archive; unpack it, and give the file in it"),
+    b"<!doctype html": ((), "is a web page, not a map; download the file itself"),
+    b"<html": ((), "is a web page, not a map; download the file itself"),
+}
+# Buildings that the map says are not there, or not yet.
+_NOT_STANDING = frozenset({"proposed", "planned", "demolished", "razed", "removed", "destroyed", "dismantled"})
 
 
 class _Reader:
@@ -227,6 +245,7 @@ class _Reader:
         self.objects = 0
         self.deleted: frozenset[tuple[str, int]] = frozenset()
         self.places: dict[int, tuple[float, float]] | None = None  # of nodes with negative ids
+        self.not_standing: dict[str, str] = {}  # what a building is said to be that is not there, by its key
 
     def read(self) -> None:
         with osmium.io.Reader(self.path, osmium.osm.NOTHING) as file:
@@ -244,7 +263,7 @@ class _Reader:
             if relation.deleted or ("r", relation.id) in self.deleted:
                 continue
             self.newest = max(self.newest, relation.timestamp.timestamp())
-            tags = dict(relation.tags)
+            tags = self._standing(f"r{own_id(relation.id)}", dict(relation.tags))
             members = [
                 (member.type, own_id(member.ref), member.role)
                 for member in relation.members
@@ -317,7 +336,15 @@ class _Reader:
         near = max(lats) >= self.south and min(lats) <= self.north and max(lons) >= self.west and min(lons) <= self.east
         if near or wanted:
             self.drafts += way.id < 0
-            self.way_rows.append((number, refs, lats, lons, dict(way.tags), near))
+            tags = self._standing(f"w{number}", dict(way.tags))
+            self.way_rows.append((number, refs, lats, lons, tags, near))
+
+    def _standing(self, key: str, tags: Tags) -> Tags:
+        """Return tags without those of a building that is planned or gone."""
+        for tag in ("building", "building:part"):
+            if tags.get(tag) in _NOT_STANDING:
+                self.not_standing[key] = f"{tag}={tags.pop(tag)}: it is not there"
+        return tags
 
     def _draft_place(self, number: int) -> tuple[float, float]:
         """Return latitude and longitude of a node with a negative id; NaN where it is not in the file."""
@@ -370,10 +397,15 @@ def read_osm(
     except (RuntimeError, ValueError, OSError, osmium.InvalidLocationError) as error:
         # libosmium reports everything from a cut block to a bad tag as one of these.
         raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
+    _check_whole(path)
     data = _assembled(reader, half, margin, sha256_of(path))
     window = f"the {2 * half:.0f} m square around {frame.lat}, {frame.lon}"
     if not (data.ways or data.nodes or data.areas):
         if reader.objects and reader.unlocated and not reader.way_rows:
+            if places_in_ways(path):
+                raise SchemaError(
+                    f"{path}: its nodes are not in it (Overpass's out geom); ask with (._;>;); out meta; instead"
+                )
             raise SchemaError(f"{path}: ways come before their nodes; sort it with: osmium sort FILE -o SORTED.osm.pbf")
         raise EmptyInputError(f"{path}: nothing in {window}; {_elsewhere(path, frame)}")
     square = shapely.box(-half, -half, half, half)
@@ -382,6 +414,12 @@ def read_osm(
     ):
         raise EmptyInputError(f"{path}: no building in {window}; {_elsewhere(path, frame)}")
     return data
+
+
+def _check_whole(path: Path) -> None:
+    """Make sure that Overpass could finish its answer."""
+    if "error" in (remark := overpass_remark(path)).lower():
+        raise SchemaError(f"{path}: Overpass stopped before its answer was whole ({remark}); ask it for less, or again")
 
 
 def extract_bounds(path: Path) -> tuple[float, float, float, float]:
@@ -407,6 +445,7 @@ def extract_bounds(path: Path) -> tuple[float, float, float, float]:
     except RuntimeError as error:
         raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
     if not places:
+        _check_whole(path)
         raise SchemaError(f"{path}: holds no points; download it again, or clip it anew")
     lats, lons = zip(*places, strict=True)
     return min(lats), min(lons), max(lats), max(lons)
@@ -435,7 +474,11 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
     by_id: dict[int, tuple[NDArray[np.float64], Tags]] = {}
     for (way_id, refs, _, _, tags, near), line in zip(reader.way_rows, _lines(reader), strict=True):
         by_id[way_id] = (line, tags)
-        if not near or not tags:
+        if not near:
+            continue
+        if sentence := reader.not_standing.get(f"w{way_id}"):
+            broken.append((f"w{way_id}", sentence))
+        if not tags:
             continue
         way = OsmWay(way_id, refs, line, len(refs) > 3 and refs[0] == refs[-1], tags)
         if not way.closed and _is_building(tags):
@@ -456,6 +499,8 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
                 areas.append(_plain(area, broken))
         if any((kind, ref) in kept for kind, ref, _ in relation.members):
             relations.append(relation)
+            if sentence := reader.not_standing.get(f"r{relation.id}"):
+                broken.append((f"r{relation.id}", sentence))
     found = OsmData(reader.frame, half, margin, nodes, ways, areas, relations, digest, _newest(reader), broken)
     return replace(found, covered=reader.covered)
 

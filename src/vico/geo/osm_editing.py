@@ -1,4 +1,4 @@
-"""What map editors leave in OpenStreetMap XML: objects that are deleted, and drafts with negative ids."""
+"""OpenStreetMap XML of editors and of Overpass: objects that are deleted, drafts, answers that are not whole."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ FIRST_DRAFT = 10**12
 _KINDS = {"node": "n", "way": "w", "relation": "r"}
 _MARK = re.compile(rb"""\b(?:action\s*=\s*["']delete|visible\s*=\s*["']false)""")
 _BLOCK, _LONGEST_MARK = 1 << 20, 64
+# Overpass says at the end of its answer why that is not whole.
+_REMARK = re.compile(rb"<remark>(.*?)</remark>", re.DOTALL)
+_NODE_WITH_PLACE = re.compile(rb"""<nd\s[^>]*\blat\s*=""")
+_END = 4096
 
 
 def own_id(number: int) -> int:
@@ -61,6 +65,29 @@ def deleted_objects(path: Path) -> frozenset[tuple[str, int]]:
     except (ParseError, DefusedXmlException, ValueError, OSError, EOFError, zlib.error, StopIteration):
         return frozenset()  # what reads the objects says what is wrong with the file
     return frozenset(found)
+
+
+def overpass_remark(path: Path) -> str:
+    """Return what Overpass says at the end of an answer in XML that it could not finish; empty if nothing."""
+    if path.name.lower().endswith(".pbf"):
+        return ""
+    try:
+        with _unpacked(path) as file:
+            end = b""
+            while block := file.read(_BLOCK):
+                end = (end + block)[-_END:]
+    except (OSError, EOFError, zlib.error):
+        return ""  # what reads the objects says what is wrong with the file
+    found = _REMARK.search(end)
+    return " ".join(found[1].decode("utf-8", "replace").split())[:200] if found else ""
+
+
+def places_in_ways(path: Path) -> bool:
+    """Whether ways carry the places of their nodes themselves, as Overpass writes them for ``out geom``."""
+    if path.name.lower().endswith(".pbf"):
+        return False
+    with _unpacked(path) as file:
+        return _NODE_WITH_PLACE.search(file.read(_BLOCK)) is not None
 
 
 def draft_places(path: Path) -> dict[int, tuple[float, float]]:

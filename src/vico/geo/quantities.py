@@ -29,6 +29,7 @@ class Kind(Enum):
     ANGLE = "angle"
     """Degrees."""
     NUMBER = "number"
+    LANES = "lanes"
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,12 @@ _FEET, _INCHES = ("ft", "feet", "foot", "fuß", "fuss", "pie", "pies", "'"), ("i
 _UNITS: dict[Kind, dict[str, float]] = {
     Kind.LENGTH: {
         **dict.fromkeys(("", "m", "mt", "mts", "mtr", "mtrs", "metre", "metres", "meter", "meters", "metro"), 1.0),
-        **dict.fromkeys(("metros", "mètre", "mètres", "м", "метр", "метров", "米"), 1.0),
+        **dict.fromkeys(("metern", "metros", "metri", "metrów", "mètre", "mètres", "м", "метр", "метров", "米"), 1.0),
         **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 0.01),
         **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 0.001),
         **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1000.0),
         **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
+        **dict.fromkeys(("mi", "mile", "miles"), 1609.344),
         **dict.fromkeys(_FEET, FOOT),
         **dict.fromkeys(_INCHES, INCH),
     },
@@ -72,6 +74,7 @@ _UNITS: dict[Kind, dict[str, float]] = {
     },
     Kind.ANGLE: dict.fromkeys(("", "°", "deg", "degree", "degrees", "grad"), 1.0),
     Kind.NUMBER: {"": 1.0},
+    Kind.LANES: dict.fromkeys(("", "lane", "lanes", "spur", "spuren", "voie", "voies", "carril", "carriles"), 1.0),
 }
 
 # Speeds that are said by what they are of, km/h.
@@ -79,19 +82,28 @@ _SPEED_WORDS = {"walk": 6.0, "living_street": 10.0, "urban": 50.0}
 _ZONE = re.compile(r"(?:[a-z]{2}:)?zone:?(\d+)")
 _COUNTRY = re.compile(r"[a-z]{2}(?:-[a-z]{2,3})?:")
 
-# Spellings of one thing; unicode's own compatible forms (full-width digits, no-break spaces) are resolved before.
+# Fractions that are a letter, after a whole number or alone.
+_FRACTION_LETTER = re.compile(r"(\d+)?\s*([¼½¾⅐-⅞])")
+# Spellings of one thing; unicode's own compatible forms (full-width digits, no-break spaces) are resolved after the
+# first and before the others.
+_FIRST = str.maketrans({"″": '"', "º": "°"})
 _ALIKE = str.maketrans(
     {**dict.fromkeys("’‘′´`ʹ", "'"), **dict.fromkeys("“”″„ʺ", '"'), **dict.fromkeys("−‐‑–—", "-"), "⁄": "/"}
 )
 _NUMBER = r"\d+(?:[ .,']\d{3})+(?:[.,]\d+)?(?!\d)|\d*[.,]?\d+"
-_ONE = re.compile(rf"(?P<number>[-+]?(?:{_NUMBER}))\s*(?P<unit>[^\d\s.,;:()+-][^\s\d,;:()]*)?")
+_ONE = re.compile(rf"(?P<number>[-+]?(?:{_NUMBER}))(?:\.(?=[^\W\d]))?\s*(?P<unit>[^\d\s.,;:()+-][^\s\d,;:()]*)?")
 _FEET_AND_INCHES = re.compile(
-    r"(?P<feet>\d+(?:[.,]\d+)?)\s*(?:'(?!')|ft\b\.?|feet\b|foot\b)\s*(?:and\s*)?-?\s*"
+    r"(?P<feet>\d+(?:[.,]\d+)?)\s*(?:'(?!')|ft(?![a-z])\.?|feet(?![a-z])|foot(?![a-z]))\s*(?:and\s*)?-?\s*"
     r"(?P<inches>\d+(?:[.,]\d+)?)\s*(?:\"|''|in\b\.?|inch(?:es)?\b)?\.?"
 )
+# "1m80", "8 m 50 cm".
+_METRES_AND_CENTIMETRES = re.compile(r"(\d+)\s*m\s*(\d\d)(?:\s*cm)?")
+# A comma between thousands, where nobody would measure in thousandths: of feet.
+_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
+_UNIT_IN_BRACKETS = re.compile(r"(.*\d)\s*\(([^\s\d()]+)\)")
 _ABOUT = re.compile(
     r"^(?:~|≈|≃|±|\+/-|ca\b\.?|circa\b|c\.|approx\b\.?|approximately\b|about\b|around\b|est\b\.?|estimated\b|etwa\b|env\b\.?|"
-    r"environ\b|roughly\b)\s*"
+    r"environ\b|roughly\b|um\b|ungefähr\b|aprox\b\.?|cca\b\.?|około\b|около\b|ок\.|c(?=\d))\s*"
 )
 _BOUND = re.compile(
     r"^(?:>=?|<=?|≥|≤|over\b|above\b|under\b|below\b|up to\b|at least\b|at most\b|min\b\.?|max\b\.?|more than\b|"
@@ -103,6 +115,8 @@ _SEVERAL = re.compile(
     r"|(?<=[\w'\"°])\s*(?:-|\.\.+)\s*(?=-?\d)"
 )
 _FRACTION = re.compile(r"(?<![\d.,/])(\d+) (\d)/([2-9])(?![\d/])")
+# Of a length; of storeys and lanes "1/2" lists two.
+_LESS_THAN_ONE = re.compile(r"^(1/2|1/3|2/3|1/4|3/4)(?![\d/])")
 _DASHED_INCHES = re.compile(r"(?<=')\s*-\s*(?=\d+(?:[.,]\d+)?\s*(?:\"|''|in\b))")
 _COLON = re.compile(r"(?<!\d)(\d+):(\d+)(?![\d:])")
 # Terms of storeys that are letters: the ground floor counts as one, cellars and what lies in the roof as none.
@@ -129,12 +143,26 @@ def read(text: str | None, kind: Kind = Kind.NUMBER) -> Reading:
     return _read(text, kind) if text and not text.isspace() else Reading(None)
 
 
-@lru_cache(maxsize=65536)
-def _read(text: str, kind: Kind) -> Reading:
-    said = unicodedata.normalize("NFKC", text.replace("″", '"').replace("½", " 1/2")).translate(_ALIKE)
+def _spelt_alike(text: str, kind: Kind) -> str:
+    """Return a value in small letters, with one spelling of marks and fractions, and its unit beside its number."""
+    said = _FRACTION_LETTER.sub(lambda found: f"{int(found[1] or 0) + unicodedata.numeric(found[2]):g}", text)
+    said = unicodedata.normalize("NFKC", said.translate(_FIRST)).translate(_ALIKE)
+    said = "".join(letter for letter in said if unicodedata.category(letter) != "Cf")
     said = " ".join(said.lower().split())
     said = _FRACTION.sub(lambda found: f"{int(found[1]) + int(found[2]) / int(found[3]):g}", said)
     said = _DASHED_INCHES.sub(" ", said)
+    if (found := _UNIT_IN_BRACKETS.fullmatch(said)) and found[2].rstrip(".") in _UNITS[kind]:
+        said = f"{found[1]} {found[2]}"
+    if kind is Kind.LENGTH and (found := _LESS_THAN_ONE.match(said)):
+        said = f"{int(found[1][0]) / int(found[1][2]):g}{said[found.end() :]}"
+    if kind is Kind.STOREYS:
+        said = re.sub(r"(?<=\d)-(?=[a-z])", " ", said)  # "3-storey"
+    return said
+
+
+@lru_cache(maxsize=65536)
+def _read(text: str, kind: Kind) -> Reading:
+    said = _spelt_alike(text, kind)
     if kind is Kind.SPEED and (named := _named_speed(said)) is not None:
         return named
     rules: list[str] = []
@@ -153,6 +181,8 @@ def _read(text: str, kind: Kind) -> Reading:
     if kind is Kind.LENGTH and _COLON.fullmatch(said):
         rules.append("a colon as the decimal point")
         said = said.replace(":", ".")
+    if kind is Kind.LANES and re.fullmatch(r"\d+(?: ?\+ ?\d+)+", said):
+        return Reading(float(sum(map(int, said.split("+")))), "; ".join([*rules, "added up"]))
     if kind is Kind.STOREYS and (summed := _sum_of_storeys(said)) is not None:
         return Reading(summed.value, "; ".join([*rules, summed.rule]))
     pieces = [piece for piece in _several(said, kind) if piece]
@@ -178,8 +208,8 @@ class _Piece:
 
 def _several(said: str, kind: Kind) -> list[str]:
     """Part a list or a range into its values."""
-    if kind is Kind.STOREYS and not re.fullmatch(r"\d+,5", said):
-        # Half storeys are all the fractions there are: "1,2" lists two values, "1,5" is one and a half.
+    if kind is Kind.STOREYS and not re.fullmatch(r"\d+,(?:50?|25|75)", said):
+        # Halves and quarters are all the fractions there are: "1,2" lists two values, "1,5" is one and a half.
         said = said.replace(",", ";")
     return _SEVERAL.split(said.strip(" ,"))
 
@@ -191,6 +221,8 @@ def _one(piece: str, kind: Kind) -> _Piece | None:
             return None
         metres = float(found["feet"].replace(",", ".")) * FOOT + float(found["inches"].replace(",", ".")) * INCH
         return _Piece(metres, "m")
+    if kind is Kind.LENGTH and (found := _METRES_AND_CENTIMETRES.fullmatch(piece)):
+        return _Piece(int(found[1]) + int(found[2]) / 100.0, "m")
     found = _ONE.match(piece)
     if found is None:
         return None
@@ -198,7 +230,10 @@ def _one(piece: str, kind: Kind) -> _Piece | None:
     rest = piece[found.end() :].strip(" .")
     if unit not in _UNITS[kind] or (rest and not unit) or re.search(r"\d", rest):
         return None
-    return _Piece(_decimal(found["number"]), unit, "the words after it left out" if rest else "")
+    rule = "the words after it left out" if rest else ""
+    if unit in _FEET and _THOUSANDS.fullmatch(found["number"]):
+        return _Piece(float(found["number"].replace(",", "")), unit, rule or "a comma between its thousands")
+    return _Piece(_decimal(found["number"]), unit, rule)
 
 
 def _decimal(number: str) -> float:
@@ -243,7 +278,7 @@ class Range:
 
 #: What stages read by the tag's key.
 QUANTITIES: Mapping[str, Range] = {
-    **dict.fromkeys(("height", "building:height", "est_height"), Range(Kind.LENGTH, 0.0, 900.0)),
+    **dict.fromkeys(("height", "building:height", "est_height"), Range(Kind.LENGTH, 0.1, 900.0)),
     **dict.fromkeys(("min_height", "building:min_height"), Range(Kind.LENGTH, 0.0, 900.0)),
     "roof:height": Range(Kind.LENGTH, 0.0, 200.0),
     "building:levels": Range(Kind.STOREYS, 1.0, 150.0),
@@ -255,7 +290,7 @@ QUANTITIES: Mapping[str, Range] = {
     "circumference": Range(Kind.LENGTH, 0.0, 50.0),
     "diameter_crown": Range(Kind.LENGTH, 0.0, 60.0),
     "maxspeed": Range(Kind.SPEED, 0.0, 100.0),
-    **dict.fromkeys(("lanes", "lanes:forward", "lanes:backward"), Range(Kind.NUMBER, 0.0, 20.0)),
+    **dict.fromkeys(("lanes", "lanes:forward", "lanes:backward"), Range(Kind.LANES, 0.0, 20.0)),
     "layer": Range(Kind.NUMBER, -10.0, 10.0),
 }
 

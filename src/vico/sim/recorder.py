@@ -82,8 +82,6 @@ class Recorder:
         self.notes = dict(notes or {})
         if out.exists() and any(out.iterdir()):
             raise OutputExistsError(f"{out}: the folder is not empty; give another, or --force")
-        with write_errors(out):
-            out.mkdir(parents=True, exist_ok=True)
         self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every, keep=keep)
         with self._errors():
             if sim.community is not None and self._sources["community"] == COMMUNITY:
@@ -106,6 +104,8 @@ class Recorder:
             raise InputError(f"{out}: {unknown[0]!r} is to be kept, but the run is not asked for it (outputs)")
         if states_every is not None and states_every < 1:
             raise InputError(f"{out}: a checkpoint every {states_every} steps; it has to be 1 or more, or None")
+        with write_errors(out):
+            out.mkdir(parents=True, exist_ok=True)
         # Held as long as this process lives, so that nobody takes the run for one that was killed.
         self._lock = FolderLock(out)
         self.out, self.sim, self.wanted, self.states_every = out, sim, wanted, states_every

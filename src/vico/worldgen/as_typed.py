@@ -24,6 +24,7 @@ _UNITS = {
     Kind.SPEED: " m/s",
     Kind.ANGLE: " degrees",
     Kind.NUMBER: "",
+    Kind.LANES: "",
 }
 # Values of `maxspeed` that say no speed, and mean to.
 _WORDS = frozenset({"none", "signals", "variable", "no", "unknown"})

@@ -18,6 +18,23 @@ _LUNATION = 28.0  # astral's moon phases go from 0 to this
 _MOST_OFFSET = 14.0
 
 
+def first_date(text: str) -> date:
+    """Read the date of a run's first day.
+
+    Raises
+    ------
+    InputError
+        If it is not of the form YYYY-MM-DD, or of the years 1900 to 2100.
+    """
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        raise InputError(f"date: {text!r} is no date; write YYYY-MM-DD, for example 2026-06-21") from None
+    if not 1900 <= day.year <= 2100:
+        raise InputError(f"date: the year {day.year} is out of range; take 1900..2100")
+    return day
+
+
 @dataclass(frozen=True)
 class Sky:
     """Sun and moon over a place.
@@ -46,12 +63,7 @@ class Sky:
         InputError
             If the date is not of the form YYYY-MM-DD, or the offset is no time zone's.
         """
-        try:
-            day = date.fromisoformat(first_day)
-        except ValueError:
-            raise InputError(f"date: {first_day!r} is no date; write YYYY-MM-DD, for example 2026-06-21") from None
-        if not 1900 <= day.year <= 2100:
-            raise InputError(f"date: the year {day.year} is out of range; take 1900..2100")
+        day = first_date(first_day)
         if utc_offset is not None and not abs(utc_offset) <= _MOST_OFFSET:
             raise InputError(f"utc_offset: {utc_offset:g} hours; it has to be -14..14")
         return cls(lat, lon, day, float(round(lon / 15.0)) if utc_offset is None else utc_offset)

@@ -16,6 +16,7 @@ from vico.errors import InputError
 from vico.exact import product
 from vico.seeds import rng
 from vico.sim.animation import STYLE, Hands, Hold, Transition, free_hands, pose, style_of
+from vico.sim.names import name_called
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian
 from vico.sim.recording.cast import CastMember
 from vico.sim.recording.run import Run
@@ -112,9 +113,8 @@ def motion_of(run: Run, agent: str) -> MotionClip:
         If no person of that name takes part in it, or was not recorded.
     """
     people = {a["name"]: a["entity"] for a in run.agents if a["kind"] != "robot"}
-    if agent not in people:
-        raise InputError(f"{run.path}: no person is called {agent!r}; there are {', '.join(people) or 'none'}")
-    entity, posed = people[agent], PosedPeople(run)
+    names = {name: called for name, called in run.names.items() if name in people}
+    entity, posed = people[name_called(agent, names, option=f"{run.path}: agent")], PosedPeople(run)
     rows = run.columns("bodies")
     mine = np.flatnonzero(rows["entity"] == entity)
     steps, yaw = rows["step"][mine], rows["yaw"][mine]
