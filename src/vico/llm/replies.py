@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from vico.llm.objects import is_one_object, objects_in
 from vico.llm.thoughts import ends_in_an_object, without_thoughts
 
 T = TypeVar("T", bound=BaseModel)
@@ -22,8 +23,6 @@ Check = Callable[[T], list[str]]
 
 MOST_CHARACTERS = 1 << 20
 _MOST_FINDINGS = 12
-_MOST_OBJECTS = 20
-_MOST_BRACES = 200
 _MOST_MENDINGS = 3
 _NUMERAL = re.compile(r"[-+]?\d{1,15}(?:\.\d{1,15})?")
 # Fields of a call of a tool, in the forms that models write as text.
@@ -129,33 +128,31 @@ def read(text: str, reply: type[T], check: Check[T] | None) -> Read[T]:
     """Read a record out of a reply, whatever is said around it.
 
     What is marked as thought is cut. Numbers that are written as text, fields that the record does not have, and an
-    envelope of one field around it are taken where the meaning is plain.
+    envelope around it are taken where the meaning is plain; so are comments and needless commas in the JSON.
 
     Returns
     -------
     Read
-        The last JSON object that is such a record, if `check` accepts it; else what is wrong with it, or with the
-        largest there is: at most twelve findings, each with the path of the field.
+        The last JSON object that is such a record, if `check` accepts it and no broken object comes after it; else
+        what is wrong: at most twelve findings, each with the path of the field.
     """
     if len(text) > MOST_CHARACTERS:
         return Read(None, [f"the reply has {len(text):,} characters; at most {MOST_CHARACTERS:,} are read"])
     whole = text.strip()
     # A reply that is an object and nothing else has no thoughts around it, whatever words are in it.
-    said = text if whole.startswith("{") and _is_json(whole) else without_thoughts(text)
-    objects, broken = _objects(said)
+    said = text if is_one_object(whole) else without_thoughts(text)
     findings: list[str] = []
     worst = -1
-    for content in reversed(objects):
-        value, wrong = _record(content, reply)
+    for one in reversed(objects_in(said)):
+        value, wrong = _called(one.closed, reply, one.fault) if one.fault else _record(one.content, reply)
         if value is not None:
             wrong = list(check(value)) if check is not None else []
             # An object that comes before the answer is a draft: it is not taken where the answer is refused.
             return Read(None, [plain(one) for one in wrong[:_MOST_FINDINGS]]) if wrong else Read(value, [])
-        if len(content) > worst:
-            worst, findings = len(content), wrong
-    if broken is not None and 2 * worst < len(said):
-        # What could be read are parts of the broken object, and their faults would lead astray.
-        findings = [broken]
+        if one.end - one.start > worst:
+            worst, findings = one.end - one.start, wrong
+        if one.fault:
+            break  # so are objects that come before a broken one
     nothing = "the reply holds no JSON object" if said.strip() or not whole else "the reply is thought and no answer"
     return Read(None, [plain(one) for one in findings[:_MOST_FINDINGS]] or [nothing])
 
@@ -177,6 +174,13 @@ def _record(content: str, reply: type[T]) -> tuple[T | None, list[str]]:
     if inner is not None:
         value, _ = _plainly(inner, reply)
     return value, wrong
+
+
+def _called(closed: str, reply: type[T], fault: str) -> tuple[T | None, list[str]]:
+    """Return the record that a call holds whose last brace is missing: its arguments are whole."""
+    call = json.loads(closed) if closed else {}
+    inner = _enveloped(call) if call.keys() <= _CALL and call.keys() & _ARGUMENTS else None
+    return (_plainly(inner, reply)[0] if inner is not None else None), [fault]
 
 
 def _enveloped(content: dict[str, Any]) -> str | None:
@@ -263,26 +267,3 @@ def _finding(error: Any) -> str:
 def plain(words: str) -> str:
     """Return a model's words as one line without control characters, fit for an error message."""
     return " ".join("".join(c if c.isprintable() else " " for c in words).split())[:400]
-
-
-def _objects(text: str) -> tuple[list[str], str | None]:
-    """Return the JSON objects in a text that lie in no other, in order; and where the first one breaks, if it does."""
-    found: list[str] = []
-    broken: str | None = None
-    decoder = json.JSONDecoder()
-    at = 0
-    for _ in range(_MOST_BRACES):
-        at = text.find("{", at)
-        if at < 0 or len(found) == _MOST_OBJECTS:
-            break
-        try:
-            _, end = decoder.raw_decode(text, at)
-        except (ValueError, RecursionError) as error:
-            if broken is None and not found:
-                where = f"character {error.pos}: {error.msg}" if isinstance(error, json.JSONDecodeError) else str(error)
-                broken = f"the JSON object is broken at {where}"[:200]
-            at += 1
-            continue
-        found.append(text[at:end])
-        at = end
-    return found, broken
