@@ -6,6 +6,7 @@ import io
 import struct
 import zipfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,15 @@ FRAME = LocalFrame(43.5, 7.5)
 
 
 def write_geotiff(
-    path: Path, heights: np.ndarray, *, west: float, north: float, step: float, code: int = 4326, **how: Any
+    path: Path,
+    heights: np.ndarray,
+    *,
+    west: float,
+    north: float,
+    step: float,
+    code: int = 4326,
+    more: Sequence[tuple[Any, ...]] = (),
+    **how: Any,
 ) -> Path:
     kind = 2048 if code in (4326, 4269) else 3072
     keys = (1, 1, 0, 3, 1024, 0, 1, 2, 1025, 0, 1, 2, kind, 0, 1, code)
@@ -34,6 +43,7 @@ def write_geotiff(
         (33922, "d", 6, (0.0, 0.0, 0.0, west, north, 0.0), False),
         (34735, "H", len(keys), keys, False),
         (42113, "s", 0, "-9999", False),
+        *more,
     ]
     tifffile.imwrite(path, heights, extratags=tags, **how)
     return path
@@ -50,6 +60,36 @@ def test_a_geotiff_s_heights_lie_where_its_tags_say(tmp_path: Path) -> None:
     lat, _ = FRAME.to_geodetic(samples.points[:, :2])
     # Pixel is point: row r lies at north - r * step, and is 10 r high.
     assert np.abs(samples.points[:, 2] - (43.515 - lat) / 0.0005 * 10).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("items", "scale", "offset"),
+    [
+        ('<Item name="SCALE" sample="0" role="scale">0.1</Item>', 0.1, 0.0),
+        (
+            '<Item sample="0" role="offset" name="OFFSET">500</Item>\n<Item name="SCALE" role="scale">0.1</Item>',
+            0.1,
+            500.0,
+        ),
+        ('<Item name="UNITTYPE" sample="0" role="unittype">ft</Item>', 0.3048, 0.0),
+        ('<Item name="UNITTYPE" sample="0" role="unittype">cm</Item>', 0.01, 0.0),
+        ('<Item name="SCALE" sample="1" role="scale">0.1</Item>', 1.0, 0.0),
+    ],
+)
+def test_the_band_s_scale_offset_and_unit_count(tmp_path: Path, items: str, scale: float, offset: float) -> None:
+    metadata = (42112, "s", 0, f"<GDALMetadata>{items}</GDALMetadata>", False)
+    counts = np.round((slope() + 500.0 - offset) / scale).astype(np.int32)
+    path = write_geotiff(tmp_path / "a.tif", counts, west=7.485, north=43.515, step=0.0005, more=[metadata])
+    samples = read_elevation(path, FRAME, 300.0)
+    lat, _ = FRAME.to_geodetic(samples.points[:, :2])
+    assert samples.points[:, 2] == pytest.approx(500.0 + (43.515 - lat) / 0.0005 * 10, abs=0.6)
+
+
+def test_a_scale_that_is_no_number_is_refused(tmp_path: Path) -> None:
+    metadata = (42112, "s", 0, '<GDALMetadata><Item role="scale">much</Item></GDALMetadata>', False)
+    path = write_geotiff(tmp_path / "a.tif", slope(), west=7.485, north=43.515, step=0.0005, more=[metadata])
+    with pytest.raises(SchemaError, match="its band's scale 'much' and offset '0' are no numbers"):
+        read_elevation(path, FRAME, 300.0)
 
 
 def test_voids_are_filled_from_their_neighbours_and_counted(tmp_path: Path) -> None:

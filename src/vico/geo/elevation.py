@@ -50,6 +50,11 @@ class HeightSamples:
     outliers
         File, latitude, longitude and metres of each pixel that was left out, as no ground stands so far above or below
         all around it (a spike, a hole); it is filled as voids are.
+    voids
+        File, latitude, longitude, metres, number of pixels and step to the ground around, metres, of each patch of one
+        value that was left out as a void that the file does not tag.
+    doubtful
+        The same of patches that may be such a void, or a sea below cliffs or the top of a tower; they are kept.
     """
 
     points: NDArray[np.float64]
@@ -61,6 +66,8 @@ class HeightSamples:
     covered: float = 1.0
     beyond: str = ""
     outliers: tuple[tuple[str, float, float, float], ...] = ()
+    voids: tuple[tuple[str, float, float, float, int, float], ...] = ()
+    doubtful: tuple[tuple[str, float, float, float, int, float], ...] = ()
 
 
 def read_elevation(
@@ -134,8 +141,15 @@ def read_elevation(
     total += "".join(f" {path.name} {crs}" for path, crs in systems if crs)
     name = ", ".join(path.name for path in used)
     outliers = tuple((cut.path.name, *place) for cut in cuts for place in cut.outliers)
+    voids, doubtful = (
+        tuple((cut.path.name, lat, lon, p.value, p.pixels, p.step) for cut, lat, lon, p in rows)
+        for rows in (
+            [(cut, *place) for cut in cuts for place in cut.voids],
+            [(cut, *place) for cut in cuts for place in cut.doubtful],
+        )
+    )
     spacing = min(cut.spacing for cut in cuts)
-    return HeightSamples(points, spacing, name, total, filled, files, covered, beyond, outliers)
+    return HeightSamples(points, spacing, name, total, filled, files, covered, beyond, outliers, voids, doubtful)
 
 
 def _opened(path: Path, frame: LocalFrame, reach: float, crs: str) -> Raster:
@@ -214,9 +228,11 @@ def _together(cuts: Sequence[RasterCut], frame: LocalFrame, half: float) -> tupl
     window = [np.abs(part[:, :2]).max(axis=1, initial=0.0) <= half + cuts[0].spacing for part in (points, empty)]
     share = window[1].sum() / max(window[0].sum() + window[1].sum(), 1)
     if len(points) < 3 or share > _MOST_VOID:
+        values = sorted({f"{patch.value:g}" for cut in cuts for *_, patch in cut.voids})
+        taken = f", patches of exactly {', '.join(values[:4])} m among it" if values else ""
         raise EmptyInputError(
-            f"{', '.join(str(cut.path) for cut in cuts)}: no heights ({100 * share:.0f} % void) around {frame.lat}, "
-            f"{frame.lon}; give another elevation file"
+            f"{', '.join(str(cut.path) for cut in cuts)}: no heights ({100 * share:.0f} % void{taken}) around "
+            f"{frame.lat}, {frame.lon}; give another elevation file"
         )
     if len(empty):
         points = np.concatenate([points, np.column_stack([empty, _filled(points, empty)])])

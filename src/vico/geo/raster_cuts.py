@@ -14,6 +14,7 @@ from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.outliers import without_outliers
 from vico.geo.rasters import Raster
+from vico.geo.untagged import Patch, without_voids
 
 _LOWEST, _HIGHEST = -1000.0, 9000.0  # SRTM's void is -32768, others use -9999; no dry land lies under -430 m
 _MOST_CUT = 100_000_000  # pixels
@@ -34,6 +35,8 @@ class RasterCut:
         Distance between neighbouring pixels, metres.
     outliers
         Latitude, longitude and metres of heights that no ground has, and that were left out.
+    voids, doubtful
+        Latitude and longitude of patches of one value: those left out as voids, and those that may be some.
     """
 
     path: Path
@@ -44,6 +47,8 @@ class RasterCut:
     xy: NDArray[np.float64]
     spacing: float
     outliers: tuple[tuple[float, float, float], ...] = ()
+    voids: tuple[tuple[float, float, Patch], ...] = ()
+    doubtful: tuple[tuple[float, float, Patch], ...] = ()
 
     def _holds(self, pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
         # The outermost pixels reach half a pixel beyond their centres.
@@ -120,12 +125,15 @@ def cut_of(path: Path, raster: Raster, frame: LocalFrame, reach: float) -> Raste
     affine[:, 2] += affine[:, :2] @ np.array([c0, r0])
     xy = _centres(frame, to_raster, affine, heights.shape)
     spacing = _spacing(xy, path)
+    heights, *patches = without_voids(heights, spacing)
     heights, odd = without_outliers(heights, spacing)
-    outliers = tuple(
-        (float(lat), float(lon), height)
-        for row, column, height in odd
-        for lat, lon in [frame.to_geodetic(xy[row, column])]
-    )
+
+    def degrees(row: int, column: int) -> tuple[float, float]:
+        lat, lon = frame.to_geodetic(xy[row, column])
+        return float(lat), float(lon)
+
+    outliers = tuple((*degrees(row, column), height) for row, column, height in odd)
+    voids, doubtful = (tuple((*degrees(patch.row, patch.column), patch) for patch in some) for some in patches)
     # Finer than the terrain can show, or too many to fit: averaged in blocks.
     step = max(round(FINEST / spacing), math.ceil(math.sqrt(heights.size / _MOST_POINTS)), 1)
     if step > 1 and min(heights.shape) >= 2 * step:
@@ -134,7 +142,7 @@ def cut_of(path: Path, raster: Raster, frame: LocalFrame, reach: float) -> Raste
         affine[:, :2] *= step
         xy = _centres(frame, to_raster, affine, heights.shape)
         spacing = _spacing(xy, path)
-    return RasterCut(path, raster, to_raster, affine, heights, xy, spacing, outliers)
+    return RasterCut(path, raster, to_raster, affine, heights, xy, spacing, outliers, voids, doubtful)
 
 
 def _centres(

@@ -30,6 +30,18 @@ _HGT_SIDES = {1201 * 1201 * 2: 1201, 3601 * 3601 * 2: 3601}
 _HGT_NAME = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
 _MOST_PIXELS = 200_000_000
 _FEET = {9002: 0.3048, 9003: 1200 / 3937}
+# GDAL's words for a band's unit, without what is no letter.
+_UNITS = {
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "internationalfoot"), 0.3048),
+    **dict.fromkeys(("ftus", "usft", "ussurveyfoot", "footus", "ussurveyfeet"), 1200 / 3937),
+    **dict.fromkeys(("dm", "decimetre", "decimeter"), 0.1),
+    **dict.fromkeys(("cm", "centimetre", "centimeter", "centimetres", "centimeters"), 0.01),
+    **dict.fromkeys(("mm", "millimetre", "millimeter", "millimetres", "millimeters"), 0.001),
+}
+_ITEM = re.compile(r"<Item\b([^<>]*)>([^<]*)</Item>", re.IGNORECASE)
+_ATTRIBUTE = re.compile(r"(\w+)\s*=\s*[\"']([^\"']*)[\"']")
+_MOST_METADATA = 1 << 16  # characters
 _DEFLATE, _BY_PILLOW = (8, 32946), {5: "LZW", 32773: "PackBits"}
 
 
@@ -178,7 +190,8 @@ class _Tiff:
     offsets: tuple[int, ...]
     counts: tuple[int, ...]
     void: float | None
-    unit: float
+    scale: float
+    offset: float
 
     def read(self, r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float64]:
         found = np.full((r1 - r0, c1 - c0), np.nan)
@@ -218,7 +231,7 @@ class _Tiff:
         heights = values.astype(np.float64)
         if self.void is not None:
             heights[values == np.asarray(self.void).astype(values.dtype)] = np.nan
-        return heights * self.unit
+        return heights * self.scale + self.offset
 
 
 class _Tag(IntEnum):
@@ -332,7 +345,7 @@ def _tiff(page: tifffile.TiffPage, order: str, tags: dict[int, object], path: Pa
         limits = np.iinfo(dtype)
         if not (math.isfinite(nothing) and limits.min <= nothing <= limits.max):
             nothing = None  # no pixel can have it
-    unit = _FEET.get(_geo_keys(tags.get(34735, ())).get(4099, 0), 1.0)
+    scale, offset = _scale(tags, path)
     return _Tiff(
         path,
         (rows, columns),
@@ -345,8 +358,31 @@ def _tiff(page: tifffile.TiffPage, order: str, tags: dict[int, object], path: Pa
         offsets,
         counts,
         nothing,
-        unit,
+        scale,
+        offset,
     )
+
+
+def _scale(tags: dict[int, object], path: Path) -> tuple[float, float]:
+    """Return metres a count and metres of count 0, as GDAL's metadata of the first band and the CRS's unit say."""
+    said = {"scale": "1", "offset": "0", "unittype": ""}
+    for attributes, value in _ITEM.findall(str(tags.get(42112, ""))[:_MOST_METADATA]):
+        words = {key.lower(): text for key, text in _ATTRIBUTE.findall(attributes)}
+        role = words.get("role", "").lower()
+        if role in said and words.get("sample", "0") == "0":
+            said[role] = value.strip()
+    try:
+        scale, offset = float(said["scale"]), float(said["offset"])
+    except ValueError:
+        scale, offset = math.nan, math.nan
+    if not (math.isfinite(scale) and math.isfinite(offset) and scale != 0.0):
+        raise SchemaError(
+            f"{path}: its band's scale {said['scale'][:20]!r} and offset {said['offset'][:20]!r} are no numbers to "
+            "count with; set them with: gdal_edit.py -a_scale 1 -a_offset 0 FILE"
+        )
+    vertical = _FEET.get(_geo_keys(tags.get(34735, ())).get(4099, 0), 1.0)
+    unit = _UNITS.get(re.sub(r"[\W_]+", "", said["unittype"].casefold()), vertical)
+    return scale * unit, offset * unit
 
 
 def _crs(tags: dict[int, object], path: Path) -> CRS:

@@ -193,6 +193,28 @@ def _report_map(data: OsmData, samples: HeightSamples | None, without: Dropped |
     if samples is not None and samples.outliers:
         told = [Dropped(id=name, reason=reason) for name, reason in _outlying(samples)]
         stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
+    if samples is not None and (samples.voids or samples.doubtful):
+        told = [Dropped(id=name, reason=reason) for name, reason in _untagged(samples)]
+        stages.report("map", {"heights_void": sum(row[4] for row in samples.voids)}, told)
+
+
+def _untagged(samples: HeightSamples) -> list[tuple[str, str]]:
+    """Return the file of each patch of one height that is a void or may be one, and a sentence on it."""
+    told = []
+    for rows, said in (
+        (samples.voids, "no ground does: left out as void and filled in; to say so in the file"),
+        (samples.doubtful, "so does a sea below cliffs or the top of a tower: kept; if there is no data, say so"),
+    ):
+        for name, lat, lon, height, count, step in rows[:_SHOWN_OUTLIERS]:
+            what = f"{count:,} pixels of exactly {height:g} m around {lat:.5f}, {lon:.5f}"
+            lies = f"lie {abs(step):.0f} m {'below' if step > 0 else 'above'} the ground on all sides"
+            told.append((name, f"{what} {lies}; {said}: gdal_edit.py -a_nodata {height:g} {name}"))
+        if len(rows) > _SHOWN_OUTLIERS:
+            more = len(rows) - _SHOWN_OUTLIERS
+            told.append(
+                (rows[-1][0], f"{more} more such patches, {sum(r[4] for r in rows[_SHOWN_OUTLIERS:]):,} pixels")
+            )
+    return told
 
 
 def _outlying(samples: HeightSamples) -> list[tuple[str, str]]:
