@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -362,6 +363,26 @@ def test_a_run_on_another_day_than_its_communitys_says_so(
 def test_a_world_built_without_heights_says_that_it_is_flat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert vico("world", "build", "--radius", 60, "--lat", 60.169, "--lon", 24.9435, "--out", tmp_path / "w") == 0
     assert "the ground is flat: no source tells its heights" in capsys.readouterr().err
+
+
+def test_a_timetable_that_gives_nothing_is_told_with_its_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tables = {
+        "stops.txt": "stop_id,stop_lat,stop_lon\na,60.169,24.9435\n",
+        "routes.txt": "route_id,route_type\nr,1\n",
+        "trips.txt": "route_id,service_id,trip_id\nr,s,t\n",
+        "stop_times.txt": "trip_id,arrival_time,stop_id,stop_sequence\nt,8:00,a,1\n",
+        "calendar_dates.txt": "service_id,date,exception_type\ns,20260105,1\n",
+    }
+    with zipfile.ZipFile(tmp_path / "metro.zip", "w") as archive:
+        for name, text in tables.items():
+            archive.writestr(name, text)
+    words = ["--radius", 60, "--lat", 60.169, "--lon", 24.9435, "--gtfs", tmp_path / "metro.zip"]
+    assert vico("world", "build", *words, "--out", tmp_path / "w") == 0
+    said = capsys.readouterr().err
+    assert "metro.zip gives no bus or tram here: routes.txt has no bus" in said
+    assert "only 1 of route_type 1 (underground)" in said
 
 
 @pytest.mark.parametrize(

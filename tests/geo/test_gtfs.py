@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import zipfile
 from datetime import date
 from pathlib import Path
@@ -99,6 +100,57 @@ def test_frequencies_repeat_a_trip(tmp_path: Path) -> None:
     two = next(p for p in read(tmp_path, TABLES | {"frequencies.txt": table}).patterns if p.stops == ("c", "a"))
     assert two.departures == (21600, 22500, 23400, 24300, 32400, 33000, 33600)
     assert two.travel == (0, 180)
+
+
+def test_a_frequency_that_ends_before_it_begins_goes_past_midnight(tmp_path: Path) -> None:
+    table = "trip_id,start_time,end_time,headway_secs\ntwo,22:00:00,01:00:00,3600\n"
+    feed = read(tmp_path, TABLES | {"frequencies.txt": table})
+    assert next(p for p in feed.patterns if p.stops == ("c", "a")).departures == (79200, 82800, 86400)
+    assert "read as past midnight, 25:00" in dict(feed.broken)["trip two"]
+
+
+def test_a_headway_may_have_decimals(tmp_path: Path) -> None:
+    table = "trip_id,start_time,end_time,headway_secs\ntwo,06:00:00,06:30:00,600.0\n"
+    two = next(p for p in read(tmp_path, TABLES | {"frequencies.txt": table}).patterns if p.stops == ("c", "a"))
+    assert two.departures == (21600, 22200, 22800)
+
+
+def test_a_trip_whose_frequencies_make_no_timetable_does_not_run_at_its_template_s_time(tmp_path: Path) -> None:
+    table = "trip_id,start_time,end_time,headway_secs\ntwo,06:00:00,07:00:00,often\n"
+    feed = read(tmp_path, TABLES | {"frequencies.txt": table})
+    assert ("c", "a") not in {p.stops for p in feed.patterns}
+    assert "makes no timetable" in dict(feed.broken)["trip two"]
+
+
+@pytest.mark.parametrize("blank", ["", "\ufeff", "\r\n\r\n"])
+def test_empty_optional_tables_are_as_if_they_were_not_there(tmp_path: Path, blank: str) -> None:
+    empty = dict.fromkeys(("agency.txt", "calendar_dates.txt", "frequencies.txt", "shapes.txt"), blank)
+    bare = {name: text for name, text in TABLES.items() if name not in empty}
+    assert read(tmp_path, TABLES | empty).patterns == read(tmp_path, bare).patterns != ()
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "reason"),
+    [
+        ("routes.txt", ",3,", ",1,", r"no bus .* only 1 of route_type 1 \(underground\)"),
+        ("routes.txt", "r,1,7,Round,3,00ff7F\n", "", "routes.txt has no rows"),
+        ("trips.txt", "\nr,", "\ngone,", "3 are of routes that routes.txt has not"),
+        ("stops.txt", ",\n", ",1\n", r"only 3 of location_type 1 \(stations\)"),
+        ("calendar.txt", "20240101,20240114", "20240114,20240101", "no day is a day of service"),
+        ("stop_times.txt", ":", ".", "trip one: its time"),
+    ],
+)
+def test_a_feed_that_gives_nothing_says_why(tmp_path: Path, name: str, old: str, new: str, reason: str) -> None:
+    tables = TABLES | {
+        "routes.txt": TABLES["routes.txt"].replace("t,1,T,Tram,0,\nx,1,X,Ferry,4,\n", ""),
+        "stops.txt": "stop_id,stop_name,stop_lat,stop_lon,location_type\na,A,49.41013,8.7043,\nb,B,49.41013,8.707,\n"
+        "c,C,49.41013,8.7099,\n",
+        "trips.txt": TABLES["trips.txt"].replace("t,week,four,0,\n", ""),
+        "calendar_dates.txt": "",
+    }
+    assert not read(tmp_path, tables).nothing
+    assert old in tables[name]
+    assert re.search(reason, read(tmp_path, tables | {name: tables[name].replace(old, new)}).nothing)
 
 
 def test_a_byte_order_mark_a_folder_and_missing_optional_tables_are_no_trouble(tmp_path: Path) -> None:
@@ -219,6 +271,7 @@ def test_times_as_typed(text: str, seconds: int | None) -> None:
     [
         ({"stops.txt": None}, "has no stops.txt"),
         ({"calendar.txt": None, "calendar_dates.txt": None}, "neither calendar.txt nor calendar_dates.txt"),
+        ({"stops.txt": ""}, "stops.txt is empty, and no feed can do without"),
         ({"trips.txt": "route_id,service_id\n"}, "trips.txt has no column trip_id"),
         ({"stops.txt": b"\xff\xfes"}, "stops.txt: is no UTF-16 text"),
         ({"stops.txt": None, "feed.zip": b"PK"}, "holds feed.zip; unpack it"),
@@ -276,8 +329,8 @@ def test_times_run_beyond_midnight(hour: int, minute: int, second: int) -> None:
 
 
 def test_route_types_of_both_tables() -> None:
-    assert [kind_of(t) for t in ("3", "700", "716", "11", "0", "900", "1", "717", "")] == [
-        "bus", "bus", "bus", "bus", "tram", "tram", None, None, None,
+    assert [kind_of(t) for t in ("3", "3.0", "200", "700", "716", "11", "0", "900", "1", "717", "")] == [
+        "bus", "bus", "bus", "bus", "bus", "bus", "tram", "tram", None, None, None,
     ]  # fmt: skip
 
 

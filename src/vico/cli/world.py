@@ -14,6 +14,7 @@ from typing import Any
 from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
+from vico.geo.gtfs.feed import NO_TIMETABLE
 from vico.world.folder import read_world
 from vico.world.model import FLAT_GROUND
 from vico.world.stored import WORLD_FOLDER, stage_seconds
@@ -80,8 +81,12 @@ def build(
     if options.author is not None:
         print(f"language model: {options.author.model.budget.spent}", file=sys.stderr)
     code = info(out, json=json)
-    if read_world(out).manifest.is_flat:
+    manifest = read_world(out).manifest
+    if manifest.is_flat:
         print(f"{out}: {FLAT_GROUND}", file=sys.stderr)
+    for feed in [what for stage in manifest.stages if stage.name == "timetables" for what in stage.dropped]:
+        if feed.reason.startswith(NO_TIMETABLE):
+            print(f"{out}: {feed.id} {feed.reason}", file=sys.stderr)
     return code
 
 

@@ -15,7 +15,7 @@ from vico.geo.detections.model import Detections
 from vico.geo.detections.reader import read_detections
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.gtfs.feed import Feed
+from vico.geo.gtfs.feed import NO_TIMETABLE, Feed
 from vico.geo.gtfs.reader import read_gtfs
 from vico.geo.osm import OsmData, read_osm
 from vico.geo.places.google import GooglePlaces, google_key
@@ -154,8 +154,9 @@ def gather(
                     sha256=feed.sha256,
                 )
             )
+        silent = [Dropped(id=feed.name, reason=f"{NO_TIMETABLE}: {feed.nothing}") for feed in feeds if feed.nothing]
         broken = [Dropped(id=key, reason=reason) for feed in feeds for key, reason in feed.broken]
-        stages.report("timetables", {"feeds": len(feeds)}, broken)
+        stages.report("timetables", {"feeds": len(feeds)}, silent + broken)
     buildings: list[FoundBuildings] = []
     if sources.buildings:
         with stages.timed("found buildings"):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 DAY = 86_400
+#: How a build's report tells of a feed that has `Feed.nothing`.
+NO_TIMETABLE = "gives no bus or tram here"
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Feed:
         Who publishes it, as the feed says.
     broken
         Id and fault of rows that were left out (the first 200).
+    nothing
+        Why no bus or tram of it calls at two stops in the window; empty where one does.
     """
 
     name: str
@@ -82,3 +86,4 @@ class Feed:
     patterns: tuple[Pattern, ...]
     attribution: str
     broken: tuple[tuple[str, str], ...] = ()
+    nothing: str = ""

@@ -6,11 +6,12 @@ space. Rows that can't be used are left out and named in `Feed.broken`.
 
 from __future__ import annotations
 
+import math
 import re
 import zipfile
 import zlib
 from collections import Counter, defaultdict
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import date, timedelta
 from itertools import pairwise
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.geo.gtfs.feed import Feed, GtfsRoute, GtfsStop, Pattern
+from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, GtfsStop, Pattern
 from vico.geo.gtfs.tables import FeedTables
 from vico.io.delimited import decimal
 from vico.io.files import sha256_of
@@ -35,6 +36,9 @@ _TIME = re.compile(r"\s*(\d{1,3}):([0-5]?\d)(?::([0-5]?\d)(?:\.\d*)?)?\s*([ap])?
 _DATE = re.compile(r"(\d{4})(-?)(\d\d)\2(\d\d)")
 _COLOUR = re.compile(r"[0-9a-fA-F]{6}")
 _TRAMS = {0, 5, 12, *range(900, 907)}
+_COACHES, _BUSES = range(200, 210), {*range(700, 717), 800}  # extended types
+_KINDS = {"1": "underground", "2": "rail", "4": "ferry", "6": "cable car", "7": "funicular", "1100": "air"}
+_STOP_KINDS = {"1": "stations", "2": "entrances", "3": "nodes", "4": "boarding areas"}
 
 
 def read_gtfs(
@@ -87,11 +91,8 @@ def read_gtfs(
 
 def kind_of(route_type: str) -> str | None:
     """Return bus, tram or None for a route type, basic or extended."""
-    try:
-        number = int(route_type)
-    except ValueError:
-        return None
-    if number in (3, 11) or 700 <= number <= 716 or number == 800:
+    number = decimal(route_type)
+    if number in (3, 11) or number in _COACHES or number in _BUSES:
         return "bus"
     return "tram" if number in _TRAMS else None
 
@@ -142,6 +143,12 @@ class _Reader:
         self._tables = FeedTables(path, archive)
         self._rows = self._tables.rows
         self.broken: list[tuple[str, str]] = []
+        # What is passed over, and how often: the reason where nothing is left.
+        self._stop_kinds: Counter[str] = Counter()
+        self._route_kinds: Counter[str] = Counter()
+        self._elsewhere: set[str] = set()
+        self._strays: Counter[str] = Counter()
+        self._rows_of: Counter[str] = Counter()
 
     def read(self, day: date | None, as_of: date | None) -> Feed:
         self._tables.need("stops.txt", "routes.txt", "trips.txt", "stop_times.txt")
@@ -150,7 +157,8 @@ class _Reader:
         agencies = self._agencies()
         stops, parents = self._stops()
         routes = self._routes(agencies)
-        trips = self._calling(self._trips(routes), stops) if stops else {}
+        known = self._trips(routes) if stops else {}
+        trips = self._calling(known, stops) if stops else {}
         served = {trip.route for trip in trips.values()}
         chosen = self._day(trips, day)
         self._tell_of_calendar(chosen, as_of)
@@ -158,6 +166,9 @@ class _Reader:
         if chosen is not None:
             running = self._running(trips, chosen)
             patterns = self._patterns(running, stops)
+        nothing = ""
+        if all(len(pattern.stops) < 2 for pattern in patterns):
+            nothing = self._why_nothing(stops, routes, known, trips, patterns)
         used = {s for p in patterns for s in p.stops} | {c[1] for t in trips.values() for c in t.calls if c[1] in stops}
         names = {stop: parents.get(stop, "") for stop in used}
         return Feed(
@@ -169,7 +180,44 @@ class _Reader:
             patterns=tuple(patterns),
             attribution=self._attribution(agencies, {routes[k].agency for k in served}),
             broken=(*sorted(self._tables.told.items()), *self.broken)[:_MOST_BROKEN],
+            nothing=nothing,
         )
+
+    def _why_nothing(
+        self,
+        stops: Collection[str],
+        routes: Collection[str],
+        known: Collection[str],
+        trips: Collection[str],
+        patterns: Collection[Pattern],
+    ) -> str:
+        """Return why no bus or tram of the feed runs here: the first step at which nothing is left."""
+        if not stops:
+            if not self._rows_of["stops.txt"]:
+                return "stops.txt has no rows"
+            if self._stop_kinds.total() == self._rows_of["stops.txt"]:
+                kinds = _listed(self._stop_kinds, _STOP_KINDS, "location_type")
+                return f"stops.txt has no stop where vehicles call (location_type 0 or empty), only {kinds}"
+            return next((why for what, why in self.broken if what == "stops.txt"), "none of its stops has a place")
+        if not routes:
+            if not self._rows_of["routes.txt"]:
+                return "routes.txt has no rows"
+            kinds = _listed(self._route_kinds, _KINDS, "route_type")
+            return f"routes.txt has no bus (route_type 3, 700-716) and no tram (0, 900-906), only {kinds}"
+        if not known:
+            if not self._rows_of["trips.txt"]:
+                return "trips.txt has no rows"
+            if self._strays:
+                return f"no trip is of a bus or tram; {self._strays.total():,} are of routes that routes.txt has not"
+            return "no trip in trips.txt is of a bus or tram"
+        if not trips:
+            told = [f"; {what}: {why}" for what, why in self.broken if what.startswith("trip ")]
+            return f"no trip that can be read calls at a stop in the window{told[0] if told else ''}"
+        if not any(self._days.values()):
+            return "no day is a day of service of the trips that call here, by calendar.txt and calendar_dates.txt"
+        if not patterns:
+            return "no trip runs here on its busiest day; see what is said of its frequencies"
+        return "no trip calls at two stops in the window, one after the other"
 
     def _fault(self, what: str, why: str) -> None:
         if len(self.broken) < _MOST_BROKEN:
@@ -185,7 +233,9 @@ class _Reader:
         degrees: list[tuple[float, float]] = []
         wanted = ["stop_name", "stop_lat", "stop_lon", "location_type"]
         for key, name, lat, lon, kind in self._rows("stops.txt", ["stop_id"], wanted):
+            self._rows_of["stops.txt"] += 1
             if kind not in ("", "0"):
+                self._stop_kinds[kind[:20]] += 1
                 continue
             y, x = decimal(lat), decimal(lon)
             if y is None or x is None or not (abs(y) <= 90.0 and abs(x) <= 180.0):
@@ -218,7 +268,6 @@ class _Reader:
         """Say where the stops lie, as none is in the window; and whether they would be, the other way round."""
         (south, west), (north, east) = table.min(axis=0), table.max(axis=0)
         turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
-        turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
         count = len(self._in_window(turned)[0]) if len(turned) else 0
         why = f"latitude and longitude look exchanged, the other way round {count:,} would; " if count else ""
         self._fault(
@@ -232,8 +281,11 @@ class _Reader:
         routes = {}
         wanted = ["route_short_name", "route_long_name", "route_color", "agency_id"]
         for key, kind, short, long, colour, agency in self._rows("routes.txt", ["route_id", "route_type"], wanted):
+            self._rows_of["routes.txt"] += 1
             what = kind_of(kind)
             if what is None:
+                self._route_kinds[kind[:20]] += 1
+                self._elsewhere.add(key)
                 if not kind.isdecimal():
                     self._fault(f"route {key[:60]}", f"route_type {kind[:20]!r} is no number; left out")
                 continue
@@ -245,8 +297,16 @@ class _Reader:
         trips = {}
         rows = self._rows("trips.txt", ["route_id", "trip_id", "service_id"], ["direction_id", "shape_id"])
         for route, key, service, direction, shape in rows:
+            self._rows_of["trips.txt"] += 1
             if route in routes:
                 trips[key] = _Trip(route, service, direction, shape)
+            elif route not in self._elsewhere:
+                self._strays[route[:60]] += 1
+        if self._strays:
+            count, first = self._strays.total(), next(iter(self._strays))
+            self._fault(
+                "trips.txt", f"{count:,} trips are of routes that routes.txt has not ({first!r} for one); left out"
+            )
         return trips
 
     def _calling(self, trips: dict[str, _Trip], stops: Collection[str]) -> dict[str, _Trip]:
@@ -350,20 +410,36 @@ class _Reader:
             if trip is None:
                 continue
             start, end = seconds_of(first), seconds_of(last)
-            step = int(gap) if gap.isdecimal() and len(gap) < 7 else 0
-            if start is None or end is None or step < 1 or (end - start) / step > _MOST_REPEATS:
+            step = decimal(gap) or 0.0
+            if start is not None and end is not None and end < start <= DAY:
+                end += DAY
+                self._fault(
+                    f"trip {key[:60]}",
+                    f"frequency {first[:9]}-{last[:9]} ends before it begins; read as past midnight, "
+                    f"{end // 3600}:{end % 3600 // 60:02d}",
+                )
+            # What repeats has no times of its own: those in stop_times.txt say how long it takes.
+            runs = repeated[key]
+            if (
+                start is None
+                or end is None
+                or end <= start
+                or not 1.0 <= step <= DAY
+                or ((end - start) / step > _MOST_REPEATS)
+            ):
                 self._fault(
                     f"trip {key[:60]}", f"frequency {first[:9]}-{last[:9]} every {gap[:9]} s makes no timetable"
                 )
                 continue
             shift = trip.calls[0][3] or 0
-            for begin in range(start, end, step):
-                if len(repeated[key]) >= _MOST_REPEATS:
+            for k in range(math.ceil((end - start) / step)):
+                if len(runs) >= _MOST_REPEATS:
                     break
+                begin = start + round(k * step)
                 calls: list[Call] = [
                     (n, s, (a or 0) - shift + begin, (d or 0) - shift + begin) for n, s, a, d in trip.calls
                 ]
-                repeated[key].append(_Trip(trip.route, trip.service, trip.direction, trip.shape, calls))
+                runs.append(_Trip(trip.route, trip.service, trip.direction, trip.shape, calls))
         plain = {key: trip for key, trip in running.items() if key not in repeated}
         return plain | {f"{key} {k}": trip for key, runs in repeated.items() for k, trip in enumerate(runs)}
 
@@ -425,6 +501,17 @@ class _Reader:
         named = [name for name in named if name] or sorted(name for name in served if name)
         named = named or list(agencies.values())
         return ", ".join(dict.fromkeys(name[:200] for name in named[:12])) or self.path.name
+
+
+def _listed(kinds: Counter[str], names: Mapping[str, str], column: str) -> str:
+    """Return counts by kind in words, the most frequent first."""
+    shown = [f"{count:,} of {column} {kind or 'empty'}{_in_words(kind, names)}" for kind, count in kinds.most_common(4)]
+    more = [f"{len(kinds) - 4} more kinds"] if len(kinds) > 4 else []
+    return ", ".join(shown + more)
+
+
+def _in_words(kind: str, names: Mapping[str, str]) -> str:
+    return f" ({names[kind]})" if kind in names else ""
 
 
 def _timed(trip: _Trip) -> str | None:

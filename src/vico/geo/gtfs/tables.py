@@ -13,6 +13,8 @@ from vico.io.delimited import DelimitedText
 
 _MOST_BYTES = 4 << 30  # unpacked, of one table
 _MOST_RATIO = 400  # unpacked to packed; timetables pack 10 to 40 to 1
+_BLANKS = b"\xef\xbb\xbf \t\r\n"
+_MOST_BLANK = 1 << 10  # bytes of a table that is looked at for having none but blanks
 _DEEPEST = 3  # folders of the zip, and the table in them
 
 
@@ -50,6 +52,8 @@ class FeedTables:
         What there is, by file name in lower case.
     packed
         When the newest table was written, as the zip says.
+    empty
+        Tables without even a header, in lower case: as if they were not there.
     told
         Table and how it is read, of those that are written otherwise than the format asks for.
     """
@@ -58,12 +62,17 @@ class FeedTables:
         self.path, self._archive = path, archive
         self.members: dict[str, zipfile.ZipInfo] = {}
         self.told: dict[str, str] = {}
+        self.empty: list[str] = []
         named = [(info.filename.replace("\\", "/").split("/"), info) for info in archive.infolist()]
         # Some feeds lie in a folder of their zip; the tables nearest to its top count.
         for parts, info in sorted(named, key=lambda entry: len(entry[0])):
             name = parts[-1].lower()
             if len(parts) <= _DEEPEST and name.endswith(".txt") and not name.startswith("."):
-                self.members.setdefault(name, info)
+                # Exporters write optional tables that they have no rows for with not even a header.
+                if info.file_size <= _MOST_BLANK and not archive.read(info).strip(_BLANKS):
+                    self.empty.append(name)
+                else:
+                    self.members.setdefault(name, info)
         self.packed = max(map(_day_of, self.members.values()), default=date.min)
         self._zips = [info.filename for _, info in named if info.filename.lower().endswith(".zip")]
 
@@ -76,6 +85,8 @@ class FeedTables:
             If it does.
         """
         for name in names:
+            if name not in self.members and name in self.empty:
+                raise SchemaError(f"{self.path}: {name} is empty, and no feed can do without; download it again")
             if name not in self.members:
                 if self._zips:
                     raise SchemaError(f"{self.path}: holds {self._zips[0]}; unpack it, and give that")
