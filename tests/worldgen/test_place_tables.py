@@ -34,8 +34,50 @@ def test_tables_as_spreadsheets_save_them_are_read(tmp_path: Path, content: str 
     assert table.bad == ()
 
 
+@pytest.mark.parametrize(
+    "header",
+    [
+        "place_name;Latitude (WGS84);Longitude (WGS84)", "City name;lat [°];lon [°]", "Name;Lat.;Long.",
+        "Ort;Breitengrad;Längengrad", "Nom;Latitude;Longitude", "Nombre;Latitud;Longitud",
+        "Città;Latitudine;Longitudine", "Naam;Breedtegraad;Lengtegraad", "Nazwa;Szerokość;Długość",
+        "MIASTO;SZEROKOSC;DLUGOSC", "Название;Широта;Долгота", "名称;纬度;经度", "名前;緯度;経度（度）",
+        "도시;위도;경도",
+        "الاسم;خط العرض;خط الطول", "שם;קו רוחב;קו אורך", "La\u0308nge;Name;Breite",
+    ],
+)  # fmt: skip
+def test_usual_names_of_columns_in_many_languages_are_known(tmp_path: Path, header: str) -> None:
+    cells = "11,6;Town;52,1" if header.startswith("La") else "Town;52,1;11,6"
+    (row,) = read(tmp_path, f"{header}\n{cells}\n").rows
+    assert (row.name, row.lat, row.lon) == ("Town", 52.1, 11.6)
+
+
+@pytest.mark.parametrize(
+    ("header", "text", "metres"),
+    [
+        ("radius", "1,000", 1000), ("radius", "1.000", 1000), ("radius", "1 000 m", 1000), ("radius", "1'000", 1000),
+        ("radius", "1.000,5", 1000.5), ("radius", "400.000", 400), ("radius", "62,5", 62.5), ("radius", "0,4 km", 400),
+        ("radius", "1.250 km", 1250), ("radius (km)", "0.3", 300), ("radius_m", "300", 300), ("Umkreis", "300", 300),
+        ("radius [ft]", "1000", 304.8), ("radius (km)", "300 m", 300),
+    ],
+)  # fmt: skip
+def test_radii_as_people_write_them(tmp_path: Path, header: str, text: str, metres: float) -> None:
+    (row,) = read(tmp_path, f"name;lat;lon;{header}\nTown;52,1;11,6;{text}\n").rows
+    assert row.radius == pytest.approx(metres)
+
+
+@pytest.mark.parametrize("text", ["wide", "1.00.000", "-5", "0", "3 parsecs"])
+def test_radii_that_are_none_are_told(tmp_path: Path, text: str) -> None:
+    with pytest.raises(SchemaError, match="is no positive number of metres"):
+        read(tmp_path, f"name;lat;lon;radius\nTown;52,1;11,6;{text}\n")
+
+
 def test_southern_and_western_degrees_are_negative(tmp_path: Path) -> None:
     (row,) = read(tmp_path, "name,lat,lon\nRio,22.9° S,43.2 W\n").rows
+    assert (row.lat, row.lon) == (-22.9, -43.2)
+
+
+def test_dashes_for_minus_signs_are_read(tmp_path: Path) -> None:
+    (row,) = read(tmp_path, "name,lat,lon\nRio,\N{EN DASH}22.9,\N{MINUS SIGN}43.2\n").rows
     assert (row.lat, row.lon) == (-22.9, -43.2)
 
 

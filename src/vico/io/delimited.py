@@ -10,6 +10,7 @@ import codecs
 import csv
 import io
 import re
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +30,7 @@ _MARKS = (
 _MOST_LINE = 1 << 16  # characters
 _MOST_BLANK = 1000  # lines before the header
 _QUOTED = re.compile(r'"[^"]*"?')
+_BRACKETS = re.compile(r"[(\[{（【][^()\[\]{}（）【】]*[)\]}）】]")
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -49,7 +51,9 @@ class DelimitedText:
     ----------
     header
         The columns: a known one by its name, another as it is written. Of several spellings of one column its own name
-        counts, else the one that is listed first.
+        counts, else the one that is listed first. What stands in brackets does not count where nothing else fits.
+    written
+        The columns as they are written.
     separator, encoding
         As found, in words.
     foreign
@@ -75,7 +79,8 @@ class DelimitedText:
         self._rows = csv.reader(self._lines(first), delimiter=delimiter, skipinitialspace=delimiter != "\t")
         with self._told():
             cells = next(self._rows, [])
-        self.header = _named([cell.strip() for cell in cells], columns)
+        self.written = [cell.strip() for cell in cells]
+        self.header = _named(self.written, columns)
 
     @property
     def line(self) -> int:
@@ -124,7 +129,10 @@ class DelimitedText:
         bare = _QUOTED.sub("", line)
 
         def knows(separator: str) -> tuple[int, int]:
-            return sum(_plain(cell) in spelt for cell in line.split(separator)), bare.count(separator)
+            cells = line.split(separator)
+            return sum(_plain(c) in spelt or _plain(_BRACKETS.sub("", c)) in spelt for c in cells), bare.count(
+                separator
+            )
 
         return line, told or max(_SEPARATORS, key=knows)
 
@@ -207,15 +215,19 @@ class _Rest(io.RawIOBase):
 
 def _named(header: list[str], columns: Mapping[str, Sequence[str]]) -> list[str]:
     """Return the header with columns that are known by another spelling under their own names."""
-    plain = [_plain(cell) for cell in header]
+    as_written = [_plain(cell) for cell in header]
+    without_remarks = [_plain(_BRACKETS.sub("", cell)) for cell in header]
     named = list(header)
     for name, others in columns.items():
-        place = next((plain.index(p) for s in (name, *others) if (p := _plain(s)) in plain), None)
+        spellings = [_plain(spelling) for spelling in (name, *others)]
+        both = ((plain, spelling) for plain in (as_written, without_remarks) for spelling in spellings)
+        place = next((plain.index(spelling) for plain, spelling in both if spelling in plain), None)
         if place is not None:
             named[place] = name
     return named
 
 
 def _plain(name: str) -> str:
-    """Return a column's name in lower case, without quotes and what separates its words."""
-    return re.sub(r"[\W_]+", "", name.casefold())
+    """Return a column's name in lower case, without accents, quotes and what separates its words."""
+    letters = unicodedata.normalize("NFKD", name.casefold())
+    return re.sub(r"[\W_]+", "", "".join(c for c in letters if not unicodedata.combining(c)))

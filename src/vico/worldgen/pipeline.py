@@ -28,13 +28,12 @@ from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
 from vico.worldgen.request import BuildOptions, WorldRequest
 from vico.worldgen.shaping import map_of
-from vico.worldgen.sources import Sources
+from vico.worldgen.sources import LEAST_RADIUS, MOST_RADIUS, Sources
 from vico.worldgen.stages import Progress, Stages
 
 #: Files that a tile lacks: its streets are its city's, and only that has them as OpenDRIVE.
 OF_A_CITY = ("roads.xodr",)
 _REQUEST = "request.json"
-_LEAST_RADIUS, _MOST_RADIUS = 50.0, 2000.0
 _DEFAULTS = BuildOptions()
 
 
@@ -97,8 +96,8 @@ def build_world(
     out = Path(out)
     if not isinstance(sources, Sources):
         sources = Sources(Path(sources))
-    if not (math.isfinite(half) and _LEAST_RADIUS <= half <= _MOST_RADIUS):
-        raise InputError(f"radius: {half:g} m; it must lie within {_LEAST_RADIUS:g}..{_MOST_RADIUS:g} m")
+    if not (math.isfinite(half) and LEAST_RADIUS <= half <= MOST_RADIUS):
+        raise InputError(f"radius: {half:g} m; it must lie within {LEAST_RADIUS:g}..{MOST_RADIUS:g} m")
     if seed < 0:
         raise InputError(f"seed: {seed}; it must not be negative")
     check_replaceable(out, force=force, kind=WORLD_FOLDER)

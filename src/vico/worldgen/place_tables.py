@@ -10,21 +10,60 @@ from pathlib import Path
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.delimited import DelimitedText, decimal, table_of
-from vico.worldgen.sources import SERVICES
+from vico.worldgen.sources import LEAST_RADIUS, SERVICES
 
 _MOST_BYTES = 16 << 20
 _LONGEST_NAME = 200  # bytes; file systems take 255, and a temporary folder's name is longer
 _THINGS = ("", "procedural", "installed")
 _FILES = ("osm", "dem", "tiles", "gtfs", "places", "photos", "layouts", "buildings", "precedence")
-# Other names that tables have for columns, those that count first in front.
+# Other names that tables have for columns, those that count first in front; accents, case and brackets do not count.
 _SPELLINGS: dict[str, tuple[str, ...]] = {
-    "name": ("place", "city", "town", "title", "label", "site", "location", "id"),
-    "lat": ("latitude", "lat deg", "y"),
-    "lon": ("longitude", "long", "lng", "lon deg", "x"),
+    "name": (
+        *("place", "place name", "city", "city name", "town", "town name", "title", "label", "site", "site name"),
+        *("location", "location name", "world", "Ort", "Ortsname", "Ortschaft", "Stadt", "Gemeinde", "Bezeichnung"),
+        *("nom", "ville", "commune", "lieu", "nombre", "ciudad", "lugar", "municipio", "nome", "città", "luogo"),
+        *("comune", "cidade", "município", "local", "naam", "plaats", "plaatsnaam", "stad", "nazwa", "miasto"),
+        *("miejscowość", "navn", "by", "sted", "namn", "ort", "nimi", "kaupunki", "název", "město", "obec"),
+        *("názov", "mesto", "név", "város", "település", "nume", "oraș", "naziv", "ime", "grad", "ad", "şehir", "yer"),
+        *("όνομα", "πόλη", "название", "имя", "город", "место", "назва", "місто", "име", "град", "名称", "名稱"),
+        *("地名", "城市", "地点", "地點", "名前", "名", "都市", "場所", "이름", "도시", "지명", "الاسم", "المدينة"),
+        *("שם", "עיר", "नाम", "शहर", "ชื่อ", "เมือง", "tên", "thành phố", "nama", "kota", "id"),
+    ),
+    "lat": (
+        *("latitude", "lat deg", "latitude deg", "latitude decimal", "decimal latitude", "lat dd", "geo lat"),
+        *("gps lat", "gps latitude", "lat wgs84", "latitude wgs84", "wgs84 lat", "Breite", "Breitengrad"),
+        *("geographische Breite", "geografische Breite", "geogr Breite", "latitud", "latitudine", "breedte"),
+        *("breedtegraad", "szerokość", "szerokość geograficzna", "breddegrad", "bredde", "breddgrad", "leveysaste"),
+        *("leveyspiiri", "zeměpisná šířka", "šířka", "zemepisná šírka", "szélesség", "földrajzi szélesség"),
+        *("geografska širina", "enlem", "πλάτος", "γεωγραφικό πλάτος", "широта", "географска ширина", "ширина"),
+        *("纬度", "緯度", "위도", "خط العرض", "קו רוחב", "अक्षांश", "ละติจูด", "vĩ độ", "lintang", "y"),
+    ),
+    "lon": (
+        *("longitude", "long", "lng", "lon deg", "longitude deg", "longitude decimal", "decimal longitude", "lon dd"),
+        *("geo lon", "geo lng", "gps lon", "gps longitude", "lon wgs84", "longitude wgs84", "wgs84 lon", "Länge"),
+        *("Laenge", "Längengrad", "Laengengrad", "geographische Länge", "geografische Länge", "geogr Länge"),
+        *("longitud", "longitudine", "lengte", "lengtegraad", "długość", "dlugosc", "długość geograficzna"),
+        *("længdegrad", "lengdegrad", "lengde", "længde", "longitud", "längdgrad", "pituusaste", "pituuspiiri"),
+        *("zeměpisná délka", "délka", "zemepisná dĺžka", "hosszúság", "földrajzi hosszúság", "geografska dužina"),
+        *("geografska dolžina", "boylam", "μήκος", "γεωγραφικό μήκος", "долгота", "довгота", "географска дължина"),
+        *("经度", "經度", "経度", "경도", "خط الطول", "קו אורך", "देशांतर", "ลองจิจูด", "kinh độ", "bujur", "x"),
+    ),
     "osm": ("map", "extract", "osm file", "pbf"),
-    "radius": ("radius m", "half"),
-    "dem": ("elevation",),
+    "radius": (
+        *("radius m", "radius km", "radius ft", "half", "Umkreis", "Halbmesser", "rayon", "radio", "raggio", "raio"),
+        *("straal", "promień", "radie", "säde", "poloměr", "sugár", "rază", "yarıçap", "ακτίνα", "радиус", "радіус"),
+        *("半径", "半徑", "반경", "반지름"),
+    ),
+    "dem": ("elevation", "elevation file"),
 }
+# Of a radius, metres.
+_UNITS = {"": 1.0, "m": 1.0, "metre": 1.0, "meter": 1.0, "km": 1000.0, "ft": 0.3048, "feet": 0.3048, "foot": 0.3048}
+_UNITS |= {"mi": 1609.344, "mile": 1609.344, "м": 1.0, "км": 1000.0, "米": 1.0, "公里": 1000.0}
+_DASHES = re.compile("[\N{MINUS SIGN}\N{EN DASH}\N{HYPHEN}]")
+_APART = re.compile(r"(?<=\d)[\s'’](?=\d{3}(?!\d))")
+_LENGTH = re.compile(r"([+-]?\d[\d.,]*)\s*([^\W\d_]*?)s?\.?", re.IGNORECASE)
+_THOUSANDS = re.compile(r"[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
+_UNIT_OF_HEADER = re.compile(r"(?<![^\W_])(km|ft|feet|mi)(?![^\W_])", re.IGNORECASE)
 # 52.1, 52,1°, N 52.1, 52°06'00.0"N
 _ANGLE = re.compile(
     r"""([NSEW])?\s*([+-]?\d[\d.,]*)\s*°?(?:\s*(\d[\d.,]*)\s*['′’])?(?:\s*(\d[\d.,]*)\s*(?:"|″|”|''))?\s*([NSEW])?""",
@@ -105,6 +144,8 @@ def read_place_table(path: Path) -> PlaceTable:
     known = [f.name for f in fields(PlaceRow)]
     table = table_of(path, {name: _SPELLINGS.get(name, ()) for name in known})
     notes = _checked_header(table, path, known)
+    said = _UNIT_OF_HEADER.search(dict(zip(table.header, table.written, strict=True)).get("radius", ""))
+    unit = said[1].lower() if said else ""
     rows: dict[str, tuple[int, PlaceRow]] = {}
     bad: list[BadRow] = []
     for cells in table:
@@ -115,7 +156,7 @@ def read_place_table(path: Path) -> PlaceTable:
                     f"has {len(cells)} cells under {len(table.header)} columns; numbers with decimal commas must be "
                     "quoted in a table that commas separate"
                 )
-            row = _row(dict(zip(table.header, cells, strict=False)), path)
+            row = _row(dict(zip(table.header, cells, strict=False)), path, unit)
             if name in rows:
                 raise ValueError(f"named as line {rows[name][0]} is; every world needs a folder of its own")
             rows[name] = line, row
@@ -146,8 +187,8 @@ def _checked_header(table: DelimitedText, path: Path, known: list[str]) -> list[
     return notes
 
 
-def _row(text: Mapping[str, str], path: Path) -> PlaceRow:
-    """Return a row of the table.
+def _row(text: Mapping[str, str], path: Path, unit: str) -> PlaceRow:
+    """Return a row of the table; `unit` is that of radii which do not say theirs.
 
     Raises
     ------
@@ -170,7 +211,7 @@ def _row(text: Mapping[str, str], path: Path) -> PlaceRow:
         name,
         lat,
         lon,
-        radius=_number(text.get("radius", ""), "radius", PlaceRow.radius),
+        radius=_radius(text.get("radius", ""), unit),
         things=things,
         seed=_seed(text.get("seed", "")),
         **{column: _beside(text.get(column, ""), path) for column in _FILES},
@@ -179,7 +220,7 @@ def _row(text: Mapping[str, str], path: Path) -> PlaceRow:
 
 def _degrees(text: str, what: str, letters: str) -> float:
     """Return an angle, degrees; the second of `letters` (south, west for longitudes) counts down."""
-    match = _ANGLE.fullmatch(text)
+    match = _ANGLE.fullmatch(_DASHES.sub("-", text))
     parts = [] if match is None else [decimal(part) for part in match.group(2, 3, 4) if part is not None]
     if match is None or None in parts:
         raise ValueError(f"{what} {text[:40]!r} is no number of degrees")
@@ -190,12 +231,24 @@ def _degrees(text: str, what: str, letters: str) -> float:
     return -value if match[2].startswith("-") or (letter and letter in "SW") else value
 
 
-def _number(text: str, what: str, otherwise: float) -> float:
+def _radius(text: str, unit: str) -> float:
+    """Return a radius, metres (``1000``, ``1,000``, ``1.000 m``, ``0,4 km``)."""
     if not text:
-        return otherwise
-    value = decimal(text.removesuffix("m"))
+        return PlaceRow.radius
+    match = _LENGTH.fullmatch(_APART.sub("", text.strip()))
+    factor = None if match is None else _UNITS.get((match[2] or unit).lower())
+    value = None
+    if match is not None and factor is not None:
+        number = match[1]
+        if "," in number and "." in number:  # the one that comes first parts thousands
+            number = number.replace(min(",.", key=number.index), "")
+        value = decimal(number)
+        # Three digits after the separator are decimals only where that gives a world.
+        if _THOUSANDS.fullmatch(number) and (value is None or value * factor < LEAST_RADIUS):
+            value = float(re.sub(r"[.,]", "", number))
+        value = None if value is None else value * factor
     if value is None or value <= 0.0:
-        raise ValueError(f"{what} {text[:40]!r} is no positive number of metres")
+        raise ValueError(f"radius {text[:40]!r} is no positive number of metres")
     return value
 
 

@@ -121,6 +121,8 @@ class Sources:
         return made
 
 
+LEAST_RADIUS, MOST_RADIUS = 50.0, 2000.0
+"""Of a world, metres."""
 #: Words that name a service instead of a file.
 SERVICES = ("google", "mapillary")
 
