@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,10 @@ from vico.viewer.motion_sheet import motion_sheet
 def convert(path: Path, *, out: Path, animation: str, sheet: Path | None, force: bool, json: bool) -> int:
     """Read a motion and write it as ours (.motion) or as SMPL-X (.npz)."""
     clip = read_gltf_motion(path, animation=animation) if animation else import_motion(path)
-    return _written(clip, path, out=out, sheet=sheet, force=force, json=json)
+    code = _written(clip, path, out=out, sheet=sheet, force=force, json=json)
+    for note in clip.notes:
+        print(f"{path}: {note}", file=sys.stderr)
+    return code
 
 
 def of_run(run: Path, *, agent: str, out: Path, sheet: Path | None, force: bool, json: bool) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,27 @@ def amass_arrays(poses: Any) -> dict[str, Any]:
     return dict(zip(parts, np.split(poses, ends[:-1], axis=1), strict=True))
 
 
+@pytest.mark.parametrize("name", ["transl", "translation", "smpl_trans"])
+def test_a_translation_under_another_usual_name_counts_and_is_told(tmp_path: Path, name: str) -> None:
+    poses, trans = np.zeros((3, 156)), np.arange(9.0).reshape(3, 3)
+    np.savez(tmp_path / "a.npz", poses=poses, mocap_framerate=30.0, trans=trans)
+    np.savez(tmp_path / "b.npz", poses=poses, fps=30, **{name: trans})
+    own, other = read_amass(tmp_path / "a.npz"), read_amass(tmp_path / "b.npz")
+    np.testing.assert_array_equal(own.position, other.position)
+    assert own.rate == other.rate
+    assert (own.notes, f"its translation is {name}" in other.notes[0]) == ((), True)
+
+
+def test_an_archive_that_is_none_is_refused_in_our_own_words(tmp_path: Path) -> None:
+    objects = np.array([1, "a", None], dtype=object)
+    np.savez(tmp_path / "objects.npz", poses=objects, trans=np.zeros((3, 3)), mocap_framerate=30.0)
+    (tmp_path / "junk.npz").write_bytes(b"junk")
+    for name, words in (("objects", "one holds Python objects"), ("junk", "is no .npz archive")):
+        with pytest.raises(SchemaError, match=words) as refused:
+            read_amass(tmp_path / f"{name}.npz")
+        assert "pickle" not in str(refused.value)
+
+
 def test_amass_parts_are_the_pose_they_were_cut_from(tmp_path: Path) -> None:
     poses, trans = np.random.default_rng(4).normal(0.0, 0.3, (3, 165)), np.ones((3, 3))
     np.savez(tmp_path / "whole.npz", poses=poses, trans=trans, mocap_frame_rate=60.0)
@@ -208,6 +230,7 @@ def test_nothing_in_an_amass_file_is_unpickled(tmp_path: Path) -> None:
         ({"betas": np.zeros(16), "gender": "male"}, "it holds betas, gender"),
         ({"root_orient": np.zeros((2, 3)), "mocap_framerate": 30}, "it holds root_orient, mocap_framerate"),
         ({"poses": np.zeros((2, 156)), "trans": np.zeros((2, 3))}, "it holds poses, trans"),
+        ({"poses": np.zeros((2, 156)), "root_position": np.zeros((2, 3)), "fps": 30}, "no trans, but root_position"),
         ({"root_orient": np.zeros((2, 3)), "pose_body": np.zeros((3, 63)), "mocap_framerate": 30}, r"be \(2, 63\)"),
     ],
 )
@@ -241,6 +264,8 @@ def _bvh_of(change: Any) -> str:
         (lambda text: text.replace("UpLeg", "Tentacle"), "no joint stands for left_hip"),
         (lambda text: text.replace("Frame Time: 0.0", "Frame Time: -0.0"), "line 144: a frame takes -0.0333333 s"),
         (lambda text: text.replace("Frame Time: 0.0", "Frame Time: 0,0"), "line 144: a number has a comma"),
+        (lambda text: text.replace("Frame Time: 0.0", "Frame Time: 500.0"), "line 144: a frame takes 500.033 s"),
+        (lambda text: text.replace("Frame Time: 0.0", "Frame Time: soon 0.0"), "line 144: .* gives no seconds"),
         (lambda text: text.replace("OFFSET 0.0 0.0", "OFFSET 0,0 0.0", 1), "line 4: a number has a comma"),
         (lambda text: text.replace("\n0.0 ", "\n0,0 ", 1), "line 145: a number has a comma"),
         (
@@ -255,6 +280,23 @@ def test_broken_bvh_is_refused_in_a_sentence(tmp_path: Path, change: Any, words:
     path.write_text(_bvh_of(change))
     with pytest.raises((SchemaError, InputError), match=words):
         read_bvh(path)
+
+
+@pytest.mark.parametrize(("typed", "rate"), [("33.3333", 30.0), ("8.3333", 120.0), ("100", 10.0), ("1", 1000.0)])
+def test_a_bvh_s_frame_times_in_milliseconds_are_read_and_told(tmp_path: Path, typed: str, rate: float) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(re.sub(r"Frame Time: \S+", f"Frame Time: {typed}", _bvh_of(str)))
+    clip = read_bvh(path)
+    assert clip.rate == pytest.approx(rate, rel=1e-4)
+    assert "read as milliseconds" in clip.notes[0]
+
+
+def test_a_bvh_s_frame_times_in_seconds_are_what_they_say(tmp_path: Path) -> None:
+    path = tmp_path / "a.bvh"
+    for typed, rate in (("0.5", 2.0), ("0.04 s", 25.0), ("0.001", 1000.0)):
+        path.write_text(re.sub(r"Frame Time: \S+", f"Frame Time: {typed}", _bvh_of(str)))
+        clip = read_bvh(path)
+        assert (clip.rate, clip.notes) == (pytest.approx(rate), ())
 
 
 def _round(document: dict[str, Any]) -> None:

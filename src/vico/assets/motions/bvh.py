@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,12 @@ _CHANNEL = re.compile(r"([xyz])_?(position|pos|translation|rotation|rot|scale)",
 _KINDS = {"pos": "position", "translation": "position", "rot": "rotation"}
 # Braces, and what stands behind them or behind an offset, are read as lines of their own.
 _STATEMENT = re.compile(r"\s*([{}])\s*|\s+(?=CHANNELS\b|OFFSET\b)")
-_COUNT, _TIME = re.compile(r"frames\s*:?\s*(.*)", re.IGNORECASE), re.compile(r"frame\s*time\s*:?\s*(.*)", re.IGNORECASE)
+# A time of a frame, seconds, that is none; and the fewest frames a second that make it milliseconds.
+_SLOWEST, _FEWEST = 1.0, 10.0
+_COUNT, _TIME = (
+    re.compile(r"frames\s*:?\s*(.*)", re.IGNORECASE),
+    re.compile(r"frame\s*time\s*:?\s*(.*?)\s*(?:s|sec|secs|seconds?)?", re.IGNORECASE),
+)
 
 
 @dataclass
@@ -57,11 +62,12 @@ def read_bvh(path: Path) -> MotionClip:
         raise MissingFileError(f"{path}: no such file") from None
     lines = iter(enumerate(text.splitlines(), start=1))
     hierarchy = _hierarchy(lines, path)
-    values, rate = _frames(lines, sum(map(len, hierarchy.channels)), path)
+    values, rate, note = _frames(lines, sum(map(len, hierarchy.channels)), path)
     skeleton = _skeleton(hierarchy)
     turned, moved = _turned(hierarchy, values)
     pelvis = joints_by_name(skeleton, source=str(path))["pelvis"]
-    return retargeted(skeleton, turned, moved[:, pelvis], rate, name=path.stem, source=str(path))
+    clip = retargeted(skeleton, turned, moved[:, pelvis], rate, name=path.stem, source=str(path))
+    return replace(clip, notes=(note,)) if note else clip
 
 
 def _hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> _Hierarchy:
@@ -123,8 +129,8 @@ def _refuse_comma(text: str, path: Path, number: int) -> None:
         ) from None
 
 
-def _frames(lines: Iterator[tuple[int, str]], channels: int, path: Path) -> tuple[NDArray[np.float64], float]:
-    """Return every frame's channels, shape ``(t, channels)``, and the frames a second."""
+def _frames(lines: Iterator[tuple[int, str]], channels: int, path: Path) -> tuple[NDArray[np.float64], float, str]:
+    """Return every frame's channels, shape ``(t, channels)``, the frames a second, and a note on these."""
     wanted, seconds, rows = 0, 0.0, []
     count_line = time_line = 0
     for number, line in lines:
@@ -140,7 +146,10 @@ def _frames(lines: Iterator[tuple[int, str]], channels: int, path: Path) -> tupl
                 rows.append(_row(text, channels))
         except ValueError:
             _refuse_comma(text, path, number)
-            raise SchemaError(f"{path}: line {number}: no frame of {channels} numbers; export it anew") from None
+            what = f"no frame of {channels} numbers; export it anew"
+            if _TIME.fullmatch(text):
+                what = f"{text[:40]!r} gives no seconds; write for example Frame Time: 0.0333333"
+            raise SchemaError(f"{path}: line {number}: {what}") from None
         if len(rows) > MOST_FRAMES:
             raise SchemaError(f"{path}: more than {MOST_FRAMES} frames; cut it into pieces")
     if not (count_line and time_line):
@@ -151,12 +160,24 @@ def _frames(lines: Iterator[tuple[int, str]], channels: int, path: Path) -> tupl
         raise SchemaError(
             f"{path}: line {count_line}: {len(rows)} of {wanted} frames are there; export it anew, or mend the number"
         )
-    if not 1.0 / MOST_RATE <= seconds < np.inf:
-        raise SchemaError(
-            f"{path}: line {time_line}: a frame takes {seconds:g} s; write {1.0 / MOST_RATE:g} or more, for example "
-            "0.0333333 for 30 frames a second"
+    rate, note = _rate(seconds, path, time_line)
+    return np.stack(rows), rate, note
+
+
+def _rate(seconds: float, path: Path, line: int) -> tuple[float, str]:
+    """Return the frames a second; and a sentence if the time of a frame can only be milliseconds."""
+    if 1.0 / MOST_RATE <= seconds < _SLOWEST:
+        return 1.0 / seconds, ""
+    rate = 1000.0 / seconds if seconds > 0.0 else 0.0
+    if seconds >= _SLOWEST and _FEWEST <= rate <= MOST_RATE:
+        return rate, (
+            f"line {line}: a frame time of {seconds:g} s is read as milliseconds, {rate:.4g} frames a second; write "
+            f"{seconds / 1000.0:g}, or another time in seconds"
         )
-    return np.stack(rows), 1.0 / seconds
+    raise SchemaError(
+        f"{path}: line {line}: a frame takes {seconds:g} s; write seconds from {1.0 / MOST_RATE:g} to below "
+        f"{_SLOWEST:g}, for example 0.0333333 for 30 frames a second"
+    )
 
 
 def _row(text: str, channels: int) -> NDArray[np.float64]:

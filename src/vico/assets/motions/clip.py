@@ -38,6 +38,8 @@ class MotionClip:
         Of the other 54 joints in the order of `vico.assets.people.JOINTS`, axis-angle relative to the parent, radians,
         about axes that are the body's in the T-pose (x forward, y left, z up), float32, shape ``(t, 54, 3)``: the 162
         pose numbers of SMPL-X, its axes renamed.
+    notes
+        What of its file was read otherwise than it is written, a sentence each; not kept in files.
 
     Raises
     ------
@@ -50,6 +52,7 @@ class MotionClip:
     position: NDArray[np.float32]
     orientation: NDArray[np.float32]
     pose: NDArray[np.float32]
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         t = len(self.position)

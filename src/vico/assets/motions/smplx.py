@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,11 @@ from vico.io.npz import read_npz
 _SMPLX_HIP_HEIGHT = 0.95
 _MOST_BYTES = 1 << 30
 #: Names under which archives keep their frame rate.
-_RATES = ("mocap_frame_rate", "mocap_framerate")
+_RATES = ("mocap_frame_rate", "mocap_framerate", "mocap_fps", "framerate", "frame_rate", "fps")
+#: Names under which archives keep the translation, AMASS's first.
+_TRANSLATIONS = ("trans", "transl", "translation", "root_trans", "root_translation", "root_transl", "smpl_trans")
+#: Parts of the names of arrays that may be a translation under another name.
+_LIKE_TRANSLATION = ("trans", "root_pos", "root_loc", "pelvis", "location")
 #: Parts under which archives keep the pose, in the order of the joints, and how many joints each has.
 _PARTS = {"root_orient": 1, "pose_body": 21, "pose_jaw": 1, "pose_eye": 2, "pose_hand": 30}
 
@@ -110,8 +115,8 @@ def read_amass(path: Path) -> MotionClip:
     """Read a motion of AMASS: an ``.npz`` with ``poses`` or its parts, ``trans`` and a frame rate.
 
     Of the parts ``root_orient`` and ``pose_body`` have to be there; jaw, eyes and hands rest without theirs. Without
-    ``trans`` it stays on the spot, on the ground where its feet are lowest. Nothing is unpickled, and other arrays are
-    not read.
+    ``trans`` (or ``transl`` or another usual name of it) it stays on the spot, on the ground where its feet are lowest.
+    Nothing is unpickled, and other arrays are not read.
 
     Raises
     ------
@@ -126,7 +131,10 @@ def read_amass(path: Path) -> MotionClip:
         if path.stat().st_size > _MOST_BYTES:
             raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut it into pieces")
         packed = path.read_bytes()
-        data = read_npz(packed, ("poses", *_PARTS, "trans", *_RATES))
+        if not packed.startswith(b"PK"):
+            what = "is empty" if not packed else "is no .npz archive, whatever its name"
+            raise SchemaError(f"{path}: {what}; save its poses, trans and mocap_frame_rate with numpy.savez")
+        data = read_npz(packed, ("poses", *_PARTS, *_TRANSLATIONS, *_RATES))
         rate = next((np.asarray(data[key], np.float64) for key in _RATES if key in data), None)
         if rate is None or rate.size != 1 or not ("poses" in data or {"root_orient", "pose_body"} <= data.keys()):
             raise SchemaError(
@@ -134,8 +142,13 @@ def read_amass(path: Path) -> MotionClip:
                 f"it holds {_held(packed)}"
             )
         poses = data["poses"] if "poses" in data else _joined(data)
-        if "trans" in data:
-            return motion_from_smplx(poses, data["trans"], rate.item(), name=path.stem)
+        name = next((name for name in _TRANSLATIONS if name in data), None)
+        if name is not None:
+            clip = motion_from_smplx(poses, data[name], rate.item(), name=path.stem)
+            said = f"its translation is {name}, taken for AMASS's trans: metres, z up"
+            return clip if name == "trans" else replace(clip, notes=(said,))
+        if like := [name for name in _names(packed) if any(part in name.lower() for part in _LIKE_TRANSLATION)]:
+            raise SchemaError(f"{path}: has no trans, but {', '.join(like[:4])}; save its translation as trans")
         return grounded(motion_from_smplx(poses, np.zeros((len(poses), 3)), rate.item(), name=path.stem))
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
@@ -144,6 +157,11 @@ def read_amass(path: Path) -> MotionClip:
     except (ValueError, OSError, EOFError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         if isinstance(error, SchemaError):
             raise
+        if "allow_pickle" in str(error):
+            raise SchemaError(
+                f"{path}: no readable .npz of plain arrays: one holds Python objects, which are not read; save it as "
+                "an array of numbers"
+            ) from None
         raise SchemaError(f"{path}: no readable .npz of plain arrays ({error})") from None
 
 
@@ -159,8 +177,12 @@ def _joined(data: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
     return np.concatenate(parts, axis=1)
 
 
+def _names(packed: bytes) -> list[str]:
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        return [name.removesuffix(".npy") for name in archive.namelist()]
+
+
 def _held(packed: bytes) -> str:
     """Return the names of an archive's arrays, none of which is read."""
-    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
-        names = [name.removesuffix(".npy") for name in archive.namelist()]
+    names = _names(packed)
     return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "") or "none of them"
