@@ -205,6 +205,31 @@ def test_a_reply_of_each_family_is_read(family: str, content: dict[str, Any]) ->
                 }
             ],
         ),
+        (
+            "OpenRouter",
+            "response_format",
+            404,
+            {"error": {"message": "No endpoints found that can handle the requested parameters.", "code": 404}},
+        ),
+        (
+            "OpenRouter",
+            "temperature",
+            404,
+            {"error": {"message": "No endpoints found that can handle the requested parameters.", "code": 404}},
+        ),
+        (
+            "OpenRouter",
+            "seed",
+            404,
+            {"error": {"message": "No endpoints found that support the parameter seed", "code": 404}},
+        ),
+        (
+            "a gateway",
+            "response_format",
+            403,
+            {"error": {"message": "structured outputs are not available in your plan"}},
+        ),
+        ("a gateway", "temperature", 500, {"error": {"message": "temperature must be > 0"}}),
         ("a gateway", "seed", 400, {"message": "`seed` is not permitted"}),
         ("a gateway", "temperature", 400, {"detail": "Bad Request"}),
     ],
@@ -225,3 +250,91 @@ def test_a_wait_of_an_hour_is_named() -> None:
     busy = Answer(429, b'{"error": {"message": "daily limit"}}', {"Retry-After": "3600"})
     with model_server(Script(busy)) as (base, _), pytest.raises(SourceError, match="it asks to wait 1 hour"):
         model(base).ask([user("Who?")], Person)
+
+
+@pytest.mark.parametrize(
+    ("status", "message", "told"),
+    [
+        (404, "model 'seed-m' not found", "no such page, or no model"),
+        (403, "seed-m is not in your plan", "wants a key"),
+        (401, "Incorrect API key provided", "wants a key"),
+    ],
+)
+def test_a_refusal_that_names_no_part_is_of_keys_and_names(status: int, message: str, told: str) -> None:
+    with model_server(Script(answered({"error": {"message": message}}, status))) as (base, script):
+        asker = LanguageModel(Endpoint(base, "seed-m"), sampling=Sampling(seed=0, temperature=0.0))
+        with pytest.raises(SourceError, match=told):
+            asker.ask([user("Who?")], Person)
+    assert len(script.asked) == 1
+
+
+CONTEXT, FILTER = "longer than the model reads", "the provider's filter refuses"
+
+
+@pytest.mark.parametrize(
+    ("family", "status", "told", "error"),
+    [
+        (
+            "Azure",
+            400,
+            FILTER,
+            {
+                "message": "The response was filtered due to the prompt triggering Azure OpenAI's content management "
+                "policy.",
+                "param": "prompt",
+                "code": "content_filter",
+            },
+        ),
+        ("OpenRouter", 403, FILTER, {"message": 'Your input was flagged for "violence".', "code": 403}),
+        ("Alibaba", 400, FILTER, {"message": "Input data may be inappropriate", "code": "data_inspection_failed"}),
+        (
+            "OpenAI",
+            400,
+            CONTEXT,
+            {
+                "message": "This model's maximum context length is 4096 tokens.",
+                "code": "context_length_exceeded",
+                "param": "messages",
+            },
+        ),
+        (
+            "llama.cpp",
+            400,
+            CONTEXT,
+            {
+                "message": "the request exceeds the available context size, try increasing it",
+                "type": "exceed_context_size_error",
+                "code": 400,
+            },
+        ),
+        ("llama.cpp", 500, CONTEXT, {"message": "the request exceeds the available context size.", "code": 500}),
+        (
+            "vLLM",
+            400,
+            CONTEXT,
+            {"message": "This model's maximum context length is 4096 tokens. However, you requested 5000 tokens"},
+        ),
+        (
+            "vLLM",
+            400,
+            CONTEXT,
+            {"message": "The decoder prompt (length 5000) is longer than the maximum context length of 4096"},
+        ),
+        ("Anthropic", 400, CONTEXT, {"message": "prompt is too long: 210000 tokens > 200000 maximum"}),
+        (
+            "Gemini",
+            400,
+            CONTEXT,
+            {"message": "The input token count (5000) exceeds the maximum number of tokens allowed (4096)."},
+        ),
+    ],
+)
+def test_what_is_wrong_with_the_messages_is_told_after_one_request(
+    family: str, status: int, told: str, error: dict[str, Any]
+) -> None:
+    with (
+        model_server(Script(answered({"error": error}, status))) as (base, script),
+        pytest.raises(SourceError, match=told),
+    ):
+        model(base).ask([user("Who?")], Person)
+    assert len(script.asked) == 1, family

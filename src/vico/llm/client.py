@@ -25,6 +25,11 @@ T = TypeVar("T", bound=BaseModel)
 
 _REFUSED = (400, 415, 422, 501)  # may be meant for a part of the request that we can do without
 _FAILED = 500  # may be meant for a schema
+_ELSEWHERE = (
+    401,
+    403,
+    404,
+)  # of keys and names, unless they speak of a part: routers look for a provider that takes it
 # Parts of a request that can be left out, the likeliest to be refused first.
 _PARTS = ("response_format", "seed", "temperature", "max_tokens")
 _MOST_QUOTED = 20_000  # characters of a bad reply that are shown to the model again
@@ -292,7 +297,7 @@ class LanguageModel:
                 break
             except RequestError as error:
                 part = self._to_leave_out(error, request, reply, tried)
-                if error.status == _FAILED and not error.names("response_format"):
+                if error.status == _FAILED and not _named(error, request):
                     retries -= error.tries  # a server that fails all the same is not asked more often for it
                 if part is None or retries < 0:
                     self._forget(tried)
@@ -316,15 +321,16 @@ class LanguageModel:
         self, error: RequestError, request: Mapping[str, Any], reply: type[BaseModel], tried: Collection[str]
     ) -> str | None:
         """Which part of a refused request to do without, that was not tried yet, or None."""
-        if error.status == _FAILED:  # llama.cpp and others fail at a schema that they can't enforce
-            return part if "response_format" in request and (part := self._part(reply)) not in tried else None
-        if error.status not in _REFUSED:
+        if error.of_messages:
             return None
-        if error.parameter.startswith("messages"):
+        likely = _named(error, request)
+        if not likely and error.status == _FAILED:
+            likely = ["response_format"]  # llama.cpp and others fail at a schema that they can't enforce
+        elif not likely and (error.status in _REFUSED or (error.status == 404 and "parameters" in error.told)):
+            likely = list(_PARTS)  # nothing is named, so it is guessed: schemas are refused most often
+        elif error.status not in (*_REFUSED, _FAILED, *_ELSEWHERE):
             return None
-        named = [name for name in _PARTS if error.names(name) and name in request]
-        # Where nothing is named, it is guessed: schemas are refused most often.
-        for name in (*named, *(() if named else _PARTS)):
+        for name in likely:
             part = self._part(reply) if name == "response_format" else name
             if name in request and part not in tried:
                 return part
@@ -340,18 +346,15 @@ class LanguageModel:
             try:
                 return (how.transport or post)(self.endpoint, request, how.timeout)
             except RequestError as error:
-                if error.status == _FAILED and "response_format" in request:
-                    # It may be the schema: then no waiting helps. Without such a word it is tried twice.
+                if error.status == _FAILED and _named(error, request):
+                    error.transient = False  # no waiting helps
+                elif error.transient and error.status == _FAILED and "response_format" in request:
+                    # It may be the schema. Without such a word it is tried twice.
                     failed += 1
-                    error.transient = failed < min(2, retries) and not error.names("response_format")
+                    error.transient = failed < min(2, retries)
                 raise
 
-        try:
-            return with_retries(send, backoff=Backoff(retries), sleep=how.sleep)
-        except RequestError as error:
-            if error.status in (*_REFUSED, _FAILED):
-                raise
-            raise error.for_people(self.endpoint) from None
+        return with_retries(send, backoff=Backoff(retries), sleep=how.sleep)
 
     def _read_answer(self, content: Mapping[str, Any], asked: int) -> Answer:
         """Return the parts of a completion that we use; anything else in it is ignored."""
@@ -378,6 +381,11 @@ class LanguageModel:
             return usage
         read, written = self.endpoint.price
         return replace(usage, cost=(usage.read * read + usage.written * written) / 1e6)
+
+
+def _named(error: RequestError, request: Mapping[str, Any]) -> list[str]:
+    """Parts of a request that a server's words name and that can be left out."""
+    return [name for name in _PARTS if name in request and error.names(name)]
 
 
 def _in_words(said: Sequence[Message], reply: type[BaseModel]) -> list[Message]:

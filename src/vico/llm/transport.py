@@ -19,6 +19,18 @@ from vico.io.http import HttpError, HttpRequest, Limits, send
 from vico.llm.endpoint import Endpoint
 
 MAX_BYTES = 8 << 20  # of an answer
+# How servers say that their filter refuses a request, and that it is longer than the model reads.
+_FILTERED = re.compile(
+    r"content[ _]?filter|content (?:management )?policy|content_policy|responsible_?ai|data_inspection|"
+    r"content exists risk|input was flagged|safety (?:system|filter)",
+    re.IGNORECASE,
+)
+_TOO_LONG = re.compile(
+    r"context_length_exceeded|exceed_context_size|(?:prompt|input) is too long|too many (?:input |prompt )?tokens|"
+    r"(?:exceed|maximum|longer|larger|greater|too (?:long|large|many)).{0,80}context|"
+    r"context.{0,60}(?:exceed|too (?:long|small))|input token count.{0,60}exceeds",
+    re.IGNORECASE | re.DOTALL,
+)
 
 #: Sends a request's body to an endpoint within so many seconds, gives the answer; raises `RequestError`.
 Transport = Callable[[Endpoint, dict[str, Any], float], dict[str, Any]]
@@ -53,13 +65,21 @@ class RequestError(HttpError):
     ----------
     parameter
         The part of the request that the server names as the one it refuses, or "".
+    told
+        The server's own words, without the model's name, which may be a word of the protocol.
     """
 
     parameter = ""
+    told = ""
+
+    @property
+    def of_messages(self) -> bool:
+        """Whether it is what was said that is refused: no part can be left out for it."""
+        return self.parameter.startswith("messages")
 
     def names(self, part: str) -> bool:
         """Whether the server's words name a part of the request, in whatever way."""
-        words = f"{self.parameter} {self}".lower()
+        words = f"{self.parameter} {self.told or self}".lower()
         also = {"response_format": r"|json_?schema|grammar|guided|structured.?output|json_object|json.?mode"}
         return re.search(rf"(?<![a-z]){part}(?![a-z]){also.get(part, '')}", words) is not None
 
@@ -146,7 +166,16 @@ def _refusal(status: int, page: str, endpoint: Endpoint, wait: float | None = No
     message, code, parameter = _told(page)
     said = f" ({message})" if message else ""
     transient = False
-    if status in (401, 403):
+    about = f"{code} {message}"
+    if status in (400, 403, 422, 500) and _FILTERED.search(about):
+        what, parameter = (
+            f"the provider's filter refuses what was asked ({status}): word it differently{said}",
+            "messages",
+        )
+    elif status in (400, 413, 422, 500) and _TOO_LONG.search(about):
+        what = f"the request is longer than the model reads ({status}): serve it with a larger context{said}"
+        parameter = "messages"
+    elif status in (401, 403):
         key = "refuses the key" if endpoint.key else "wants a key"
         what = f"it {key} ({status}): set VICO_LLM_KEY to one that may use {endpoint.model}{said}"
     elif status == 404:
@@ -164,6 +193,7 @@ def _refusal(status: int, page: str, endpoint: Endpoint, wait: float | None = No
         what = f"it refuses the request ({status}){said}"
     error = RequestError(what, status=status, transient=transient, retry_after=wait)
     error.parameter = parameter
+    error.told = re.sub(rf"(?<!\w){re.escape(endpoint.model)}(?!\w)", " ", message, flags=re.IGNORECASE)
     return error
 
 
