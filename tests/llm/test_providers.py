@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 
 from http_server import Answer
 from llm_server import Script, model_server
-from vico.errors import SourceError
+from vico.errors import LlmReplyError, SourceError
 from vico.llm import Connection, Endpoint, LanguageModel, Sampling, user
 
 
@@ -338,3 +338,30 @@ def test_what_is_wrong_with_the_messages_is_told_after_one_request(
     ):
         model(base).ask([user("Who?")], Person)
     assert len(script.asked) == 1, family
+
+
+@pytest.mark.parametrize(
+    ("choice", "told"),
+    [
+        (
+            {"finish_reason": "stop", "message": {"content": [{"type": "refusal", "refusal": "I can't."}]}},
+            "refuses: I can",
+        ),
+        ({"finish_reason": "stop", "message": {"content": "", "refusal": "I can't."}}, "refuses: I can't"),
+        ({"finish_reason": "content_filter", "message": {}}, "the provider's filter held the answer back"),
+        ({"finish_reason": "content_filter: SAFETY", "index": 0}, "the provider's filter held the answer back"),
+    ],
+)
+def test_a_refusal_is_told_after_one_request(choice: dict[str, Any], told: str) -> None:
+    with (
+        model_server(Script(answered({"choices": [choice]}))) as (base, script),
+        pytest.raises(LlmReplyError, match=told),
+    ):
+        model(base).ask([user("Who?")], Person)
+    assert len(script.asked) == 1
+
+
+def test_a_chunk_that_is_sent_whole_is_read() -> None:
+    whole = {"choices": [{"index": 0, "delta": {"content": GOOD}, "finish_reason": "stop"}]}
+    with model_server(Script(answered(whole))) as (base, _):
+        assert model(base).ask([user("Who?")], Person).value == ANNA

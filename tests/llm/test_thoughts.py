@@ -43,6 +43,8 @@ ANNA = Person(name="Anna", age=41)
         f"<|channel|>analysis<|message|>{DRAFT}<|end|><|start|>assistant<|channel|>final<|message|>{GOOD}<|return|>",
         f"<|channel|>analysis<|message|>{DRAFT}<|end|><|channel|>final <|constrain|>json<|message|>{GOOD}",
         f"<|channel|>analysis<|message|>{DRAFT}<|end|><|channel|>commentary to=functions.reply<|message|>{GOOD}",
+        f"<|channel|>analysis<|message|>{DRAFT}<|end|><|start|>assistant to=functions.reply<|channel|>commentary json"
+        f"<|message|>{GOOD}<|call|>",
         f"analysisWe take {DRAFT}?assistantfinal{GOOD}",
         f"Here is my thought process: {DRAFT}\n\nHere is my response: {GOOD}",
         f"Draft: {DRAFT}\nFinal: {GOOD}",
@@ -95,6 +97,8 @@ def test_text_without_thoughts_stays_as_it_is() -> None:
         f'{{"answer": {GOOD}}}',
         f'{{"Person": {GOOD}}}',
         f"[{GOOD}]",
+        f'{{"reasoning": "She is 41.", "answer": {GOOD}}}',
+        f'{{"reasoning": {DRAFT}, "result": {GOOD}, "confidence": 0.9}}',
         f'{{"people": [{GOOD}]}}',
         f'{{"name": "Person", "arguments": {GOOD}}}',
         f'<tool_call>\n{{"name": "Person", "arguments": {GOOD}}}\n</tool_call>',
@@ -114,6 +118,8 @@ def test_what_is_plainly_meant_is_taken(text: str) -> None:
         '{"name": "Anna", "age": 41, "names": "Anna Maria"}',
         '{"name": 41, "age": 41}',
         f'{{"type": "object", "properties": {GOOD}}}',
+        f'{{"one": {DRAFT}, "other": {GOOD}}}',
+        f'{{"name": 41, "friend": {GOOD}}}',
     ],
 )
 def test_what_is_not_plain_is_asked_for_again(text: str) -> None:
@@ -145,6 +151,18 @@ def test_what_is_not_plain_is_asked_for_again(text: str) -> None:
         ),
         ({"content": None, "function_call": {"name": "Person", "arguments": GOOD}}, "function_call"),
         ({"content": {"name": "Anna", "age": 41}}, "stop"),
+        ({"content": "Let me do that.", "tool_calls": [{"function": {"arguments": GOOD}}]}, "tool_calls"),
+        ({"content": f"<think>{DRAFT}</think>", "tool_calls": [{"function": {"arguments": GOOD}}]}, "stop"),
+        ({"content": GOOD, "tool_calls": [{"function": {"arguments": "{}"}}]}, "stop"),
+        (
+            {"content": None, "tool_calls": [{"function": {"arguments": GOOD}}, {"function": {"arguments": "{}"}}]},
+            "stop",
+        ),
+        ({"content": [{"type": "tool_use", "name": "reply", "input": {"name": "Anna", "age": 41}}]}, "stop"),
+        ({"content": [GOOD[:9], GOOD[9:]]}, "stop"),
+        ({"content": {"parts": [{"text": DRAFT, "thought": True}, {"text": GOOD}]}}, "stop"),
+        ({"role": "model", "parts": [{"text": GOOD}]}, "STOP"),
+        ({"content": "", "thinking": GOOD}, "stop"),
     ],
 )
 def test_the_answer_is_found_wherever_a_server_puts_it(message: dict[str, object], finish: str) -> None:
@@ -160,3 +178,8 @@ def test_the_answer_is_found_wherever_a_server_puts_it(message: dict[str, object
 )
 def test_a_thought_beside_an_empty_answer_is_no_answer(message: dict[str, object], finish: str) -> None:
     assert said_in(message, finish) == ""
+
+
+def test_what_a_tool_says_to_the_model_is_no_answer() -> None:
+    text = f"<|start|>functions.look to=assistant<|channel|>commentary<|message|>{DRAFT}<|end|>"
+    assert read(text, Person, None).value is None

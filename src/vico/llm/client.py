@@ -18,7 +18,7 @@ from vico.llm.endpoint import Endpoint
 from vico.llm.messages import Message, checked, tokens_of, user
 from vico.llm.prompts import data_block
 from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
-from vico.llm.replies import Check, instruction, plain, read, response_format, said_in
+from vico.llm.replies import Check, instruction, plain, read, refused_in, response_format, said_in
 from vico.llm.transport import Connection, RequestError, post
 
 T = TypeVar("T", bound=BaseModel)
@@ -34,6 +34,7 @@ _ELSEWHERE = (
 _PARTS = ("response_format", "seed", "temperature", "max_tokens")
 _MOST_QUOTED = 20_000  # characters of a bad reply that are shown to the model again
 _THOUGHT_TOO_LONG = "the reply is empty: the model thought up to its limit; think less, or allow more tokens"
+_HELD_BACK = "the provider's filter held the answer back: word the request differently, or ask another model"
 _CUT = "the reply breaks off because it is too long: say it with fewer words and numbers"
 
 
@@ -210,7 +211,8 @@ class LanguageModel:
             if spent is not None:
                 spent(answer.usage)
             if answer.refusal:
-                raise _unusable(self.endpoint, f"refuses: {answer.refusal[:300]}", [answer.refusal], answer.text)
+                what = _HELD_BACK if _is_filtered(answer.finish) else f"refuses: {answer.refusal[:300]}"
+                raise _unusable(self.endpoint, what, [answer.refusal], answer.text)
             found = read(answer.text, reply, check)
             if found.value is not None:
                 if self._cache is not None and self._replay is None:
@@ -363,12 +365,15 @@ class LanguageModel:
         message = choice.get("message") if isinstance(choice, dict) else None
         if isinstance(choice, dict) and message is None and isinstance(choice.get("text"), str):
             message = {"content": choice["text"]}  # the older protocol of plain completions
+        finish = str(choice.get("finish_reason") or "") if isinstance(choice, dict) else ""
+        if isinstance(choice, dict) and message is None:
+            message = {} if _is_filtered(finish) else choice.get("delta")  # of a stream, where a server sends it whole
         if not isinstance(choice, dict) or not isinstance(message, dict):
             raise RequestError("its answer is no chat completion: is VICO_LLM_BASE_URL the address up to /v1?")
-        finish = str(choice.get("finish_reason") or "")
         text = said_in(message, finish)
-        refused = message.get("refusal") if not text.strip() else None
-        refusal = plain(str(refused or ("filtered" if finish == "content_filter" else "")))
+        refusal = plain(
+            (refused_in(message) if not text.strip() else "") or ("filtered" if _is_filtered(finish) else "")
+        )
         counted = content.get("usage")
         counted = counted if isinstance(counted, dict) else {}
         usage = Usage(
@@ -396,6 +401,11 @@ def _in_words(said: Sequence[Message], reply: type[BaseModel]) -> list[Message]:
     if isinstance(content, list):
         return [*before, {**last, "content": [*content, {"type": "text", "text": words}]}]
     return [*before, last if words in content else {**last, "content": f"{content}\n{words}"}]
+
+
+def _is_filtered(finish: str) -> bool:
+    """Whether a model was stopped by its provider's filter: ``content_filter``, ``content_filter: SAFETY``, ..."""
+    return finish.lower().startswith(("content_filter", "safety", "prohibited_content", "blocklist", "spii"))
 
 
 def _count(value: object, otherwise: int) -> int:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from vico.llm.objects import is_one_object, objects_in
-from vico.llm.thoughts import ends_in_an_object, without_thoughts
+from vico.llm.thoughts import ends_in_an_object, is_thought, without_thoughts
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -28,6 +28,7 @@ _NUMERAL = re.compile(r"[-+]?\d{1,15}(?:\.\d{1,15})?")
 # Fields of a call of a tool, in the forms that models write as text.
 _ARGUMENTS = frozenset({"arguments", "parameters", "input"})
 _CALL = _ARGUMENTS | {"name", "type", "id", "function", "tool_name"}
+_ANSWER_NAME = re.compile(r"(?:final_?)?(?:answer|result|response|reply|output)|final|data|json", re.IGNORECASE)
 # Keywords that services with enforced schemas refuse, or that only describe; the records are checked in full anyway.
 _LEFT_OUT = ("title", "default", "examples", "minLength", "maxLength", "uniqueItems", "discriminator")
 
@@ -98,30 +99,57 @@ def said_in(message: Mapping[str, Any], finish: str) -> str:
     finish
         Why the model stopped: what was cut off among the thoughts is no answer.
     """
-    content = message.get("content")
-    if isinstance(content, list):
-        content = "".join(str(part.get("text", "")) for part in content if _is_said(part))
-    if isinstance(content, dict):
-        content = json.dumps(content)
-    said = content if isinstance(content, str) else ""
-    if not said.strip():
-        calls = message.get("tool_calls")
-        call = calls[-1] if isinstance(calls, list) and calls else {"function": message.get("function_call")}
-        function = call.get("function") if isinstance(call, dict) else None
-        arguments = function.get("arguments") if isinstance(function, dict) else None
-        said = (
-            json.dumps(arguments) if isinstance(arguments, dict) else arguments if isinstance(arguments, str) else said
-        )
+    parts = _parts(message)
+    said = "".join(part if isinstance(part, str) else str(part.get("text", "")) for part in parts if _is_said(part))
+    if isinstance(message.get("content"), dict) and not parts:
+        said = json.dumps(message["content"])
+    called = "\n".join(_arguments(message, parts))
+    if called.strip():
+        # Words beside a call count if there is an object in them that fits: the later one of a text is tried first.
+        beside = said if is_one_object(said.strip()) else without_thoughts(said)
+        said = f"{called}\n{beside}" if "{" in beside else called
     if not said.strip() and finish != "length":
-        thoughts = message.get("reasoning_content") or message.get("reasoning")
+        thoughts = message.get("reasoning_content") or message.get("reasoning") or message.get("thinking")
         if isinstance(thoughts, str) and ends_in_an_object(thoughts):
             said = thoughts
     return said.encode("utf-8", "replace").decode()  # lone surrogates
 
 
+def refused_in(message: Mapping[str, Any]) -> str:
+    """Return the words in which a message refuses, of its own or among its parts; or ""."""
+    own = [message.get("refusal"), *(part.get("refusal") for part in _parts(message) if isinstance(part, dict))]
+    return " ".join(one for one in own if isinstance(one, str) and one)
+
+
+def _parts(message: Mapping[str, Any]) -> list[Any]:
+    """Return the parts of a message's content; Gemini's own protocol has them under a name of theirs."""
+    content = message.get("content")
+    if isinstance(content, dict) and content.keys() <= {"parts", "role"}:
+        content = content.get("parts")
+    if content is None:
+        content = message.get("parts")
+    return content if isinstance(content, list) else [content] if isinstance(content, str) else []
+
+
 def _is_said(part: Any) -> bool:
     """Whether a part of a content is what is said: not a thought, a picture or a call."""
+    if isinstance(part, str):
+        return True
     return isinstance(part, dict) and part.get("type", "text") in ("text", "output_text") and not part.get("thought")
+
+
+def _arguments(message: Mapping[str, Any], parts: Sequence[Any]) -> list[str]:
+    """Return the arguments of all calls of tools in a message, in the forms of OpenAI, Anthropic and Gemini."""
+    calls = message.get("tool_calls")
+    calls = calls if isinstance(calls, list) else [calls]
+    functions = [call.get("function") for call in calls if isinstance(call, dict)] + [message.get("function_call")]
+    values = [function.get("arguments") for function in functions if isinstance(function, dict)]
+    for part in parts:
+        if isinstance(part, dict) and part.get("type") == "tool_use":
+            values.append(part.get("input"))
+        elif isinstance(part, dict) and isinstance(part.get("functionCall"), dict):
+            values.append(part["functionCall"].get("args"))
+    return [one if isinstance(one, str) else json.dumps(one) for one in values if isinstance(one, (str, dict))]
 
 
 def read(text: str, reply: type[T], check: Check[T] | None) -> Read[T]:
@@ -170,10 +198,23 @@ def _record(content: str, reply: type[T]) -> tuple[T | None, list[str]]:
     value, wrong = _plainly(content, reply)
     if value is not None:
         return value, []
-    inner = _enveloped(json.loads(content))
+    content_of = json.loads(content)
+    inner = _enveloped(content_of) or _beside_thoughts(content_of, reply)
     if inner is not None:
         value, _ = _plainly(inner, reply)
     return value, wrong
+
+
+def _beside_thoughts(content: dict[str, Any], reply: type[BaseModel]) -> str | None:
+    """Return the one object in an envelope that has more fields: ``{"reasoning": "...", "answer": {...}}``."""
+    own = set(reply.model_fields) | {one.alias for one in reply.model_fields.values() if one.alias}
+    if content.keys() & own:
+        return None  # a record that is wrong, not one in an envelope
+    others = {key: one for key, one in content.items() if not is_thought(key)}
+    answers = {key: one for key, one in others.items() if _ANSWER_NAME.fullmatch(key) or key == reply.__name__}
+    # A field with another name counts where all the rest are thoughts: a schema that is repeated has an object, too.
+    held = [inner for key, one in (answers or others).items() if (inner := _enveloped({key: one})) is not None]
+    return held[0] if len(held) == 1 and (answers or len(others) == 1) else None
 
 
 def _called(closed: str, reply: type[T], fault: str) -> tuple[T | None, list[str]]:

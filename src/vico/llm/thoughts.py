@@ -20,8 +20,11 @@ _TAG = re.compile(
     re.IGNORECASE,
 )
 _CHANNEL = re.compile(
-    r"<\|channel\|>\s*(?P<name>\w+)(?P<head>[^<]*)(?:<\|constrain\|>[^<]*)?<\|message\|>", re.IGNORECASE
+    r"(?P<role><\|start\|>[^<]*)?<\|channel\|>\s*(?P<name>\w+)(?P<head>[^<]*)(?:<\|constrain\|>[^<]*)?<\|message\|>",
+    re.IGNORECASE,
 )
+# Whom a message is for: a tool, where it is a call; what a tool says is for the assistant.
+_TO_TOOL = re.compile(r"to=(?!assistant)", re.IGNORECASE)
 _END_OF_MESSAGE = re.compile(r"<\|(?:end|return|call|start)\|>")
 # gpt-oss where a server left out its special tokens.
 _BARE_CHANNELS = re.compile(r"^\s*(?:assistant)?\s*analysis(?=[\sA-Z]).*?assistant\s*final", re.DOTALL)
@@ -32,6 +35,14 @@ _ANSWER = re.compile(
     r"(?:<\|?/?(?:(?P=tag)|end_of_solution)\|?>|\Z)",
     re.DOTALL | re.IGNORECASE,
 )
+
+
+def is_thought(name: str) -> bool:
+    """Whether a name is one for thoughts or drafts, not for an answer."""
+    return (
+        re.fullmatch(rf"(?:{_NAMES}|drafts?|examples?|first_\w+|explanation|rationale)", name, re.IGNORECASE)
+        is not None
+    )
 
 
 def without_thoughts(text: str) -> str:
@@ -60,11 +71,11 @@ def without_thoughts(text: str) -> str:
 
 def _final_channel(text: str) -> str:
     """Return what was said in the last final channel, or as the arguments of a call; empty if there is none."""
-    answer = text[: text.lower().index("<|channel|>")].replace("<|start|>assistant", "")
+    answer = re.sub(r"<\|start\|>[^<]*\Z", "", text[: text.lower().index("<|channel|>")])
     found = list(_CHANNEL.finditer(text))
     for channel in found:
         name, head = channel["name"].lower(), channel["head"]
-        if name == "final" or (name == "commentary" and "to=" in head):
+        if name == "final" or (name == "commentary" and _TO_TOOL.search(f"{channel['role'] or ''} {head}")):
             rest = text[channel.end() :]
             end = _END_OF_MESSAGE.search(rest)
             answer = rest[: end.start()] if end else rest

@@ -17,6 +17,7 @@ from typing import Any
 from vico.errors import SourceError
 from vico.io.http import HttpError, HttpRequest, Limits, send
 from vico.llm.endpoint import Endpoint
+from vico.llm.stream import completion_from_stream
 
 MAX_BYTES = 8 << 20  # of an answer
 # How servers say that their filter refuses a request, and that it is longer than the model reads.
@@ -148,10 +149,14 @@ def _hint(cause: object) -> str:
 
 
 def _object(received: bytes, endpoint: Endpoint) -> dict[str, Any]:
+    # Routers that keep a connection open by comments send them before an answer that is no stream, too.
+    text = re.sub(r"\A\s*(?::[^\n]*\n\s*)+", "", received.decode("utf-8-sig", "replace"))
     try:
-        answer = json.loads(received)
+        answer = json.loads(text)
     except (ValueError, RecursionError):
-        answer = None
+        answer, ended = completion_from_stream(text)
+        if answer is not None and not ended:
+            raise RequestError("its stream breaks off before the answer is whole", transient=True) from None
     if not isinstance(answer, dict):
         raise RequestError("it does not answer in JSON: is VICO_LLM_BASE_URL the address up to /v1?")
     if answer.get("error"):  # some routers say 200 and put the upstream's failure inside
