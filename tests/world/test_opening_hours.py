@@ -125,13 +125,127 @@ def test_the_sun_sets_when_it_does_at_the_place() -> None:
         ("Su-Th 15-00; Fr-Sa 15-02", "Su-Th 15:00-00:00; Fr-Sa 15:00-02:00"),
         ("Daily 10:00-18:00", "Mo-Su 10:00-18:00"),
         ("24 hours", "24/7"),
+        ("Sun-Thu 11AM-10PM, Fri-Sat 11AM-11PM", "Su-Th 11:00-22:00, Fr-Sa 11:00-23:00"),
+        ("Tues & Thurs 18-20", "Tu,Th 18:00-20:00"),
+        ("Weds-Thur 9a-5p", "We-Th 09:00-17:00"),
+        ("Mo-Fr 9：00～18：00", "Mo-Fr 9:00-18:00"),
+        ("Mo-Fr 24h", "Mo-Fr 00:00-24:00"),
+        ("24x7", "24/7"),
+        ("24h/24 7j/7", "24/7"),
+        ("11.30am - 2.30pm, 5.30pm - 10pm", "11:30-14:30, 17:30-22:00"),
+        ("Mo-Fr 9:00-12:00 14:00-18:00", "Mo-Fr 9:00-12:00,14:00-18:00"),
+        ("Mo-Fr 9:00-12:00/14:00-18:00", "Mo-Fr 9:00-12:00,14:00-18:00"),
+        ("Mo-Fr 8:00-18:00 | Sa 8:00-12:00", "Mo-Fr 8:00-18:00; Sa 8:00-12:00"),
+        ("Mo-Fr 8:00-18:00 / Sa 8:00-12:00", "Mo-Fr 8:00-18:00; Sa 8:00-12:00"),
+        ("Mo-Fr 9:00-17:00;;Sa 10:00-12:00", "Mo-Fr 9:00-17:00;Sa 10:00-12:00"),
+        ("(sunrise-sunset)", "sunrise-sunset"),
+        ("noon-5pm", "12:00-17:00"),
+        ("5pm-midnight", "17:00-24:00"),
+        ("Mo-Fr 09:00-18:00 hrs", "Mo-Fr 09:00-18:00"),
+        ("Mo-Su 11:00-late", "Mo-Su 11:00+"),
+        ("930-1830", "9:30-18:30"),
+        ("Di Ruhetag; 11:00-22:00", "11:00-22:00; Tu off"),
+        ("Mo-Fr 9-12 “by the back door”", "Mo-Fr 9:00-12:00"),
     ],
 )
 def test_common_spellings_are_read(typed: str, meant: str) -> None:
     assert (how_read(typed), respelled(typed)) == ("respelled", meant)
 
 
-@pytest.mark.parametrize("text", ["Tuesdays 9-5", "summer", "Mo-Fr 07:00-late", "", "lundi 10-12"])
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("Mo-So 8-20 Uhr", "Mo-Su 8:00-20:00"),
+        ("Montag bis Freitag 9 bis 18 Uhr, So geschlossen", "Mo-Fr 9:00-18:00, Su off"),
+        ("Di,Do 10:00-18:00", "Tu,Th 10:00-18:00"),
+        ("Sa-Di 14h-18h", "Sa-Su 14:00-18:00"),
+        ("du lundi au vendredi de 9h à 18h", "Mo-Fr 9:00-18:00"),
+        ("mar-sam 9h30-19h", "Tu-Sa 9:30-19:00"),
+        ("Lunes a viernes 9:00-18:00", "Mo-Fr 9:00-18:00"),
+        ("lun-ven 9-13 15-19; dom chiuso", "Mo-Fr 9:00-13:00,15:00-19:00; Su off"),
+        ("maandag t/m vrijdag van 9.00 tot 17.30 uur", "Mo-Fr 9:00-17:30"),
+        ("segunda a sexta 9h-18h", "Mo-Fr 9:00-18:00"),
+        ("pn-pt 8-16; sob 9-13", "Mo-Fr 8:00-16:00; Sa 9:00-13:00"),
+        ("пн-пт 9:00-18:00; сб,вс выходной", "Mo-Fr 9:00-18:00; Sa,Su off"),
+        ("周一至周五 9:00-18:00", "Mo-Fr 9:00-18:00"),
+        ("月～金 10:00-19:00、土日祝 10:00-17:00", "Mo-Fr 10:00-19:00, Sa,Su,PH 10:00-17:00"),
+        ("Mar-Oct: Di-So 10-18 Uhr", "Mar-Oct: Tu-Su 10:00-18:00"),
+    ],
+)
+def test_days_are_read_in_the_language_that_knows_all_their_names(typed: str, meant: str) -> None:
+    assert (how_read(typed), respelled(typed)) == ("respelled", meant)
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        ("1-5pm", (780, 1020)),
+        ("6-10pm", (1080, 1320)),
+        ("9-5pm", (540, 1020)),
+        ("11-2pm", (660, 840)),
+        ("12-9pm", (720, 1260)),
+        ("8-11am", (480, 660)),
+        ("9:30am-5", (570, 1020)),
+        ("6pm-2", (1080, 1560)),
+        ("18-2", (1080, 1560)),
+    ],
+)
+def test_half_of_the_day_said_once_counts_for_both_times_where_it_can(typed: str, expected: Span) -> None:
+    assert weekly_hours(f"Tu {typed}") == [[], [expected], *[[]] * 5]
+
+
+@pytest.mark.parametrize(
+    "text", ["9-5", "Mo-Fr 9:30-5", "10:00-7", "11-2am", "9am-11", "Ma-Do 9-17", "ma-pe 9-17", "Po-Pá 8-18; So 9-12"]
+)
+def test_hours_and_days_that_could_be_two_are_not_read(text: str) -> None:
+    assert how_read(text) == "not read"
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "second"),
+    [
+        ("Mo-Su 18:00-02:00; Mo off", [(0, 120)], [(1080, 1560)]),
+        ("Mo-Fr 22:00-06:00; Mo off", [], [(1320, 1800)]),
+        ("Mo-Su 11:00-01:00; 2026 Jun 8 off", [(0, 60)], [(660, 1500)]),
+        ("Mo 18:00-03:00; Tu off", [(1080, 1620)], [(0, 180)]),
+        ("Mo-Su 18:00-02:00; Mo 18:00-03:00", [(0, 120), (1080, 1620)], [(0, 180), (1080, 1560)]),
+        ("24/7; 22:00-06:00 off", [(360, 1320)], [(360, 1320)]),
+    ],
+)
+def test_a_night_belongs_to_the_day_that_it_begins_on(text: str, first: list[Span], second: list[Span]) -> None:
+    found = [open_spans(text, MONDAY, BERLIN), open_spans(text, TUESDAY, BERLIN)]
+    assert found == [first, second]
+
+
+def test_hours_by_the_clock_are_kept_where_clocks_change_at_midnight() -> None:
+    cairo, changing = (30.04, 31.23), date(2026, 4, 24)
+    assert open_spans("Mo-Su 18:00+", changing - timedelta(days=1), cairo) == [(1080, 1440)]
+    assert open_spans("00:00-24:00", changing, cairo) == [(0, 1440)]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('Mo-Fr 10:00-18:00; "nach Vereinbarung"', [(600, 1080)]),
+        ('Mo-Fr 10:00-18:00, "nach Vereinbarung"', [(600, 1080)]),
+        ('Mo-Fr 11:00-14:00 "Lunch", 18:00-22:00 "Dinner"', [(660, 840), (1080, 1320)]),
+        ('24/7 "self service"', [(0, 1440)]),
+        ('Mo-Fr 10:00-18:00 "opens 9:00; in summer"', [(600, 1080)]),
+        ('Mo-Fr 10:00-18:00 open "ring the bell"', [(600, 1080)]),
+        ('Mo-Fr 10:00-18:00; Tu off "stocktaking"', []),
+        ('"by appointment"', None),
+        ("Mo-Fr 10:00-18:00 unknown", None),
+    ],
+)
+def test_a_comment_beside_hours_is_a_remark(text: str, expected: list[Span] | None) -> None:
+    assert (how_read(text), open_spans(text, TUESDAY, BERLIN)) == ("as typed", expected)
+
+
+def test_remarks_keep_spans_on_their_days() -> None:
+    assert open_spans('Mo-Fr 11:00-14:00 open "Lunch", 18:00-22:00 open "Dinner"', SUNDAY, BERLIN) == []
+
+
+@pytest.mark.parametrize("text", ["Tuesdays 9-5", "summer", "", "by appointment"])
 def test_what_could_mean_several_things_is_not_read(text: str) -> None:
     assert how_read(text) == "not read"
     assert open_spans(text, TUESDAY, BERLIN) is None

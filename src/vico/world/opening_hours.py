@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import date as Date
 from datetime import datetime, timedelta
-from datetime import time as Time
 from functools import lru_cache
 from typing import Literal
 
 import opening_hours as library
 
-DAYS = ("Mo", "Tu", "We", "Th", "Fr", "Sa", "Su")
+from vico.world.hours_spelling import DAY, in_specification
+from vico.world.hours_spelling import DAYS as DAYS
+
 MINUTES = 24 * 60
 
 #: Open from, until, in minutes of the day; `until` may lie past midnight.
@@ -32,73 +33,40 @@ _LATEST = 12 * 60
 _ORDINARY_SHARE = 0.9
 # Any year without a rule of its own does: the weeks of this one are looked at for what is usual.
 _ORDINARY_YEAR = 2026
-_SUN = re.compile(r"sunrise|sunset|dawn|dusk")
-
-# Spellings that people use and the specification does not know, tried only where it refuses a value as it is typed.
-_DAY = "(?:Mo|Tu|We|Th|Fr|Sa|Su|PH|SH)"
-_DAY_NAMES = re.compile(
-    r"\b(mo|tu|we|th|fr|sa|su)(?:n|ndays?|es|esdays?|d|dnesdays?|ur|urs|rs|ursdays?|i|idays?|t|turdays?)?\b\.?:?", re.I
-)
-_RESPELLED: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
-    (re.compile("[‐‑‒–—−]"), "-"),
-    (re.compile("[“”„«»]"), '"'),
-    (re.compile("[\u00a0\u2009\u202f\\s]+"), " "),
-    (re.compile(r"\b(?:daily|every ?day)\b", re.I), "Mo-Su"),
-    (re.compile(r"\bweekdays\b", re.I), "Mo-Fr"),
-    (re.compile(r"\bweekends?\b", re.I), "Sa-Su"),
-    (re.compile(r"^\s*(?:open )?(?:24 ?/ ?7|24 ?h(?:ours?)?)\s*$", re.I), "24/7"),
-    (re.compile(r"\bph\b", re.I), "PH"),
-    (re.compile(r"\bsh\b", re.I), "SH"),
-    (re.compile(r"\s*(?:\bto\b|\btill?\b|\buntil\b|\bbis\b)\s*", re.I), "-"),
-    (re.compile(r"\s*(?:&|\band\b|\bund\b)\s*", re.I), ","),
-    (re.compile(r"\s*-\s*"), "-"),
-    (re.compile(r"\b(\d{1,2})h(\d{2})\b", re.I), r"\1:\2"),
-    (re.compile(r"\b(\d{1,2}(?::\d{2})?)\s*(?:uhr|h)\b", re.I), r"\1"),
-    (re.compile(r"\b(\d{1,2})\.(\d{2})\b(?=\s*-|\s*[,;]|\s*$|\s*[ap]\.?m)", re.I), r"\1:\2"),
-    (re.compile(r"(?<=\d-)(\d{2})(\d{2})\b|\b(\d{2})(\d{2})(?=-\d)"), r"\1\3:\2\4"),
-    (re.compile(r"\b(\d{1,2})(?::?(\d{2}))?\s*([ap])\.?m\b\.?", re.I), lambda found: _of_half_day(*found.groups())),
-    (re.compile(r"(?<![\d:])(\d{1,2})(?=-(\d{1,2})(?::\d{2})?(?![\d:]))"), lambda found: _of_a_day(*found.groups())),
-    (re.compile(r"(?<=\d:\d{2}-)(\d{1,2})(?![\d:])"), r"\1:00"),
-    (re.compile(r"(\d:\d{2})-(?=\s*(?:[,;]|$))"), r"\1+"),
-    (re.compile(rf"({_DAY})(?=\d)"), r"\1 "),
-    (re.compile(rf"(\d:\d{{2}}\+?)[\s,.]+(?={_DAY}\b)"), r"\1, "),
-)  # fmt: skip
-
+_SUN = re.compile(r"sunrise|sunset|dawn|dusk", re.I)
+_NOON = 12 * 60
 
 # "Mo, Tu 10:00-12:00" lists days; by the letter of the specification its first rule would be "Mo", round the clock.
-_SPACED_LIST = re.compile(rf"\b({_DAY}),\s+(?={_DAY}\b)")
-# A last resort without certain hours ("|| on appointment") opens nothing; the library forgets all days but one for it.
-_LAST_RESORT = re.compile(r"""\s*\|\|\s*(?:unknown\s*)?(?:"[^"]*")?\s*$""")
-# Rules that override earlier ones; a semicolon within a comment separates nothing.
-_OVERRIDING = re.compile(r';(?=(?:[^"]*"[^"]*")*[^"]*$)')
+_SPACED_LIST = re.compile(rf"\b({DAY}),\s+(?={DAY}\b)")
+# Times outside comments, each alone and as spans.
+_TIME = r"(?<!\d)(\d{1,2}):(\d{2})(?!:?\d)"
+_ONE_TIME = re.compile(_TIME)
+_FROM_UNTIL = re.compile(rf"{_TIME}\s*-\s*{_TIME}(\s*(?:off|closed)\b)?", re.I)
+_COMMENT = re.compile('("[^"]*")')
+# A comment beside hours is a remark ("Lunch"), with "open" or without. Quotes pair up behind it.
+_REMARK = re.compile(
+    r'((?:\d:\d\d\+?|24/7|\)|sunrise|sunset|dawn|dusk))\s*(?:open\s*)?"[^"]*"(?=(?:[^"]*"[^"]*")*[^"]*$)', re.I
+)
+_RULE = re.compile(r'([;,]|\|\||^)((?:"[^"]*"|[^";,|])*)')
+_SAYS_NOTHING = re.compile(r'\s*(?:unknown)?\s*(?:"[^"]*")?\s*', re.I)
 
 
-def _of_half_day(hour: str, minute: str | None, half: str) -> str:
-    return f"{int(hour) % 12 + (12 if half.lower() == 'p' else 0):02d}:{minute or '00'}"
+def _without_remarks(text: str) -> str:
+    """Return a value without comments beside hours, and without rules that are comments alone beside other rules.
 
-
-def _of_a_day(hour: str, until: str) -> str:
-    """Return an hour without minutes as a time; left as it is in "9-5", which hardly means until five at night."""
-    return hour if len(until) == 1 and int(until) <= int(hour) else f"{hour}:00"
-
-
-def _respelled(text: str) -> str:
-    """Return a value in the specification's spelling, as far as its parts are known words and times."""
-    pieces = re.split(r'("[^"]*")', text)
-    for k in range(0, len(pieces), 2):  # comments stay as they are
-        piece = _DAY_NAMES.sub(lambda found: found[1].capitalize(), pieces[k])
-        for pattern, instead in _RESPELLED:
-            piece = pattern.sub(instead, piece)
-        pieces[k] = piece
-    return "".join(pieces).strip(" ,.;")
+    By the letter "by appointment" would override all rules before it. People mean: at other times.
+    """
+    rules = [(separator, rule.rstrip()) for separator, rule in _RULE.findall(_REMARK.sub(r"\1", text))]
+    said = [(separator, rule) for separator, rule in rules if not _SAYS_NOTHING.fullmatch(rule)] or rules
+    return "".join((separator if k else "") + rule for k, (separator, rule) in enumerate(said)).strip()
 
 
 @lru_cache(maxsize=16384)
 def _readable(text: str) -> str | None:
     """Return a value as the library takes it: as typed, else respelled; None where neither can be read."""
-    for candidate in (text.strip(), _respelled(text)):
+    for candidate in (text.strip(), in_specification(text)):
         if candidate and library.validate(candidate):
-            return _LAST_RESORT.sub("", _SPACED_LIST.sub(r"\1,", candidate))
+            return _without_remarks(_SPACED_LIST.sub(r"\1,", candidate))
     return None
 
 
@@ -115,44 +83,90 @@ def respelled(text: str) -> str:
     return _readable(text) or text
 
 
+def _clock(minutes: int) -> str:
+    return f"{minutes // 60:02d}:{minutes % 60:02d}"
+
+
+def _within_days(text: str) -> tuple[str, list[int]] | None:
+    """Return a value whose spans all end on the day they begin, and the minutes that its times stand for.
+
+    The library takes what is open past midnight from the hours of the next day: it forgets it where another rule
+    decides the next day, and leaves it where the day it began is off. So the times of a value, those past midnight
+    counted on, are put in order and stand as the minutes after noon: the k-th for k minutes. None where times follow
+    the sun, or where a value closes by night.
+    """
+    if _SUN.search(text):
+        return None
+    pieces, moments = _COMMENT.split(text), set[int]()
+
+    def with_end(found: re.Match[str]) -> str:
+        hour, minute, to_hour, to_minute, closing = found.groups()
+        begin, end = int(hour) * 60 + int(minute), int(to_hour) * 60 + int(to_minute)
+        return f"{_clock(begin)}-{_clock(end if end > begin else end + MINUTES)}{closing or ''}"
+
+    pieces[::2] = [_FROM_UNTIL.sub(with_end, piece) for piece in pieces[::2]]
+    for piece in pieces[::2]:
+        if any(
+            closing and (int(hour), int(minute)) > (24, 0) for *_, hour, minute, closing in _FROM_UNTIL.findall(piece)
+        ):
+            return None
+        moments |= {int(hour) * 60 + int(minute) for hour, minute in _ONE_TIME.findall(piece)}
+    order = sorted(moments)
+
+    def ranked(found: re.Match[str]) -> str:
+        return _clock(_NOON + order.index(int(found[1]) * 60 + int(found[2])))
+
+    pieces[::2] = [_ONE_TIME.sub(ranked, piece) for piece in pieces[::2]]
+    return "".join(pieces), order
+
+
 class _Calendar:
     """A readable value at a place, asked for what is open on dates."""
 
     def __init__(self, text: str, coordinates: Coordinates | None, holidays: bool) -> None:
-        self._text, self._coordinates, self._holidays = text, coordinates, holidays
-        self._hours = library.OpeningHours(text, coords=coordinates, auto_country=holidays)
+        self._text = text
+        asked, moments = _within_days(text) or (text, None)
+        self._moments: list[int] | None = moments
+        # Hours by the clock need no time zone: in some, clocks are put forward at midnight, and a day begins at one.
+        self._hours = library.OpeningHours(
+            asked, coords=coordinates, auto_country=holidays, auto_timezone=moments is None
+        )
 
     def _is_open(self, state: library.State, comment: str) -> bool:
-        # A comment beside no `open` makes hours unknown by the specification ("by appointment"); the library says open.
+        # A comment beside no `open` makes a day unknown by the specification ("by appointment"); the library says open.
         commented = comment != "" and not re.search(rf'\bopen\s*"{re.escape(comment)}"', self._text)
         return state == library.State.OPEN and not commented
 
-    def _late_end(self, midnight: datetime) -> datetime:
-        """Return until when it is open that is open up to a midnight.
-
-        The library forgets the hours past midnight of one rule where another rule decides the next day: so the rules
-        are asked one by one. The last one that is open up to midnight holds.
-        """
-        rules = _OVERRIDING.split(self._text)
-        for rule in reversed(rules) if len(rules) > 1 else ():
-            one = _calendar(rule, self._coordinates, self._holidays)
-            spans = [] if one is None else one.open_between(midnight.date() - timedelta(days=1), 3)
-            for low, high in spans:
-                if low < midnight <= high:
-                    return high
-        return midnight
+    def _by_the_clock(self, low: datetime, high: datetime) -> list[tuple[datetime, datetime]]:
+        """Return what an answer of the library stands for, day by day."""
+        if self._moments is None:
+            return [(low, high)]
+        found: list[tuple[datetime, datetime]] = []
+        while low < high:
+            day = datetime(low.year, low.month, low.day)
+            until = min(high, day + timedelta(days=1))
+            begin = 0 if low == day else self._moments[low.hour * 60 + low.minute - _NOON]
+            end = (
+                MINUTES if until > day + timedelta(hours=23) else self._moments[until.hour * 60 + until.minute - _NOON]
+            )
+            if begin < end:
+                found.append((day + timedelta(minutes=begin), day + timedelta(minutes=end)))
+            low = until
+        return found
 
     def open_between(self, first: Date, days: int) -> list[tuple[datetime, datetime]]:
-        """Return when it is open within some days, local time; what lies back to back is one interval."""
+        """Return what begins within some days, local time; what lies back to back is one interval."""
         start = datetime(first.year, first.month, first.day)
-        found: list[tuple[datetime, datetime]] = []
+        spans: list[tuple[datetime, datetime]] = []
         for low, high, state, comment in self._hours.intervals(start, start + timedelta(days=days)):
-            if not self._is_open(state, comment):
-                continue
-            low, high = low.replace(tzinfo=None), high.replace(tzinfo=None)
+            if self._is_open(state, comment):
+                spans += self._by_the_clock(low.replace(tzinfo=None), high.replace(tzinfo=None))
+        found: list[tuple[datetime, datetime]] = []
+        for low, high in sorted(spans):
             if found and found[-1][1] >= low:
-                low = found.pop()[0]
-            found.append((low, high))
+                found[-1] = (found[-1][0], max(found[-1][1], high))
+            else:
+                found.append((low, high))
         return found
 
     def is_closed_on(self, date: Date) -> bool:
@@ -166,8 +180,6 @@ class _Calendar:
         result: list[list[Span]] = [[] for _ in range(days)]
         start = datetime(first.year, first.month, first.day) - timedelta(days=1)
         for low, high in self.open_between(first - timedelta(days=1), days + 2):
-            if high.time() == Time(0):
-                high = self._late_end(high)
             begin, end = (round((moment - start).total_seconds() / 60) for moment in (low, high))
             while begin < end:
                 midnight = (begin // MINUTES + 1) * MINUTES
@@ -227,8 +239,8 @@ def open_spans(
     -------
     list of Span or None
         Sorted; what spills over from the day before comes first, and hours that reach past midnight are kept whole.
-        Hours that a comment makes uncertain ("by appointment") are not open. None where nothing is known: the value
-        can't be read, names only closings that are not on this date, or only uncertain hours.
+        A comment beside hours is a remark; days with a comment instead of hours ("by appointment") are not open. None
+        where nothing is known: the value can't be read, names only closings that are not on this date, or no hours.
     """
     found = _spans(text, date, coordinates, holidays)
     return None if found is None else list(found)
