@@ -74,6 +74,9 @@ _WORDS: _Rules = (
     (re.compile(r"\s*-\s*"), "-"),
 )  # fmt: skip
 
+# "Jun 8-10" and "week 8-10" before days, hours or a closing are dates.
+_MONTHS = "jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec"
+_NO_DATES = rf"(?!(?<=(?:{_MONTHS}|eek) )\d{{1,2}}-\d{{1,2}}(?!\d):? ?(?:{DAY}|\d|off|closed))"
 # A time with or without minutes and half of the day.
 _TIME = r"(\d{1,2})(?::(\d{2}))?([ap]m)?"
 _TIMES: _Rules = (
@@ -83,7 +86,7 @@ _TIMES: _Rules = (
     (re.compile(r"\b(\d{1,2})\.(\d{2})(?=[-,;/ ]|$|[ap]m)"), r"\1:\2"),
     (re.compile(r"\b(?!20\d\d-20)(\d{1,2})([0-5]\d)(?=-\d)"), r"\1:\2"),
     (re.compile(r"(?<=\d-)(?!(?<=20\d\d-)20)(\d{1,2})([0-5]\d)\b"), r"\1:\2"),
-    (re.compile(rf"(?<![\d:])\b{_TIME}-{_TIME}(?![\w:])"), lambda found: _span(*found.groups())),
+    (re.compile(rf"(?<![\d:])\b{_NO_DATES}{_TIME}-{_TIME}(?![\w:])", re.I), lambda found: _span(*found.groups())),
     (re.compile(rf"(?<![\d:-])\b{_TIME}(?=\+)"), lambda found: _time(*found.groups())),
     (re.compile(r"(\d:\d{2})-(?=\s*(?:[,;]|$))"), r"\1+"),
     (re.compile(r"\(((?:sunrise|sunset|dawn|dusk)-(?:sunrise|sunset|dawn|dusk))\)", re.I), r"\1"),
