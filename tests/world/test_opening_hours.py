@@ -237,6 +237,10 @@ def test_hours_by_the_clock_are_kept_where_clocks_change_at_midnight() -> None:
         ('Mo-Fr 10:00-18:00 open "ring the bell"', [(600, 1080)]),
         ('Mo-Fr 10:00-18:00; Tu off "stocktaking"', []),
         ('"by appointment"', None),
+        ('Mo-Fr 09:00-17:00 "by appointment"', None),
+        ('Mo-Fr 09:00-17:00 "nur nach telefonischer Vereinbarung"', None),
+        ('Mo-Fr 09:00-17:00 "sur rendez-vous"', None),
+        ('Mo-Fr 09:00-17:00 "desk 2 by appointment"', [(540, 1020)]),
         ("Mo-Fr 10:00-18:00 unknown", None),
     ],
 )

@@ -43,9 +43,18 @@ _TIME = r"(?<!\d)(\d{1,2}):(\d{2})(?!:?\d)"
 _ONE_TIME = re.compile(_TIME)
 _FROM_UNTIL = re.compile(rf"{_TIME}\s*-\s*{_TIME}(\s*(?:off|closed)\b)?", re.I)
 _COMMENT = re.compile('("[^"]*")')
-# A comment beside hours is a remark ("Lunch"), with "open" or without. Quotes pair up behind it.
+# Comments that say that the hours are for those alone who asked before.
+_ON_REQUEST = (
+    r"(?:only )?(?:(?:by|on|upon|with) (?:prior )?(?:appointment|request|arrangement|reservation|booking)|"
+    r"(?:nur )?(?:nach|auf|mit) (?:[\w.]+ )?(?:vereinbarung|absprache|anmeldung|anfrage|termin(?:vereinbarung)?)|(?:uniquement )?sur (?:rendez-vous|rdv|"
+    r"r[eé]servation|demande)|con (?:cita(?: previa)?|reserva)|(?:solo )?su (?:appuntamento|prenotazione)|op afspraak)"
+    r"(?: only)?[.!]?"
+)
+# Any other comment beside hours is a remark ("Lunch"), with "open" or without. Quotes pair up behind it.
 _REMARK = re.compile(
-    r'((?:\d:\d\d\+?|24/7|\)|sunrise|sunset|dawn|dusk))\s*(?:open\s*)?"[^"]*"(?=(?:[^"]*"[^"]*")*[^"]*$)', re.I
+    rf'((?:\d:\d\d\+?|24/7|\)|sunrise|sunset|dawn|dusk))\s*(?:open\s*)?"(?!{_ON_REQUEST}")[^"]*"'
+    r'(?=(?:[^"]*"[^"]*")*[^"]*$)',
+    re.I,
 )
 _RULE = re.compile(r'([;,]|\|\||^)((?:"[^"]*"|[^";,|])*)')
 _SAYS_NOTHING = re.compile(r'\s*(?:unknown)?\s*(?:"[^"]*")?\s*', re.I)
@@ -239,8 +248,9 @@ def open_spans(
     -------
     list of Span or None
         Sorted; what spills over from the day before comes first, and hours that reach past midnight are kept whole.
-        A comment beside hours is a remark; days with a comment instead of hours ("by appointment") are not open. None
-        where nothing is known: the value can't be read, names only closings that are not on this date, or no hours.
+        A comment beside hours is a remark, unless it says "by appointment": such days, and days with a comment instead
+        of hours, are not open. None where nothing is known: the value can't be read, names only closings that are not
+        on this date, or no hours.
     """
     found = _spans(text, date, coordinates, holidays)
     return None if found is None else list(found)
