@@ -153,6 +153,16 @@ def test_a_feed_that_gives_nothing_says_why(tmp_path: Path, name: str, old: str,
     assert re.search(reason, read(tmp_path, tables | {name: tables[name].replace(old, new)}).nothing)
 
 
+def test_trips_and_calls_that_name_what_is_not_there_are_told(tmp_path: Path) -> None:
+    tables = TABLES | {
+        "trips.txt": TABLES["trips.txt"] + "gone,week,five,0,\n",
+        "stop_times.txt": TABLES["stop_times.txt"] + "two,06:05:00,06:05:00,0a,3\n",
+    }
+    faults = dict(read(tmp_path, tables).broken)
+    assert faults["trips.txt"] == "1 of its trips are of routes that routes.txt has not ('gone' for one); left out"
+    assert faults["stop_times.txt"] == "1 of its calls are at stops that stops.txt has not ('0a' for one)"
+
+
 def test_a_byte_order_mark_a_folder_and_missing_optional_tables_are_no_trouble(tmp_path: Path) -> None:
     needed = ("stops.txt", "routes.txt", "trips.txt", "stop_times.txt", "calendar.txt")
     tables = {f"feed/{name}": b"\xef\xbb\xbf" + TABLES[name].encode() for name in needed}

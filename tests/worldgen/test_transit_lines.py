@@ -105,6 +105,18 @@ def test_every_route_of_the_map_is_driven_or_left_out_with_a_reason() -> None:
     assert all(route.name in driven or route.id in told for route in routes)
 
 
+def test_a_timetable_of_which_no_line_can_be_driven_is_told() -> None:
+    city = road_city()
+    feed = _feed(city)
+    far = replace(feed, stops=tuple(replace(stop, xy=(9000.0, 9000.0 + k)) for k, stop in enumerate(feed.stops)))
+    transit = transit_from_osm(site_facts(city.osm), city.lanes, FLAT, solids=city.solids, feeds=[far])
+    told = [what.reason for what in transit.left_out if what.id == "feed.zip"]
+    assert told == [
+        "gives no bus here: none of its bus routes can be driven on the map's streets; each is told of with its reason"
+    ]
+    assert "gtfs" not in transit.origin["lines"]
+
+
 def test_stops_of_the_old_schema_make_two_runs() -> None:
     city = road_city()
     spots = [(-300.0, 0.0), (0.0, 0.0), (300.0, 0.0)]

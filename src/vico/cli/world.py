@@ -84,9 +84,9 @@ def build(
     manifest = read_world(out).manifest
     if manifest.is_flat:
         print(f"{out}: {FLAT_GROUND}", file=sys.stderr)
-    for feed in [what for stage in manifest.stages if stage.name == "timetables" for what in stage.dropped]:
-        if feed.reason.startswith(NO_TIMETABLE):
-            print(f"{out}: {feed.id} {feed.reason}", file=sys.stderr)
+    for what in [what for stage in manifest.stages for what in stage.dropped]:
+        if what.reason.startswith(NO_TIMETABLE):
+            print(f"{out}: {what.id} {what.reason}", file=sys.stderr)
     return code
 
 

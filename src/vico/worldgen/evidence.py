@@ -154,7 +154,11 @@ def gather(
                     sha256=feed.sha256,
                 )
             )
-        silent = [Dropped(id=feed.name, reason=f"{NO_TIMETABLE}: {feed.nothing}") for feed in feeds if feed.nothing]
+        silent = [
+            Dropped(id=feed.name, reason=f"{NO_TIMETABLE} or tram here: {feed.nothing}")
+            for feed in feeds
+            if feed.nothing
+        ]
         broken = [Dropped(id=key, reason=reason) for feed in feeds for key, reason in feed.broken]
         stages.report("timetables", {"feeds": len(feeds)}, silent + broken)
     buildings: list[FoundBuildings] = []
@@ -208,7 +212,7 @@ def _untagged(samples: HeightSamples) -> list[tuple[str, str]]:
     ):
         for name, lat, lon, height, count, step in rows[:_SHOWN_OUTLIERS]:
             what = f"{count:,} pixels of exactly {height:g} m around {lat:.5f}, {lon:.5f}"
-            lies = f"lie {abs(step):.0f} m {'below' if step > 0 else 'above'} the ground on all sides"
+            lies = f"lie {abs(step):.0f} m {'below' if step > 0 else 'above'} the ground on nearly all sides"
             told.append((name, f"{what} {lies}; {said}: gdal_edit.py -a_nodata {height:g} {name}"))
         if len(rows) > _SHOWN_OUTLIERS:
             more = len(rows) - _SHOWN_OUTLIERS

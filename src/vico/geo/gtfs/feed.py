@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 DAY = 86_400
-#: How a build's report tells of a feed that has `Feed.nothing`.
-NO_TIMETABLE = "gives no bus or tram here"
+#: How a build's report begins where a feed gives nothing to drive.
+NO_TIMETABLE = "gives no bus"
 
 
 @dataclass(frozen=True)

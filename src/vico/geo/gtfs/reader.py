@@ -146,6 +146,7 @@ class _Reader:
         # What is passed over, and how often: the reason where nothing is left.
         self._stop_kinds: Counter[str] = Counter()
         self._route_kinds: Counter[str] = Counter()
+        self._stop_ids: set[str] = set()
         self._elsewhere: set[str] = set()
         self._strays: Counter[str] = Counter()
         self._rows_of: Counter[str] = Counter()
@@ -234,6 +235,7 @@ class _Reader:
         wanted = ["stop_name", "stop_lat", "stop_lon", "location_type"]
         for key, name, lat, lon, kind in self._rows("stops.txt", ["stop_id"], wanted):
             self._rows_of["stops.txt"] += 1
+            self._stop_ids.add(key)
             if kind not in ("", "0"):
                 self._stop_kinds[kind[:20]] += 1
                 continue
@@ -305,13 +307,25 @@ class _Reader:
         if self._strays:
             count, first = self._strays.total(), next(iter(self._strays))
             self._fault(
-                "trips.txt", f"{count:,} trips are of routes that routes.txt has not ({first!r} for one); left out"
+                "trips.txt",
+                f"{count:,} of its trips are of routes that routes.txt has not ({first!r} for one); left out",
             )
         return trips
 
     def _calling(self, trips: dict[str, _Trip], stops: Collection[str]) -> dict[str, _Trip]:
         """Trips that call in the window, with all their calls. Two passes: most of a large feed never comes near."""
-        near = {trip for trip, stop in self._rows("stop_times.txt", ["trip_id", "stop_id"]) if stop in stops}
+        near: set[str] = set()
+        strays: Counter[str] = Counter()
+        for key, stop in self._rows("stop_times.txt", ["trip_id", "stop_id"]):
+            if stop in stops:
+                near.add(key)
+            elif stop not in self._stop_ids:
+                strays[stop[:60]] += 1
+        if strays:
+            count, first = strays.total(), next(iter(strays))
+            self._fault(
+                "stop_times.txt", f"{count:,} of its calls are at stops that stops.txt has not ({first!r} for one)"
+            )
         near &= trips.keys()
         if not near:
             return {}

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from vico.geo.gtfs.feed import Feed
+from vico.geo.gtfs.feed import NO_TIMETABLE, Feed
 from vico.geo.osm import OsmData
 from vico.rules import BUS_DOOR_BEHIND_FRONT
 from vico.world.heights import HeightField
@@ -186,6 +186,8 @@ def transit_from_osm(
     )
     on_rails = {f"tram {line.name}: {NOT_ON_THE_MAP}" for line in tram_lines}
     left_out = [what for what in left_out if what.reason not in on_rails] + off_rails
+    if all(line.route is None or line.route.origin != "gtfs" for line in chosen):
+        left_out += _unused(feeds)
     origins = dict.fromkeys("planned" if line.route is None else line.route.origin for line in chosen)
     return Transit(
         stops=list(stops.values()),
@@ -196,6 +198,13 @@ def transit_from_osm(
         tram_stops=tram_stops,
         tram_lines=tram_lines,
     )
+
+
+def _unused(feeds: Sequence[Feed]) -> list[Dropped]:
+    """Say so of feeds whose buses serve the window, as none of them is driven."""
+    why = "none of its bus routes can be driven on the map's streets; each is told of with its reason"
+    with_buses = [feed for feed in feeds if not feed.nothing and any(route.kind == "bus" for route in feed.routes)]
+    return [Dropped(id=feed.name, reason=f"{NO_TIMETABLE} here: {why}") for feed in with_buses]
 
 
 def _planned(
