@@ -46,9 +46,9 @@ _COMMENT = re.compile('("[^"]*")')
 # Comments that say that the hours are for those alone who asked before.
 _ON_REQUEST = (
     r"(?:only )?(?:(?:by|on|upon|with) (?:prior )?(?:appointment|request|arrangement|reservation|booking)|"
-    r"(?:nur )?(?:nach|auf|mit) (?:[\w.]+ )?(?:vereinbarung|absprache|anmeldung|anfrage|termin(?:vereinbarung)?)|(?:uniquement )?sur (?:rendez-vous|rdv|"
-    r"r[eé]servation|demande)|con (?:cita(?: previa)?|reserva)|(?:solo )?su (?:appuntamento|prenotazione)|op afspraak)"
-    r"(?: only)?[.!]?"
+    r"(?:nur )?(?:nach|auf|mit) (?:[\w.]+ )?(?:vereinbarung|absprache|anmeldung|anfrage|termin(?:vereinbarung)?)|"
+    r"(?:uniquement )?sur (?:rendez-vous|rdv|r[eé]servation|demande)|con (?:cita(?: previa)?|reserva)|"
+    r"(?:solo )?su (?:appuntamento|prenotazione)|op afspraak)(?: only)?[.!]?"
 )
 # Any other comment beside hours is a remark ("Lunch"), with "open" or without. Quotes pair up behind it.
 _REMARK = re.compile(
