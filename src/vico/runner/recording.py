@@ -13,6 +13,7 @@ from vico.runner.faults import FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Step
 from vico.sim.recorder import Checkpoint, Recorder
+from vico.sim.recording.schema import RUN_FOLDER
 from vico.sim.simulation import Simulation
 
 
@@ -136,4 +137,4 @@ class RecordedRun(Hook):
         self._recorder.write(step.result, actions=step.actions)
 
 
-__all__ = ["RecordedOnce", "RecordedRun", "Recorder", "go_on_from", "recorded_in"]
+__all__ = ["RUN_FOLDER", "RecordedOnce", "RecordedRun", "Recorder", "go_on_from", "recorded_in"]

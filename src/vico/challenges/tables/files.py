@@ -19,7 +19,6 @@ from vico.challenges.tables.summary import Summary, summarise
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_bytes, write_json
 from vico.io.folders import FolderKind
-from vico.sim.recording.schema import RUN_FOLDER
 from vico.version import __version__
 
 SCHEMA = "vico.results"
@@ -74,16 +73,17 @@ def timing_content(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-# Recordings of episodes; of a day of influence there may be one an assignment, and its talks lie beside it.
-_RUNS = [
-    f"{run}/{name}"
-    for run in ("runs/*", "runs/*/*")
-    for name in (RUN_FOLDER.manifest, *RUN_FOLDER.patterns(Path()), "talks.json")
-]
+def _files_of(_: Path) -> list[str]:
+    """Return the files of an evaluation; a day of influence may have a run an assignment, its talks beside it."""
+    from vico.runner.recording import RUN_FOLDER  # simulations are slow to import
+
+    in_runs = (RUN_FOLDER.manifest, *RUN_FOLDER.patterns(Path()), "talks.json")
+    runs = [f"{run}/{name}" for run in ("runs/*", "runs/*/*") for name in in_runs]
+    return ["results.md", "timing.json", "episodes/*.json", "tasks/*.json", *runs]
+
+
 #: What an evaluation makes, in which its episodes lie.
-EVALUATION_FOLDER = FolderKind(
-    "evaluation", "results.json", lambda _: ("results.md", "timing.json", "episodes/*.json", "tasks/*.json", *_RUNS)
-)
+EVALUATION_FOLDER = FolderKind("evaluation", "results.json", _files_of)
 
 
 def write_results(
