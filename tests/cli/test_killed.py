@@ -96,11 +96,11 @@ def test_a_run_killed_before_its_manifest_begins_again(
 ) -> None:
     out = tmp_path / "run"
     out.mkdir()
-    (out / ".run.json.x1").write_text("{")
+    (out / ".run.json.a1b2c3d4.json").write_text("{")
     quiet = ("--robots", "none", "--cars", 0, "--pedestrians", 0, "--observe", "none")
     assert vico("run", helsinki_path, helsinki_people, "--steps", 2, *quiet, "--out", out) == 0
     assert read_run(out).complete
-    assert not (out / ".run.json.x1").exists()
+    assert not (out / ".run.json.a1b2c3d4.json").exists()
 
 
 def test_a_run_that_goes_on_elsewhere_is_left_alone(

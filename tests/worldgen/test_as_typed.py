@@ -31,7 +31,7 @@ def test_plain_values_are_not_told() -> None:
         ("building:levels", "G+4", "was read as 5 storeys: storeys added up, the ground floor one of them"),
         ("height", "10-12", "was read as 12 m: the highest of several values"),
         ("building:levels", "two", "can't be read: decided by rule"),
-        ("height", "9999", "can't be (0 to 900 m): decided by rule"),
+        ("height", "9999", "can't be (0.1 to 900 m): decided by rule"),
     ],
 )
 def test_each_other_value_is_told_with_its_tag(key: str, text: str, sentence: str) -> None:
