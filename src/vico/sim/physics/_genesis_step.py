@@ -92,7 +92,7 @@ def _pair_shapes(
 
 
 @qd.func
-def _detect(  # noqa: PLR0913 (it is given all that it reads)
+def _detect(  # noqa: PLR0917 (it is given all that it reads)
     geoms_init_AABB: array_class.GeomsInitAABB,
     dyn_state: array_class.DynState,
     collider_state: array_class.ColliderState,
@@ -192,7 +192,7 @@ def _place(
 
 
 @qd.kernel(fastcache=True)
-def _begin_step(  # noqa: PLR0913 (a kernel is given all that it reads)
+def _begin_step(  # noqa: PLR0917 (a kernel is given all that it reads)
     geoms_init_AABB: array_class.GeomsInitAABB,
     dyn_state: array_class.DynState,
     collider_state: array_class.ColliderState,
