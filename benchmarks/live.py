@@ -78,7 +78,7 @@ class Turns(Hook):
         #: Milliseconds a step by the clock and of the processor, by number of streams.
         self.took: dict[int, list[tuple[float, float]]] = {count: [] for count in STREAMS}
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Note where a part of a turn begins and ends."""
         part, at = divmod(step.number - _WARM, self._steps)
         if part < 0:

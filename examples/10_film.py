@@ -108,7 +108,7 @@ class UntilPlayed(Hook):
         self.cast: tuple[str, ...] = ()
         self.worth: list[list[float]] = []
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Look whether it begins or is over."""
         if self.begun < 0 and self.scene.begins(self.sim):
             follow = self.scene.follow if isinstance(self.scene.follow, (str, tuple)) else self.scene.follow(self.sim)

@@ -161,8 +161,8 @@ class Story:
                 actions[name] = dict(action) if mine and action is not None else {"type": "wait"}
             result = SimpleNamespace(observations=observations)
             step = Step(self.number, actions, {}, cast(Any, result))
-            self.judge.stepped(step)
-            self.chronicle.stepped(step)
+            self.judge.on_step(step)
+            self.chronicle.on_step(step)
 
     def report(self, index: int = 0, **options: Any) -> None:
         """Have a subtask reported."""

@@ -125,7 +125,7 @@ class _Watch(Hook):
         self.last: list[Step] = []
         self.nowhere: dict[str, str] = {}
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         if step.number == self._from:
             self.before = self._sim.snapshot()
         elif step.number > self._from:

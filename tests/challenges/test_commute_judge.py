@@ -52,7 +52,7 @@ class Day:
             self.time += 1.0
             self.number += 1
             result: Any = Result(self.seen(x, vehicle, **how))
-            self.judge.stepped(Step(self.number, {}, {}, result))
+            self.judge.on_step(Step(self.number, {}, {}, result))
 
     def walk(self, start: float, end: float) -> None:
         for x in np.arange(start + 1.0, end + 0.5, 1.0):

@@ -56,8 +56,8 @@ def send_after(monkeypatch: pytest.MonkeyPatch, step: int, number: int) -> None:
     """Have a signal sent to this process when a run has made a step."""
 
     class Sends(run_verb._Progress):
-        def stepped(self, made: Any) -> None:
-            super().stepped(made)
+        def on_step(self, made: Any) -> None:
+            super().on_step(made)
             if made.number == step:
                 os.kill(os.getpid(), number)
 

@@ -154,7 +154,7 @@ class Watch(Hook):
     def begin(self, observations: Any) -> None:
         self.states.append(person_state(observations["assistant_0"]))
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         self.states.append(person_state(step.result.observations["assistant_0"]))
 
 

@@ -34,7 +34,7 @@ class Messages(Hook):
     def __init__(self) -> None:
         self.said: list[str] = []
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Listen."""
         self.said += [event.text for event in step.result.events if event.kind == "message"]
 

@@ -45,7 +45,7 @@ class Watcher(Hook):
         self.source = Source(self.tables.out, self.tables, self.world, live=True)
         self._look(0)
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         self._look(step.number)
 
     def _look(self, step: int) -> None:

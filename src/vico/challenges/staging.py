@@ -124,7 +124,7 @@ class ReportedSeconds(Hook):
         self._progress, self._label = progress, label
         self._sim, self._limit, self._start = sim, limit, sim.state.second
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Tell it."""
         self._progress(self._label, int(self._sim.state.second - self._start), self._limit)
 

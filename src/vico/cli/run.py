@@ -474,7 +474,7 @@ class _Progress(Hook):
     def __init__(self, report: Report, steps: int) -> None:
         self._report, self._steps = report, steps
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Show it."""
         self._report("simulating", step.number, self._steps)
 

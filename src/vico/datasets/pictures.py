@@ -91,7 +91,7 @@ class PictureKeeper(Hook):
         """Keep the pictures before the first step."""
         self.keep(0, observations)
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Keep a step's pictures."""
         self.keep(step.number, step.result.observations)
 

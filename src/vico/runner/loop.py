@@ -46,7 +46,7 @@ class Hook:
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Take in how things stand before the first step of this run (or after the one it is resumed from)."""
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Take in a step."""
 
     def checkpoint(self, states: Mapping[str, AgentState]) -> None:
@@ -155,7 +155,7 @@ class Runner:
             if is_malformed(observation["state"]["action_code"]):
                 self._fault(step.number, name, Failure("malformed", observation["state"]["action_reason"]))
         for hook in self.hooks:
-            hook.stepped(step)
+            hook.on_step(step)
         if self.states_every and step.number % self.states_every == 0:
             self._save(step.number)
 

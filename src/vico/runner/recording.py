@@ -90,9 +90,9 @@ class RecordedOnce(Hook):
             self._inner.begin(observations)
         self._begun = True
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Record a step."""
-        self._inner.stepped(step)
+        self._inner.on_step(step)
 
     def checkpoint(self, states: Mapping[str, AgentState]) -> None:
         """Save the run."""
@@ -129,7 +129,7 @@ class RecordedRun(Hook):
         notes = {} if self._notes is None else dict(self._notes())
         self._recorder.checkpoint(states, notes=notes | {"faults": self._faults.record(), "overlaps": overlaps})
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Record a step."""
         if self._faults.count != self._told:
             self._told = self._faults.count

@@ -117,7 +117,7 @@ class LiveViewer(Hook):
         if self._player is not None:
             self._player.tell(self._recorder.sim)
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Keep a step, and say that it is there."""
         assert self._recorder is not None
         self._tables.add(step.number, self._recorder.latest, self._recorder.latest_cast)

@@ -160,7 +160,7 @@ class Stage:
         for _ in range(seconds):
             self.second += 1.0
             seen = {"segmentation": np.where(np.arange(100) < pixels, 77, 0)}
-            self.judge.stepped(SimpleNamespace(result=SimpleNamespace(observations={"robot_0": seen})))  # type: ignore[arg-type]
+            self.judge.on_step(SimpleNamespace(result=SimpleNamespace(observations={"robot_0": seen})))  # type: ignore[arg-type]
 
     def lift(self) -> None:
         """Have the arm take the thing up."""

@@ -185,7 +185,7 @@ def test_a_robot_that_falls_for_a_moment_has_failed(
     for fallen in (False, True, False):
         scene.fallen = fallen
         scene.second += 0.2
-        judge.stepped(step)  # type: ignore[arg-type]
+        judge.on_step(step)  # type: ignore[arg-type]
     assert (judge.over, judge.cause(), judge.done_at) == (True, "fallen", None)
 
 
@@ -196,11 +196,11 @@ def test_the_judge_counts_the_pixels_of_the_thing_and_hears_the_person(
     judge = TeamingJudge(tasks["spot"], helsinki, scene, scene, lambda: scene.second)
     picture = {"segmentation": np.where(np.arange(100) < t.SEEN_PIXELS, 77, 0)}
     scene.second = 2.0
-    judge.stepped(SimpleNamespace(actions={}, result=SimpleNamespace(observations={"robot_0": picture})))  # type: ignore[arg-type]
+    judge.on_step(SimpleNamespace(actions={}, result=SimpleNamespace(observations={"robot_0": picture})))  # type: ignore[arg-type]
     assert judge.cause() == "not reached"
     scene = Scene(tasks["guide"])
     judge = TeamingJudge(tasks["guide"], helsinki, scene, scene, lambda: scene.second)
     assert judge.cause() == "not met"
     says = {tasks["guide"].person.agent: {"type": "communicate", "text": I_FOLLOW}}
-    judge.stepped(SimpleNamespace(actions=says, result=SimpleNamespace(observations={})))  # type: ignore[arg-type]
+    judge.on_step(SimpleNamespace(actions=says, result=SimpleNamespace(observations={})))  # type: ignore[arg-type]
     assert judge.cause() == "out of time"

@@ -201,14 +201,14 @@ class Knowledge:
         """Return the nearest place of a name or kind that one knows: near by, or where one or one's friends go."""
         bare = read_grammar().bare
         wanted = bare(what).lower()
-        ids = {place.id for place in self.public_map.places_near(position, NEAR)} | self._haunts
+        ids = {place.id for place in self.public_map.places_near(position, NEAR)} | self._frequented_places
         known = [place for place in self.public_map.places if place.id in ids]
         found = [place for place in known if bare(place.name).lower() == wanted]
         found = found or [place for place in known if place.kind.replace("_", " ") == wanted]
         return min(found, key=lambda place: math.dist(place.position[:2], position), default=None)
 
     @cached_property
-    def _haunts(self) -> set[str]:
+    def _frequented_places(self) -> set[str]:
         """Ids of places where one goes, or people whom one knows."""
         theirs = {habit.place for one in self.known.values() for habit in one.habits}
         return {*self.me.places, *theirs, *(one.home for one in self.known.values())}

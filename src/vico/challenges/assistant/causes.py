@@ -90,7 +90,7 @@ class Chronicle(Hook):
             name: deque(maxlen=BLOCKED_STEPS) for name in judge.assistants
         }
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Take in a step."""
         self.steps = step.number
         judge = self.judge

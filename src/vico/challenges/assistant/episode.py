@@ -186,7 +186,7 @@ class Reported(Hook):
         self._progress, self._label = progress, f"{task.world}, {task.category}, seed {task.seed}"
         self._steps = task.steps
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Tell it."""
         self._progress(self._label, step.number, self._steps)
 

@@ -86,7 +86,7 @@ class Draw:
         order = self.chance.permutation(len(near))[: count - 1]
         return self._mixed(source, [near[int(k)] for k in order])
 
-    def haunts(self, source: Region, who: Resident, home: Region, *, count: int) -> tuple[list[Region], int]:
+    def frequented_places(self, source: Region, who: Resident, home: Region, *, count: int) -> tuple[list[Region], int]:
         """Return the source among other places of somebody's day, `count` in all if there are so many.
 
         Where the day has fewer, the nearest others that they know fill up.
@@ -231,7 +231,7 @@ def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
         home = with_surface(home, draw.world, draw.chance)
     count = HAUNTS * thresholds(advanced=draw.advanced).regions
     source = draw.occasion.whereabouts[who.id]
-    regions, right = draw.haunts(source, who, home, count=count)
+    regions, right = draw.frequented_places(source, who, home, count=count)
     kind = draw.kind(f"What does {who.name} carry home?", candidates, who)
     names = draw.names_for(index)
     for name in names:

@@ -63,7 +63,7 @@ class Judge(Hook):
         self.reported_at: list[int | None] = [None] * len(task.subtasks)
         self.escorts = [Escort() for _ in task.subtasks]
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Look at the state after a step, and take the reports that were made in it."""
         self.watch(step.number)
         self.take_reports(step)

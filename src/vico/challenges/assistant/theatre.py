@@ -102,7 +102,7 @@ class Seconds(Hook):
         self._judge.begin(observations)
         self._chronicle.begin(observations)
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Tell them, if it is time."""
         passed = self._sim.state.second - self._start
         whole = abs(passed - round(passed)) < 1e-6
@@ -110,9 +110,9 @@ class Seconds(Hook):
         told = replace(step, number=round(passed) if whole else int(passed) + 1)
         acted = any(step.actions.get(name, {}).get("type", "wait") not in _MOVING for name in self._judge.assistants)
         if whole:
-            self._judge.stepped(told)
+            self._judge.on_step(told)
         elif acted:
             self._judge.look(told.number)
             self._judge.take_reports(told)
         if whole or acted:
-            self._chronicle.stepped(told)
+            self._chronicle.on_step(told)

@@ -144,7 +144,7 @@ class DayJudge(Hook):
         self.stays = False
         self._open(time)
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Look at a step."""
         observation = step.result.observations.get(self.name)
         if observation is not None and not self.over:

@@ -89,7 +89,7 @@ class _Index(Hook):
     def __init__(self, judge: DayJudge, info: CommuteInfo) -> None:
         self._judge, self._info = judge, info
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         self._info.index = len(self._judge.logs)
 
 
@@ -99,7 +99,7 @@ class _Reported(Hook):
     def __init__(self, progress: Progress, label: str, task: CommuteTask) -> None:
         self._progress, self._label, self._task = progress, label, task
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         observation = step.result.observations.get(AGENT)
         if observation is not None:
             done = round(float(observation["state"]["time"])) - self._task.appointments[0].end

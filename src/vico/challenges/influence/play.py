@@ -196,7 +196,7 @@ class _Reported(Hook):
     def __init__(self, progress: Progress, label: str, steps: int) -> None:
         self._progress, self._label, self._steps = progress, label, steps
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Tell it."""
         self._progress(self._label, step.number, self._steps)
 

@@ -119,7 +119,7 @@ class AssistantTask:
         others = self._others(self._result.observations, self._result.infos)
         self._result = self.env.advance({**others, AGENT: action})
         self._steps += 1
-        self._judge.stepped(Step(self._steps, {AGENT: dict(action)}, {}, self._result))
+        self._judge.on_step(Step(self._steps, {AGENT: dict(action)}, {}, self._result))
         done, self._done = self._done, self._count()
         reward = float(self._done - done)
         if self.options.reward == "shaped":

@@ -111,7 +111,7 @@ class CommuteTaskEnv:
         spent = log.spent
         self._result = self.env.advance({AGENT: {"type": "wait"} if refused else action})
         self._steps += 1
-        judge.stepped(Step(self._steps, {}, {}, self._result))
+        judge.on_step(Step(self._steps, {}, {}, self._result))
         reward = self._worth(log)
         if self.options.reward == "shaped":
             on_foot = not vehicle

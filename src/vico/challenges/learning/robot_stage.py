@@ -163,7 +163,7 @@ class RobotStage:
         self.result = self.env.advance({**others, **actions})
         self.steps += 1
         told = {name: dict(action) for name, action in actions.items()}
-        self._judge.stepped(Step(self.steps, told, {}, self.result))
+        self._judge.on_step(Step(self.steps, told, {}, self.result))
         return self.result
 
     @property

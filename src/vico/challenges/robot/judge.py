@@ -134,7 +134,7 @@ class RobotJudge(Hook):
         self._last = truth.object_position(task.thing.name)
         self._in_jaw = False
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Look at the state."""
         second = self._seconds() - self._start
         if int(second) > self._looked:

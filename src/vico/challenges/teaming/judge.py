@@ -75,7 +75,7 @@ class TeamingJudge(Hook):
         self._start, self._looked = seconds(), -1
         self._said: list[str] = []
 
-    def stepped(self, step: Step) -> None:
+    def on_step(self, step: Step) -> None:
         """Look at the state."""
         action = step.actions.get(self.task.person.agent, {})
         if action.get("type") == "communicate":

@@ -9,8 +9,8 @@ from vico.assets.vehicles import BICYCLE_PAINTS, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
-from vico.sim.traffic.makes import VEHICLE_MODELS
 from vico.sim.traffic.records import NONE
+from vico.sim.traffic.vehicle_models import VEHICLE_MODELS
 from vico.world.lanes import LaneGraph
 
 #: Half a cyclist's width, and how high one reaches, metres.

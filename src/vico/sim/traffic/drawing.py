@@ -11,8 +11,8 @@ from vico.assets.vehicles import CRANK_AXLE, ridden_prototypes, vehicle_prototyp
 from vico.exact import product
 from vico.sim.bodies import Drawn, joined_drawn
 from vico.sim.traffic.lights import LampDrawing
-from vico.sim.traffic.makes import VEHICLE_MODELS
 from vico.sim.traffic.signal_heads import SignalHeads
+from vico.sim.traffic.vehicle_models import VEHICLE_MODELS
 from vico.world.mesh import Surface
 
 

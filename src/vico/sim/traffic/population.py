@@ -20,7 +20,6 @@ from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.leaving import RADIUS
 from vico.sim.traffic.levels import TrafficLevels, shapes_of
-from vico.sim.traffic.makes import choose_models
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import advance_pedestrians
 from vico.sim.traffic.records import AWAY, COMING, PEDESTRIAN_RECORD, TOP_SPEED, VEHICLE_STATE
@@ -34,6 +33,7 @@ from vico.sim.traffic.starting import Starting
 from vico.sim.traffic.state import BusRoutes, new_fleet, new_junctions, new_pedestrians
 from vico.sim.traffic.stopping_places import without_deliveries
 from vico.sim.traffic.track_crossings import crossed_tracks
+from vico.sim.traffic.vehicle_models import choose_models
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
 from vico.world.heights import HeightField
 

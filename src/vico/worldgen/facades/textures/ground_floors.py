@@ -92,7 +92,7 @@ def show_window(
         view = canvas.pixels[round(b + y) : min(round(b + y + h), d), round(left) : round(right)]
         view += (np.asarray(colour, np.float32) - view) * opacity
 
-    def goods() -> NDArray[np.float32]:
+    def colour_of_goods() -> NDArray[np.float32]:
         return _GOODS[own[int(random.integers(4))]] * np.float32(random.uniform(0.62, 1.0))
 
     # A shop has few colours of its own.
@@ -100,12 +100,12 @@ def show_window(
     for x in np.arange(0.08, 1.0, max(22 / width, 0.12)) * width:
         thing(x, 0.9 * height, 5, 2, (255, 246, 220), 1.0)
     if kind == 0:
-        _shelves(thing, goods, width, height, random)
+        _shelves(thing, colour_of_goods, width, height, random)
     elif kind == 1:
         thing(0, 0, width, 0.1 * height, (168, 162, 152))
         thing(0, 0.09 * height, width, 2, (206, 200, 190))
         for x in np.arange(0.16, 1.0, max(0.36, 58 / width)) * width:
-            cloth = goods()
+            cloth = colour_of_goods()
             thing(x - 6, 0.1 * height, 4, 0.3 * height, cloth * 0.5)
             thing(x + 1, 0.1 * height, 4, 0.3 * height, cloth * 0.5)
             thing(x - 8, 0.36 * height, 15, 0.29 * height, cloth)
@@ -127,11 +127,13 @@ def show_window(
             thing(x, 0, w, h, (176, 172, 164), 0.8)
             thing(x, h - 1.5, w, 1.5, (214, 210, 202))
             for place in np.arange(x + 2, x + w - 5, 8.0):
-                thing(place, h, float(random.uniform(3, 6)), float(random.uniform(0.05, 0.16)) * height, goods())
+                thing(
+                    place, h, float(random.uniform(3, 6)), float(random.uniform(0.05, 0.16)) * height, colour_of_goods()
+                )
             x += w + float(random.uniform(4, 22))
         if random.random() < 0.5:
             left = float(random.uniform(0.1, 0.6)) * width
-            thing(left, 0.42 * height, 0.26 * width, 0.36 * height, goods(), 0.8)
+            thing(left, 0.42 * height, 0.26 * width, 0.36 * height, colour_of_goods(), 0.8)
             for line in (0.5, 0.56, 0.62):
                 thing(left + 0.03 * width, line * height, float(random.uniform(0.08, 0.2)) * width, 2, (226, 222, 214))
     # By day the street mirrors in the pane: the sky above the roofs opposite, dull facades below.
@@ -147,7 +149,7 @@ def show_window(
 
 def _shelves(
     thing: Callable[..., None],
-    goods: Callable[[], NDArray[np.float32]],
+    colour_of_goods: Callable[[], NDArray[np.float32]],
     width: int,
     height: int,
     random: np.random.Generator,
@@ -158,7 +160,7 @@ def _shelves(
         x = 2.0
         while x < width - 6:
             w, h = float(random.uniform(3, 8)), float(random.uniform(0.07, 0.15)) * height
-            colour = goods()
+            colour = colour_of_goods()
             for _ in range(int(random.integers(2, 6))):
                 if x < width - w:
                     thing(x, level * height, w - 1, h * float(random.uniform(0.9, 1.05)), colour)
