@@ -14,6 +14,7 @@ GROUND = {
     "seeds",
     "threads",
     "exact",
+    "geometry",
     "rules",
     "clock",
     "crowd",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.exact import each
+from vico.geometry import arc_lengths, points_along
 from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.world.model import Point2
@@ -59,7 +60,7 @@ class Track:
         steps = np.hypot(*np.diff(points, axis=0).T)
         keep = np.concatenate([[True], steps > 1e-6])
         points = points[keep]
-        self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        self._along = arc_lengths(points)
         self._points = points
         self.length = float(self._along[-1])
         s = np.arange(math.floor(self.length / STEP) + 1) * STEP
@@ -84,7 +85,7 @@ class Track:
         """Points at distances along the track, metres, straight on beyond its ends; shape ``(..., 2)``."""
         s = np.asarray(s, np.float64)
         inside = np.clip(s, 0.0, self.length)
-        xy = np.stack([np.interp(inside, self._along, self._points[:, k]) for k in (0, 1)], axis=-1)
+        xy = points_along(self._points, inside, self._along)
         over = (s - inside)[..., None]
         first, last = self._ends
         return np.asarray(xy + np.where(over < 0, first, last) * over, np.float64)

@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.geometry import arc_lengths, points_along
 from vico.world.clear_lines import Floats, Gaps, Interval, columns_within, sides_along, ways_through
 from vico.world.heights import HeightField
 
@@ -146,7 +147,7 @@ def _touched(courses: Sequence[ClearCourse], grown: shapely.STRtree) -> Floats:
     found: list[float] = []
     for course in courses:
         path = shapely.LineString(course.points)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(course.points, axis=0).T))])
+        along = arc_lengths(course.points)
         for solid in np.sort(grown.query(path, predicate="intersects")).tolist():
             part = overlay.crossing(path, grown.geometries[solid], grid=None)
             if part.length > _AROUND / 2:
@@ -157,7 +158,7 @@ def _touched(courses: Sequence[ClearCourse], grown: shapely.STRtree) -> Floats:
 
 def _offsets(line: Floats) -> Floats:
     """Metres along a line of its points and of places between them."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
     between = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / _STEP)), 1) + 1)
     apart = np.abs(between[:, None] - along[None, :]).min(axis=1) > 0.05
     return np.sort(np.concatenate([along, between[apart]]))
@@ -165,11 +166,11 @@ def _offsets(line: Floats) -> Floats:
 
 def _places(line: Floats, offsets: Floats) -> tuple[Floats, Floats]:
     """Return the points at so many metres along a line, and the unit vectors to the left there."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
 
     def at(metres: Floats) -> Floats:
         metres = np.clip(metres, 0.0, along[-1])
-        return np.stack([np.interp(metres, along, line[:, 0]), np.interp(metres, along, line[:, 1])], axis=1)
+        return points_along(line, metres, along)
 
     way = at(offsets + 0.25) - at(offsets - 0.25)
     way /= np.maximum(np.hypot(*way.T), 1e-9)[:, None]

@@ -19,6 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData
+from vico.geometry import arc_lengths, points_along
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.ground_kinds import water_pieces
@@ -214,10 +215,10 @@ def _samples(network: Network, found: Floats, wide: Floats, covers: NDArray[np.b
         if len(row) < 2 or not covers[row].all():
             continue
         line = network.points[row]
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        along = arc_lengths(line)
         steps = np.linspace(0.0, along[-1], max(math.ceil(along[-1] / 1.5), 1) + 1)
         own = float(np.median(wide[row]))
-        places.append(np.stack([np.interp(steps, along, line[:, k]) for k in (0, 1)], axis=1))
+        places.append(points_along(line, steps, along))
         # Within the carriageway it comes from or leads to, a side street lies as that one does.
         first, last = (float(wide[k]) if wide[k] > own else 0.0 for k in (row[0], row[-1]))
         if first + last > 0.8 * along[-1]:

@@ -19,6 +19,7 @@ from defusedxml.ElementTree import fromstring
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.geometry import arc_lengths, points_along
 
 Floats = NDArray[np.float64]
 
@@ -113,7 +114,7 @@ def _path(shape: str, *, inside: bool) -> _Path:
 
 def _shares(line: Floats) -> Floats:
     """Return how far along a line its points are, from 0 to 1."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
     return along / max(float(along[-1]), 1e-9)
 
 
@@ -175,11 +176,11 @@ def _unit(heading: float) -> Floats:
 def _share_out(curve: Floats, inner: list[_Path]) -> None:
     """Give the lanes of a way through a junction their parts of a curve, as long as they were."""
     sizes = np.array([np.hypot(*np.diff(path.line, axis=0).T).sum() for path in inner])
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])
+    along = arc_lengths(curve)
     marks = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum() * along[-1]
     for path, low, high in zip(inner, marks, marks[1:], strict=False):
         at = np.concatenate([[low], along[(along > low + 0.05) & (along < high - 0.05)], [high]])
-        path.line = np.stack([np.interp(at, along, curve[:, k]) for k in (0, 1)], axis=1)
+        path.line = points_along(curve, at, along)
         path.changed = True
 
 

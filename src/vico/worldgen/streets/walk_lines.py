@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
+from vico.geometry import arc_lengths
 
 Floats = NDArray[np.float64]
 
@@ -160,7 +161,7 @@ def _written(line: Floats, before: Floats) -> bytes:
 
 def _shares(line: Floats) -> Floats:
     """How far along a line its points are, from 0 to 1."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
     return along / max(float(along[-1]), 1e-9)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vico.geo.gtfs.feed import DAY, Feed, Pattern
 from vico.geo.osm import OsmData, OsmRelation, OsmWay
+from vico.geometry import arc_lengths, points_along
 from vico.rules import BUS_DWELL, TRAM_WIDTH
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
@@ -202,9 +203,9 @@ def _pieces(relation: OsmRelation, ways: Mapping[int, OsmWay]) -> list[NDArray[n
 
 def _within(line: NDArray[np.float64], osm: OsmData) -> list[NDArray[np.float64]]:
     """Stretches of a line inside the window, a point a metre."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
     s = np.arange(0.0, along[-1], 1.0)
-    points = np.column_stack([np.interp(s, along, line[:, k]) for k in (0, 1)])
+    points = points_along(line, s, along)
     inside = osm.holds(points)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     runs = [points[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]

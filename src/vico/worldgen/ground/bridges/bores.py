@@ -18,6 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
 from vico.worldgen.ground.bridges.decks import left_normals
@@ -205,7 +206,7 @@ def _portal(stone: Masonry, a: Floats, b: Floats, floors: _Floors, terrain: Heig
 def _lamps(stone: Masonry, bore: Bore, reach: float) -> None:
     """Hang lamps below the ceiling."""
     line = shapely.LineString(bore.line)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(bore.line, axis=0).T))])
+    along = arc_lengths(bore.line)
     for place in np.arange(_LAMPS_EVERY / 2, line.length, _LAMPS_EVERY).tolist():
         k = min(int(np.searchsorted(along, place)), len(along) - 1)
         middle = np.array(line.interpolate(place).coords[0])

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.geo.quantities import quantity
+from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.levels import ON_FOOT, SLAB, SLAB_ON_FOOT
@@ -134,7 +135,7 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
 
 def _kerbed(line: Floats, z: Floats, ground: Floats, ends: tuple[bool, bool], terrain: HeightField) -> Floats:
     """Lower the middle of a deck by a kerb, as the street's is that leads onto it, pavements staying as high."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
     drop = np.full(len(line), KERB)
     within = np.ones(len(line), bool)
     for end, away, k in ((ends[0], along, 0), (ends[1], along[-1] - along, -1)):
@@ -179,7 +180,7 @@ def pier_boxes(
     deck: Deck, left: Floats, terrain: HeightField, keep_clear: BaseGeometry, reach: float
 ) -> list[tuple[list[Floats], float, float]]:
     """Feet, lower and upper ends of a deck's piers: beside streets and rails, where it is high enough."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(deck.line, axis=0).T))])
+    along = arc_lengths(deck.line)
     found: list[tuple[list[Floats], float, float]] = []
     last = -_PIER_EVERY
     for k in range(1, len(deck.line) - 1):

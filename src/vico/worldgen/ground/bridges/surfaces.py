@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmWay, polygons_of
+from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
 from vico.worldgen.facts.expendable import expendable
@@ -77,7 +78,7 @@ class _Beside:
             # Beyond its ends a deck has no edge.
             if not 0.01 < place < line.length - 0.01:
                 continue
-            along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(deck.line, axis=0).T))])
+            along = arc_lengths(deck.line)
             if abs(float(np.interp(place, along, deck.z)) - middle[2]) < _STEP_BETWEEN:
                 return True
         return False

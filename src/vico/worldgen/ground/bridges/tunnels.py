@@ -22,6 +22,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.geometry import arc_lengths
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
@@ -303,7 +304,7 @@ def _open_length(network: Network, rows: Sequence[int], is_open: NDArray[np.bool
 
 def _kerbed(line: Floats, z: Floats, is_mouth: NDArray[np.bool_], terrain: Ground) -> Floats:
     """Lower a floor by a kerb, as the street's is that leads in; where that has none, little by little."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = arc_lengths(line)
     drop = np.full(len(line), KERB)
     for mouth, away, k in ((is_mouth[0], along, 0), (is_mouth[1], along[-1] - along, -1)):
         if mouth and float(terrain.smooth(line[k]) - terrain(line[k])) < KERB / 2:
@@ -356,7 +357,7 @@ def _one_above(first: Bore, second: Bore, line: shapely.LineString) -> bool:
     """Whether two tunnels overlap at heights that differ; `line`: the second's."""
     places = shapely.points(first.line)
     near = np.flatnonzero(shapely.distance(line, places) < (first.width + second.width) / 2)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(second.line, axis=0).T))])
+    along = arc_lengths(second.line)
     z = np.interp(shapely.line_locate_point(line, places[near]), along, second.z)
     return bool((np.abs(first.z[near] - z) > _SAME_FLOOR).any())
 
