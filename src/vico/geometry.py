@@ -1,9 +1,22 @@
-"""Plane geometry that many rooms need: polylines, and how far along them something lies."""
+"""Plane geometry that many rooms need: distances, and polylines with how far along them something lies."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
+
+
+def distance(a: NDArray[Any], b: NDArray[Any] | tuple[float, float]) -> float:
+    """Return how far two points are apart, metres; each of shape ``(2,)``."""
+    return float(np.hypot(*(a - b)))
+
+
+def distances(points: NDArray[Any], to: NDArray[Any] | tuple[float, float]) -> NDArray[np.float64]:
+    """Return how far points are from a point, or from as many others; shapes ``(n, 2)`` and ``(2,)`` or ``(n, 2)``."""
+    found: NDArray[np.float64] = np.hypot(*(points - to).T)
+    return found
 
 
 def arc_lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,4 +58,4 @@ def points_along(
     return np.stack([np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])], axis=-1)
 
 
-__all__ = ["arc_lengths", "points_along"]
+__all__ = ["arc_lengths", "distance", "distances", "points_along"]

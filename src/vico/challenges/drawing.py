@@ -17,6 +17,7 @@ from vico.challenges.assistant.regions import Neighbourhood
 from vico.challenges.ways import Ways
 from vico.community.model import Community, Resident
 from vico.errors import InputError
+from vico.geometry import distance
 from vico.world.walkable import OPEN, SIDEWALK
 from vico.world.world import World
 
@@ -76,7 +77,7 @@ class Draw:
                 )
             except InputError:
                 return None
-            if low <= float(np.hypot(*(found - near))) and (suits is None or suits(found)):
+            if low <= distance(found, near) and (suits is None or suits(found)):
                 return found
         return None
 

@@ -17,6 +17,7 @@ from vico.community.place_rooms import PlaceRooms
 from vico.community.ride_times import RideTimes
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
+from vico.geometry import distances
 from vico.io.recent import Recent
 from vico.rules import WALK_SPEED
 from vico.world.model import Category, Place, Point2
@@ -175,7 +176,7 @@ class PlaceIndex:
         known = self._estimates.get(a)
         if known is None:
             k = self.spot[a]
-            far = np.hypot(*(self._positions - self._positions[k]).T)
+            far = distances(self._positions, self._positions[k])
             inside = self._inside + self._inside[k]
             minutes = np.ceil((far * 1.5 + inside * 1.05 + 45) / 60)
             known = np.minimum(minutes, _MOST_MINUTES).astype(np.int16)

@@ -21,6 +21,7 @@ from vico.geo.osm_editing import FIRST_DRAFT, deleted_objects, draft_places, ove
 from vico.geo.outlines import check_size, mended, simplified
 from vico.geo.overlay import OverlayError
 from vico.geo.overlay import polygons_of as polygons_of
+from vico.geometry import distance
 from vico.io.files import sha256_of
 
 Tags = dict[str, str]
@@ -514,7 +515,7 @@ def _closed(way: OsmWay, reader: _Reader, window: Polygon, broken: list[tuple[st
     if not np.isfinite(way.line).all() or not window.intersects(LineString(way.line)):
         return way
     key = f"w{way.id}"
-    width = float(np.hypot(*(way.line[0] - way.line[-1])))
+    width = distance(way.line[0], way.line[-1])
     if missing := reader.partial.get(way.id, 0):
         broken.append(
             (key, f"{missing} of its nodes are not in the file, so that its outline is not closed; no building")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import distances
 from vico.sim.environment import Occurrence
 from vico.sim.hearing import heard_from
 from vico.sim.perception import is_clear, opaque_grid
@@ -87,7 +88,7 @@ def _is_seen(one: Occurrence, pose: NDArray[np.float64], state: SimulationState)
     """Return whether one of an event's things is within sight, whichever way one looks, and nothing hides it."""
     things = state.things.of_event(one.id)
     eye = pose[:3] + _EYES
-    near = np.hypot(*(things.position[:, :2] - eye[:2]).T) <= state.environment.sight_of(things.position)
+    near = distances(things.position[:, :2], eye[:2]) <= state.environment.sight_of(things.position)
     grid = opaque_grid(state.world)
     return any(is_clear(eye, at + _LOOKED_AT, grid) for at in things.position[near])
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
+from vico.geometry import distances
 from vico.io.compiled import compiled
 from vico.sim.collisions import box_gap, gap_to, room_gap
 from vico.sim.room_doors import Door, DoorsListed
@@ -257,7 +258,7 @@ class Indoor:
         gap = self.gaps(room, spots)
         gap[0] += _NARROWER
         spots = spots[gap >= RADIUS + 0.02]
-        spots = spots[np.argsort(np.hypot(*(spots - near).T), kind="stable")]
+        spots = spots[np.argsort(distances(spots, near), kind="stable")]
         if room not in self.stairs:
             return np.column_stack([spots, np.full(len(spots), self.floor[room])])
         # On stairs the other flight may be near, and yet a floor away.

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from vico.errors import InputError, SchemaError
+from vico.geometry import distances
 from vico.io.files import write_bytes
 from vico.rules import EARSHOT, LONGEST_TEXT
 from vico.sim.recording.schema import INTERVENTIONS
@@ -295,7 +296,7 @@ def _nearest(line: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[flo
     a, b = line[:-1], line[1:]
     share = ((point - a) * (b - a)).sum(axis=1) / np.maximum(((b - a) ** 2).sum(axis=1), 1e-9)
     feet = a + np.clip(share, 0.0, 1.0)[:, None] * (b - a)
-    x, y = feet[np.argmin(np.hypot(*(feet - point).T))].tolist()
+    x, y = feet[np.argmin(distances(feet, point))].tolist()
     return x, y
 
 

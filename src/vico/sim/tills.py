@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import distances
 from vico.sim.indoor import Indoor
 from vico.sim.state import RADIUS, ArrayState
 from vico.world.model import Category, Place
@@ -92,7 +93,7 @@ def _line(room: int, counter: tuple[float, float, float, float], indoor: Indoor)
         spots = []
         for k in range(_LONGEST):
             spot = first + k * SPACING * np.array([c, s])
-            in_the_way = bool((np.hypot(*(doors - spot).T) < _DOORWAY).any())
+            in_the_way = bool((distances(doors, spot) < _DOORWAY).any())
             if in_the_way or indoor.gap(room, (float(spot[0]), float(spot[1]))) < RADIUS + _AIR:
                 break
             spots.append(spot)

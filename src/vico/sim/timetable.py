@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.clock import DAY
 from vico.community.model import Mode
+from vico.geometry import distances
 from vico.sim.appointments import Appointment
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_TRAM, ArrayState, Vehicle
@@ -172,6 +173,6 @@ class Punctuality(ArrayState):
     def _are_there(who: NDArray[np.int64], places: NDArray[np.int32], state: SimulationState) -> NDArray[np.bool_]:
         """Whether each is at a place: in one of its rooms, or near an open one; shape ``(who,)``."""
         people = state.people
-        away = np.hypot(*(people.position[who, :2] - state.base.place_spots[places]).T)
+        away = distances(people.position[who, :2], state.base.place_spots[places])
         near = (people.room[who] < 0) & (away <= OPEN_REACH)
         return np.where(state.base.has_rooms[places], people.place[who] == places, near)

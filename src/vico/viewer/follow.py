@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from vico.errors import InputError
+from vico.geometry import distances
 from vico.render.cameras import Cameras
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.scene import Scene
@@ -162,7 +163,7 @@ class FollowCamera:
         """Return how steeply the camera has to look down, radians, to be above those who come near it."""
         if others is None or not len(others):
             return 0.0
-        away = np.hypot(*(others[:, :2] - place[:2]).T)
+        away = distances(others[:, :2], place[:2])
         share = np.clip((_RISES - away) / (_RISES - _RISEN), 0.0, 1.0)
         height = float((share * (others[:, 2] + _ABOVE - self._focus[2])).max())
         return math.asin(min(max(height / wanted, 0.0), 0.9))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vico.geometry import distances
 from vico.rules import EARSHOT, REACH
 from vico.sim.actions import Command, check
 from vico.sim.simulation import Simulation
@@ -78,7 +79,7 @@ def _things(sim: Simulation, i: int) -> Iterator[Hint]:
     state, p = sim.state, sim.state.people
     objects = state.objects
     hand = _RIGHT if not p.held[i, _RIGHT] else _LEFT
-    away = np.hypot(*(objects.position[:, :2] - p.position[i, :2]).T) if len(objects) else np.zeros(0)
+    away = distances(objects.position[:, :2], p.position[i, :2]) if len(objects) else np.zeros(0)
     for k in np.argsort(away, kind="stable").tolist():
         if away[k] > _AROUND:
             break

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.state import AgentState
+from vico.geometry import distance
 
 Array = NDArray[np.float64]
 Action = dict[str, Any]
@@ -64,7 +65,7 @@ class Drive:
             return {"type": "stop"}
         sensors, state = observation["sensors"], observation["state"]
         position = np.asarray(sensors["base_pose"], np.float64)[:3]
-        away = float(np.hypot(*(position[:2] - self._goal)))
+        away = distance(position[:2], self._goal)
         stands = float(np.abs(sensors["base_velocity"][:2]).max()) < _STANDS
         self._stood = self._stood + self._period if stands else 0.0
         refused = self._asked and state["action_status"] == "refused"

@@ -12,6 +12,7 @@ from vico.agents.robot.held import Held
 from vico.agents.robot.reaching import TURNS, Reach, reach_spot, room_around
 from vico.agents.robot.sight import height_at
 from vico.exact import apply_matrix
+from vico.geometry import distances
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ def turns_held_up(held: Held, points: Array, spot: Array) -> list[list[float]]:
     # Across to the way there: so it juts out least over the edge of a table.
     across = turns_along(held, math.atan2(float(spot[1]), float(spot[0])) + math.pi / 2)
     turns = [*TURNS, *across]
-    near = points[np.hypot(*(points[:, :2] - spot[:2]).T) < float(np.hypot(*held.half)) + _CELL]
+    near = points[distances(points[:, :2], spot[:2]) < float(np.hypot(*held.half)) + _CELL]
     shares = [_held_up(held, near, spot, turn) for turn in turns]
     best = max(shares)
     if best < _SEES:

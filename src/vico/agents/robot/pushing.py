@@ -18,6 +18,7 @@ from vico.agents.robot.reaching import room_around
 from vico.agents.robot.sight import look
 from vico.agents.state import AgentState
 from vico.exact import dot
+from vico.geometry import distance
 from vico.kinematics.inverse import free_reach
 from vico.kinematics.planning import Arm, free_way
 from vico.kinematics.ways import downward, straight_way
@@ -125,7 +126,7 @@ class Pusher:
         self.outcome = self.why = ""
         self._knows = False
         self._next(PushStage.COME)
-        if float(np.hypot(*(self._goal - self.thing))) > FARTHEST:
+        if distance(self._goal, self.thing) > FARTHEST:
             self._end("too far")
 
     def act(self, observation: Mapping[str, Any]) -> Action:
@@ -148,7 +149,7 @@ class Pusher:
         return _STAGES[self.stage](self, observation, angles)
 
     def _longest(self) -> float:
-        way = float(np.hypot(*(self._goal - self.thing)))
+        way = distance(self._goal, self.thing)
         return _STALE + _A_METRE * way * (self.stage is PushStage.PUSH)
 
     def _come(self, observation: Mapping[str, Any], angles: Array) -> Action:
@@ -249,7 +250,7 @@ class Pusher:
             return self._hold()
         if self.why:
             return self._end(self.why)
-        off = float(np.hypot(*(self._goal - self.thing)))
+        off = distance(self._goal, self.thing)
         return self._end("" if off < 2.0 * THERE else "off its way")
 
     # How it does it.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vico.agents.perception import points_from_depth
 from vico.agents.robot.body import ArmBody, Stance
+from vico.geometry import distances
 
 Array = NDArray[np.float64]
 
@@ -88,7 +89,7 @@ def seen_at(observation: Mapping[str, Any], info: Mapping[str, Any], name: str) 
 
 def height_at(points: Array, spot: Array) -> float:
     """Return how high what was seen round a spot is, in the points' frame; the spot's own height if that is little."""
-    near = points[np.hypot(*(points[:, :2] - spot[:2]).T) < _SUPPORT]
+    near = points[distances(points[:, :2], spot[:2]) < _SUPPORT]
     return float(np.median(near[:, 2])) if len(near) >= _FEWEST else float(spot[2])
 
 

@@ -18,6 +18,7 @@ from vico.agents.teaming.newcomer import I_FOLLOW
 from vico.agents.teaming.walking import apart, sight_of, turn, turn_towards
 from vico.agents.teaming.words import heard_from
 from vico.english import split_name
+from vico.geometry import distance
 from vico.world.public import PublicMap
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ class Leader:
             return self.goal, True
         left = _LEG * (1 + self._blocked)
         for start, end in pairwise(path):
-            length = float(np.hypot(*(end - start)))
+            length = distance(end, start)
             if length >= left:
                 return start + (end - start) * left / length, False
             left -= length

@@ -19,6 +19,7 @@ from vico.challenges.assistant.thresholds import (
     SEEN_PIXELS,
 )
 from vico.english import split_name
+from vico.geometry import distances
 from vico.runner.loop import Hook, Step
 
 #: Every cause, in the order in which a table lists them.
@@ -247,6 +248,6 @@ class Chronicle(Hook):
         if len(trail) < BLOCKED_STEPS:
             return
         where = np.array([position for position, _ in trail])
-        moved = float(np.hypot(*(where - where[-1]).T).max())
+        moved = float(distances(where, where[-1]).max())
         tries = sum(walks for _, walks in trail)
         self.blocked_steps += moved < BLOCKED_DISTANCE and tries > BLOCKED_STEPS // 3

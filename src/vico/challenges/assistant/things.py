@@ -13,6 +13,7 @@ from vico.challenges.assistant.beside import Lying, spot_beside
 from vico.challenges.assistant.model import Region, TaskObject
 from vico.challenges.assistant.thresholds import OFF_MIDDLE
 from vico.errors import EmptyInputError
+from vico.geometry import distances
 from vico.world.model import Container, Point3, Room
 from vico.world.walkable import OPEN, SIDEWALK
 from vico.world.world import World
@@ -66,7 +67,7 @@ class Things:
     def untold(self, regions: Sequence[Region]) -> list[Region]:
         """Regions in whose middle, which is told, no thing lies."""
         lying = np.array([thing.position[:2] for thing in self.made]).reshape(-1, 2)
-        return [r for r in regions if (np.hypot(*(lying - r.centre[:2]).T) >= OFF_MIDDLE).all()]
+        return [r for r in regions if (distances(lying, r.centre[:2]) >= OFF_MIDDLE).all()]
 
     def _add(self, name: str, kind: str, position: Point3, *, room: str | None, holder: str | None) -> TaskObject:
         taken = {thing.name for thing in self.made}
@@ -110,7 +111,7 @@ class Things:
             spot = self.world.walkable.random_point(
                 self.chance, classes=(OPEN, SIDEWALK), near=region.centre, radius=region.radius, clearance=0.5
             )
-            if np.hypot(*(middles - spot).T).min() >= OFF_MIDDLE:
+            if distances(middles, spot).min() >= OFF_MIDDLE:
                 return (float(spot[0]), float(spot[1]), float(self.world.height(spot)))
         raise EmptyInputError(f"tasks: at {region.name} things can lie in its middle only; use a larger world")
 

@@ -33,6 +33,7 @@ from vico.envs import CommunityEnv, StepResult, make
 from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
 from vico.envs.arrays.surroundings import surroundings_of
 from vico.errors import InputError
+from vico.geometry import distance
 from vico.runner.loop import Step
 from vico.world.world import World
 
@@ -195,7 +196,7 @@ class RobotStage:
         observation = self.result.observations[MANIPULATOR]
         hand = self._body.hand(np.asarray(observation["sensors"]["joint_position"], np.float64)[:7])[:, 3]
         away = float(np.linalg.norm(Stance.of(observation).outside(hand) - thing.middle))
-        missing = float(np.hypot(*(thing.middle[:2] - self.goal_at[:2])))
+        missing = distance(thing.middle[:2], self.goal_at[:2])
         lifted = float(thing.middle[2]) - float(self.env.world.height(thing.middle[:2])) > 4.0 * float(thing.half[2])
         reward = -_PENALTY * (min(away, _FAR) + min(missing, _FAR))
         return reward + _GRASP * (self.is_held() and lifted) + _PLACE * self.success

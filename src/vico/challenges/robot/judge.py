@@ -21,6 +21,7 @@ from vico.challenges.robot.thresholds import (
     SEEN_DISTANCE,
     SEEN_PIXELS,
 )
+from vico.geometry import distances
 from vico.runner.loop import Hook, Step
 from vico.world.world import World
 
@@ -202,7 +203,7 @@ class RobotJudge(Hook):
     def on_deck(self, position: NDArray[np.float64]) -> bool:
         """Return whether a thing lies on a robot."""
         bodies = self.robots.bodies().position
-        away = np.hypot(*(bodies[:, :2] - position[:2]).T)
+        away = distances(bodies[:, :2], position[:2])
         return bool(np.any((away < _OF_DECK) & (position[2] - bodies[:, 2] > _ON_DECK)))
 
     def _is_there(self, position: NDArray[np.float64]) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import distance, distances
 from vico.rules import REACH, ReasonCode, reach_up
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
@@ -131,7 +132,7 @@ def check_hand_over(values: Values, i: int, state: SimulationState) -> Refusal |
         return Refusal(ReasonCode.SELF, "hand_over: that is yourself")
     if not state.same_space(i, j):
         return Refusal(ReasonCode.ELSEWHERE, f"hand_over: {p.names[j]} is not in here")
-    away = float(np.hypot(*(p.position[i, :2] - p.position[j, :2])))
+    away = distance(p.position[i, :2], p.position[j, :2])
     if away > REACH:
         return Refusal(ReasonCode.TOO_FAR, f"hand_over: {p.names[j]} is {away:.1f} m away; reach is {REACH} m")
     if p.held[j].all():
@@ -272,14 +273,14 @@ def _on(container: Container, i: int, k: int, state: SimulationState) -> Placeme
     grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     c, s = math.cos(container.yaw), math.sin(container.yaw)
     spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
-    away = np.hypot(*(spots - person[:2]).T)
+    away = distances(spots, person[:2])
     lying = (objects.hand < 0) & (objects.room == p.room[i])
     lying &= np.abs(objects.position[:, 2] - z) < 0.3
     radius = np.hypot(objects.size[:, 0], objects.size[:, 1]) / 2
     for index in np.argsort(away, kind="stable"):
         if away[index] > REACH:
             break
-        clear = np.hypot(*(objects.position[lying, :2] - spots[index]).T) >= radius[lying] + radius[k]
+        clear = distances(objects.position[lying, :2], spots[index]) >= radius[lying] + radius[k]
         on_floor_below = container.kind == "floor" and state.indoor.gap(int(p.room[i]), spots[index]) < radius[k]
         if clear.all() and not on_floor_below:
             return PlacementPoint(np.array([*spots[index], z]))

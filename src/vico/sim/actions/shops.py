@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from vico.geometry import distance
 from vico.rules import ReasonCode
 from vico.sim.actions.model import ActionType, Refusal, Values
 from vico.sim.queues import place_in_line
@@ -23,7 +22,7 @@ def check_queue(values: Values, i: int, state: SimulationState) -> Refusal | Non
         return Refusal(
             ReasonCode.FULL, f"queue: {len(state.lines.waiting(room))} stand in line, and there is no room for more"
         )
-    away = float(np.hypot(*(p.position[i, :2] - place[1])))
+    away = distance(p.position[i, :2], place[1])
     if away > AT_SPOT:
         return Refusal(
             ReasonCode.TOO_FAR, f"queue: the end of the line is {away:.1f} m away; {AT_SPOT:g} m or less is needed"

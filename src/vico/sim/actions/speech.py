@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vico.geometry import distances
 from vico.rules import EARSHOT
 from vico.sim.actions.fields import Field
 from vico.sim.actions.model import ActionType, Actors, Situation, Values
@@ -62,7 +63,7 @@ def _listeners_near(listeners: list[str], i: int, state: SimulationState) -> lis
     people = [p.names.index(name) for name in listeners if name in p.names]
     if not people:
         return []
-    away = np.hypot(*(p.position[people, :2] - p.position[i, :2]).T)
+    away = distances(p.position[people, :2], p.position[i, :2])
     near = [people[k] for k in np.argsort(away, kind="stable") if away[k] <= _TALKING_DISTANCE]
     return near or None
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
+from vico.geometry import distance, distances
 from vico.io.compiled import compiled
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap
@@ -156,7 +157,7 @@ class Airspace:
     def highest(self, start: ArrayLike, end: ArrayLike, beside: float = BESIDE) -> float:
         """How high anything reaches along a straight line and so far beside it, ENU metres."""
         a, b = np.asarray(start, np.float64)[:2], np.asarray(end, np.float64)[:2]
-        away = float(np.hypot(*(b - a)))
+        away = distance(b, a)
         shares = np.linspace(0.0, 1.0, max(2, math.ceil(away / max(beside, _CELL)) + 1))
         return max(self.top(a + share * (b - a), 1.2 * beside) for share in shares.tolist())
 
@@ -221,7 +222,7 @@ class Airspace:
         rows, columns = self._window(float(point[0]), float(point[1]), reach)
         found = np.argwhere(cells[rows, columns])
         spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
-        away = np.hypot(*(spots - point).T)
+        away = distances(spots, point)
         order = np.argsort(away, kind="stable")
         found_spots: Array = spots[order[away[order] <= reach]]
         return found_spots
@@ -267,7 +268,7 @@ class Airspace:
             around = ndimage.maximum_filter(tops, 2 * round(beside / _CELL) + 1)
             found = np.argwhere(around <= np.maximum(floor + _LOW, start[2] + _OVERHEAD))
             spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
-            order = np.argsort(np.hypot(*(spots - start[:2]).T), kind="stable")
+            order = np.argsort(distances(spots, start[:2]), kind="stable")
             for spot in spots[order[:_MOST_SPOTS]]:
                 height = max(start[2], float(self.ground(spot)) + _LEAD)
                 if self.highest(start, spot, _ALONG) <= height - _OVERHEAD:
@@ -291,7 +292,7 @@ class Airspace:
         if path is None:
             return None
         path = path + shift
-        if float(np.hypot(*(path[-1] - target[:2]))) > 2 * cell:
+        if distance(path[-1], target[:2]) > 2 * cell:
             return None
         middle = np.column_stack([path, np.full(len(path), height)])
         return np.vstack([[*start[:2], height], middle, [*target[:2], height], target])

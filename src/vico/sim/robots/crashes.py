@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from vico.geometry import distances
 from vico.sim.bodies import Bodies
 from vico.sim.robots import flying
 from vico.sim.robots.path_follower import RobotStatus
@@ -85,7 +86,7 @@ def _set_upright(run: RobotRun, flight: Flight, row: int, everybody: Bodies) -> 
     spots = spots[np.isin(run.scene.world.walkable.class_at(spots), (OPEN, SIDEWALK))]
     others = everybody.where(everybody.entity != run.entities[robot])
     for spot in spots:
-        away = np.hypot(*(others.position[:, :2] - spot).T) - others.half_length
+        away = distances(others.position[:, :2], spot) - others.half_length
         if (away > model.half_length + _CLEAR).all():
             run.engine.stand(robot, np.array([*spot, base.yaw]))
             run.forget(robot)

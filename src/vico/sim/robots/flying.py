@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.exact import dot
+from vico.geometry import distance
 from vico.sim.bodies import Bodies
 from vico.sim.robots.airspace import HOVER
 from vico.sim.robots.keeping_apart import BRAKE, Around, keep_apart, near_in_the_air
@@ -100,7 +101,7 @@ def land(run: RobotRun, robot: int, xy: Array | None = None) -> None:
     space = run.scene.airspace
     if not space.is_flat(spot):
         raise InputError("land: what is there is not even enough to land on")
-    if float(np.hypot(*(spot - here[:2]))) < 1.0:
+    if distance(spot, here[:2]) < 1.0:
         run.set_mode(robot, RobotMode.ROUTE)
         flight.arrays.phase[row] = _LANDING
         flight.arrays.calm[row] = 0.0

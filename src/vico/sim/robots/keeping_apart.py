@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import distances
 from vico.sim.bodies import Bodies
 from vico.sim.robots.airspace import BESIDE, CEILING
 from vico.sim.robots.path_follower import RobotStatus
@@ -86,7 +87,7 @@ def near_in_the_air(run: RobotRun, flight: Flight, row: int, everybody: Bodies) 
     own, position = int(run.entities[robot]), run.position(robot)
     bottom = float(position[2]) - flight.model.stand
     fly = [run.entities[f.robots[f.arrays.phase != _LANDED]] for f in run.flights if f is not None]
-    away = np.hypot(*(everybody.position[:, :2] - position[:2]).T) - everybody.half_length
+    away = distances(everybody.position[:, :2], position[:2]) - everybody.half_length
     chosen = np.flatnonzero((away < max(_FLIGHT_NEAR, _NEAR)) & (everybody.entity != own))
     flies = np.isin(everybody.entity[chosen], np.concatenate(fly))
     near = away[chosen] < np.where(flies, _FLIGHT_NEAR, _NEAR)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.exact import apply_matrix
+from vico.geometry import distances
 from vico.kinematics.arm import hand_pose, reach_pose
 from vico.kinematics.ways import CARRY, downward, way_down, way_to_carry
 from vico.quaternions import matrix_of
@@ -284,7 +285,7 @@ def _align(run: RobotRun, robot: int, work: Work, row: int, everybody: Bodies) -
 
 def _somebody_ahead(run: RobotRun, robot: int, base: Base, everybody: Bodies) -> bool:
     ahead = base.position[:2] + base.rotation[:2, 0] * _PEOPLE / 2
-    away = np.hypot(*(everybody.position[:, :2] - ahead).T) - everybody.half_length
+    away = distances(everybody.position[:, :2], ahead) - everybody.half_length
     return bool(np.any((away < _PEOPLE / 2) & everybody.person))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import MobileManipulator, SkidSteering
+from vico.geometry import distance
 from vico.sim.bodies import Bodies
 from vico.sim.physics.housed import HousedEngine
 from vico.sim.robots.rooms import DOORWAY, OUTDOORS, fits_doors, turning_radius
@@ -97,7 +98,7 @@ def _way(run: RobotRun, robot: int, here: int, at: Array, goal: Array, within: f
         radius = turning_radius(run.scene.models[robot])
         return run.scene.rooms.path(here, at, goal, radius, within=within)
     path = way_to(run, robot, goal, start=at[:2])
-    if path is None or float(np.hypot(*(path[-1] - goal[:2]))) > max(within, 1.0):
+    if path is None or distance(path[-1], goal[:2]) > max(within, 1.0):
         return None
     return path
 

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.geometry import distance
 from vico.sim.environment.event_crowds import Gathering
 from vico.sim.traffic.guides import guided_walks
 from vico.sim.traffic.records import CROWD, NONE, WINDOW
@@ -121,7 +122,7 @@ class Gatherings:
             )
             for i in members:
                 if i % _PLACARDS == 0:
-                    away = float(np.hypot(*(position[i, :2] - one.entry)))
+                    away = distance(position[i, :2], one.entry)
                     joined = walkers.stand_kind[i] == CROWD
                     up[i] = 1.0 if joined else min(max((_RAISED_FROM - away) / _RAISING, 0.0), 1.0)
         return up

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.geometry import distances
 from vico.seeds import rng
 from vico.sim.avatars import free_ground
 from vico.sim.bodies import Bodies
@@ -165,7 +166,7 @@ class Passengers:
         room = _FULL - self._transit.aboard(bus) - int(((walkers.stand_kind == BOARD) & (walkers.boards == bus)).sum())
         for i in waiting[stops == self._number[stop]][: max(room, 0)].tolist():
             here = self._position(i)
-            door = int(np.argmin(np.hypot(*(fronts - here).T)))
+            door = int(np.argmin(distances(fronts, here)))
             walkers.stand_kind[i], walkers.boards[i], walkers.spot[i] = BOARD, bus, NONE
             walkers.stand_xy[i] = fronts[door]
             walkers.stand_yaw[i] = math.atan2(*(doors[door] - fronts[door])[::-1])

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.exact import each
+from vico.geometry import distances
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.records import TRACK_CROSSING
 from vico.sim.transit.tram_outlines import first_taken
@@ -183,7 +184,7 @@ def _met(
     crosses = (turn > _ALONG) & (away <= track.half_width[nearest] + _HALF_WIDTH)
     for k, here in zip(near[crosses].tolist(), nearest[crosses].tolist(), strict=True):
         beside = slice(max(here - int(_FARTHEST / STEP), 0), here + int(_FARTHEST / STEP) + 1)
-        apart = np.hypot(*(track.xy[beside] - place[k, :2]).T)
+        apart = distances(track.xy[beside], place[k, :2])
         close = np.flatnonzero(apart <= track.half_width[beside] + _HALF_WIDTH) + beside.start
         found[k], first[k], last[k] = True, close[0] * STEP, close[-1] * STEP
     return found, first, last

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vico.geometry import distances
 from vico.rules import BUS_DOOR_REACH, BUS_DOORS_BEHIND_FRONT, BUS_WIDTH, TRAM_SECTIONS
 from vico.world.check.finding import WorldFinding
 from vico.world.rails import TRAM_LENGTH, Track, tram_door
@@ -23,7 +24,7 @@ def check_roads(world: World) -> Iterator[WorldFinding]:
     rows = np.repeat(np.arange(len(lanes)), np.diff(lanes.next_first))
     ends = lanes.points[lanes.first[rows + 1] - 1]
     starts = lanes.points[lanes.first[lanes.next]]
-    gap = np.hypot(*(ends - starts).T)
+    gap = distances(ends, starts)
     for k in np.flatnonzero(gap > 1.0).tolist():
         yield WorldFinding(
             "lanes apart", lanes.ids[int(rows[k])], f"{gap[k]:.1f} m from its successor {lanes.ids[int(lanes.next[k])]}"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from vico.geometry import distance
 from vico.world.heights import HeightField
 from vico.world.model import Building
 from vico.world.objects import Objects
@@ -240,7 +241,7 @@ def _on_wall(
     """Hang a plate at the end of a wall that is nearer to the corner; None where it has no storey above the first."""
     if building.levels < 2:
         return None
-    first = float(np.hypot(*(edge[0] - corner))) <= float(np.hypot(*(edge[1] - corner)))
+    first = distance(edge[0], corner) <= distance(edge[1], corner)
     end = edge[0] + along * 0.6 if first else edge[1] - along * 0.6
     wall = ground.at(building.entity, float(end[0]), float(end[1]), math.atan2(-along[0], along[1]))
     if wall is None or wall.length < _LEAST_WALL or wall.high + 1.0 > building.base + building.height:

@@ -13,6 +13,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
+from vico.geometry import distance
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.streets import Street, StreetPolygons
 
@@ -104,7 +105,7 @@ def kerb_bays(street: Street, side: float, depth: float, breaks: BaseGeometry) -
         borders = bay_borders(piece, slanted=across)
         for low, high in pairwise(borders.tolist()):
             a, b = shapely.get_coordinates(shapely.line_interpolate_point(piece, [low, high]))
-            run = float(np.hypot(*(b - a)))
+            run = distance(b, a)
             if run < 0.97 * (high - low):
                 continue  # round a bend
             u = (b - a) / run

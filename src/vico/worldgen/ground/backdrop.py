@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vico.assets.models.plants import leaf_material
 from vico.geo import overlay
+from vico.geometry import distance
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined, quad_triangles
@@ -153,7 +154,7 @@ def _house(
     run = 0.0
     for k in range(3):
         p, q = corners[k], corners[k + 1]
-        wide = float(np.hypot(*(q - p)))
+        wide = distance(q, p)
         points += [np.r_[p, foot[k]], np.r_[q, foot[k + 1]], np.r_[q, head[k + 1]], np.r_[p, head[k]]]
         bays, storeys = round(wide / 3.0) / 4.0, max(round((eaves - low) / _STOREY), 1) / 4.0
         uv += [(run, 0.0), (run + bays, 0.0), (run + bays, storeys), (run, storeys)]

@@ -10,6 +10,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.geometry import distances
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Heights = Callable[[Floats], Floats]
@@ -113,7 +115,7 @@ def _parted(corners: Floats, triangles: Ints, piece: Ints, added: Ints) -> tuple
     point = ends[point]
     a, b = corners[alone[edge, 0]], corners[alone[edge, 1]]
     along = ((corners[point] - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum(axis=1)
-    margin = 0.5 / _WELD / np.hypot(*(b - a).T)
+    margin = 0.5 / _WELD / distances(b, a)
     inside = (along > margin) & (along < 1.0 - margin) & (point != alone[edge, 0]) & (point != alone[edge, 1])
     edge, point, along = edge[inside], point[inside], along[inside]
     order = np.lexsort((along, edge))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import distance
 from vico.worldgen.facts.streets import Crossing
 from vico.worldgen.ground.strokes import ribbon
 
@@ -21,7 +22,7 @@ _ROWS = {
 def _zebra(start: tuple[float, float], end: tuple[float, float], width: float) -> list[NDArray[np.float64]]:
     """Bars along the traffic, side by side along the walk, as many as fit with half a gap at either kerb."""
     a, b = np.array(start), np.array(end)
-    length = float(np.hypot(*(b - a)))
+    length = distance(b, a)
     count = int((length - 0.2) / _STRIPE_PERIOD)
     if count < 2:
         return []
@@ -50,7 +51,7 @@ def crossing_paint(crossing: Crossing) -> list[NDArray[np.float64]]:
         lines = [quad for side in sides for quad in ribbon(side, 0.0, 0.25)]
         return lines + bars if crossing.marking == "ladder" else lines
     step, size, wide = _ROWS[crossing.marking]
-    length = float(np.hypot(*(line[1] - line[0])))
+    length = distance(line[1], line[0])
     return [
         quad
         for side in sides

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.geometry import distances
 from vico.world.heights import HeightField
 from vico.world.mesh import quad_triangles
 from vico.worldgen.ground.halving import halved
@@ -235,7 +236,7 @@ def curtain(lines: Sequence[BaseGeometry], bottom: Heights, top: Heights, *, lea
     points, line = shapely.get_coordinates(list(lines), return_index=True)
     first = np.flatnonzero(line[:-1] == line[1:]) if len(line) else np.zeros(0, np.int64)
     a, b = points[first], points[first + 1]
-    length = np.hypot(*(b - a).T)
+    length = distances(b, a)
     along = np.cumsum(length) - length
     low = np.stack([bottom(a), bottom(b)], axis=1) if len(first) else np.zeros((0, 2))
     high = np.stack([top(a), top(b)], axis=1) if len(first) else np.zeros((0, 2))

@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData
-from vico.geometry import arc_lengths, points_along
+from vico.geometry import arc_lengths, distances, points_along
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.ground_kinds import water_pieces
@@ -117,9 +117,9 @@ def raised(
     """Points of decks that lie too low over a street, and the height each needs."""
     least: dict[int, float] = {}
     for need in needs:
-        near = on_deck[np.hypot(*(points[on_deck] - need.place).T) < need.reach]
+        near = on_deck[distances(points[on_deck], need.place) < need.reach]
         if not len(near):
-            near = on_deck[[int(np.hypot(*(points[on_deck] - need.place).T).argmin())]]
+            near = on_deck[[int(distances(points[on_deck], need.place).argmin())]]
         height = float(ground.smooth(np.array(need.place))) + need.clearance
         for k in near.tolist():
             if found[k] < height:

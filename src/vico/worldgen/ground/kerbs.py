@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.geometry import distance
 from vico.io.compiled import compiled
 from vico.world.heights import EDGE_RANGE, HeightField, Steps
 from vico.world.walkable import fill_polygon
@@ -36,7 +37,7 @@ def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:
     lines = []
     for crossing in crossings:
         a, b = np.array(crossing.start), np.array(crossing.end)
-        along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+        along = (b - a) / max(distance(b, a), 1e-9)
         across = np.array([-along[1], along[0]]) * crossing.width / 2
         lines += [[a - across, a + across], [b - across, b + across]]
     return shapely.MultiLineString(lines)

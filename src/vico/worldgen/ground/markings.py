@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.geometry import distance
 from vico.worldgen.facts.bays import bay_borders, free_pieces, junction_zones, lot_rows, stands_across
 from vico.worldgen.facts.expendable import NamedShape, expendable, widened
 from vico.worldgen.facts.street_habits import Markings
@@ -296,7 +297,7 @@ def _stop_lines_of(
         if not 0.5 < at < line.length - 0.5:
             continue
         here, there = (np.asarray(line.interpolate(v).coords[0]) for v in (at, at + 0.2))
-        u = (there - here) / max(float(np.hypot(*(there - here))), 1e-9) * ahead
+        u = (there - here) / max(distance(there, here), 1e-9) * ahead
         right = np.array([u[1], -u[0]]) * (-1.0 if left_driving else 1.0)
         inner = -street.width / 2 + 0.3 if street.oneway else 0.1
         ends = np.array([here + right * inner, here + right * (street.width / 2 - 0.3)])
@@ -337,7 +338,7 @@ def _kerbside_of(
                 edges += ribbon(path, 0.0, 0.1)
                 for place in bay_borders(piece, slanted=stands_across(street, parking)):
                     a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
-                    u = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+                    u = (b - a) / max(distance(b, a), 1e-9)
                     out = side * np.array([-u[1], u[0]])
                     edges += ribbon(np.array([a, a + out * (parking - 0.2)]), 0.0, 0.1)
         if cycle:

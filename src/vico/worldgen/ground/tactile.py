@@ -9,6 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.geometry import distance
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.streets import Crossing, StreetPolygons
 
@@ -44,7 +45,7 @@ def tactile_fields(streets: StreetPolygons, window: Polygon) -> list[Polygon]:
 
 def _fields(crossing: Crossing, carriageway: BaseGeometry, pavement: BaseGeometry) -> list[BaseGeometry]:
     a, b = np.array(crossing.start), np.array(crossing.end)
-    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+    along = (b - a) / max(distance(b, a), 1e-9)
     reach = _FROM_KERB + _DEEP
     found: list[BaseGeometry] = []
     for end, out in ((a, -along), (b, along)):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
+from vico.geometry import distance, distances
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, quad_triangles
 from vico.world.model import ENTITY_WIRE
@@ -84,9 +85,9 @@ def _spans(
     for place in np.arange(_SPAN_EVERY / 2, track.length, _SPAN_EVERY):
         a, b = (np.asarray(track.interpolate(v).coords[0]) for v in (place - 0.5, place + 0.5))
         here = (a + b) / 2
-        if len(middles) and np.hypot(*(middles - here).T).min() < _APART:
+        if len(middles) and distances(middles, here).min() < _APART:
             continue
-        along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+        along = (b - a) / max(distance(b, a), 1e-9)
         across = np.array([-along[1], along[0]])
         ends = [_wall(here, side * across, walls) for side in (1.0, -1.0)]
         if ends[0] is None or ends[1] is None:

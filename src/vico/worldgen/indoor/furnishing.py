@@ -18,6 +18,7 @@ from scipy import ndimage
 
 from vico.assets.models.furniture import furniture_models
 from vico.assets.models.model import Model
+from vico.geometry import distances
 
 GRID = 0.1
 BODY = 0.3  # bodies are 0.25 m; the rest is for the raster
@@ -192,7 +193,7 @@ class RoomDraft:
     @staticmethod
     def _has_side(bed: _Bed, points: NDArray[np.float64], others: Sequence[Box]) -> bool:
         """Whether one can stand beside a bed at one of some points with nothing but the bed up to the hips."""
-        away = np.min([np.hypot(*(points - side).T) for side in bed.sides], axis=0)
+        away = np.min([distances(points, side) for side in bed.sides], axis=0)
         x, y = points[away <= _NEAR_SIDE].T
         along = np.linspace(0.0, 1.0, _SAMPLES)
         u, v = x[:, None] + along * (bed.hips[0] - x[:, None]), y[:, None] + along * (bed.hips[1] - y[:, None])

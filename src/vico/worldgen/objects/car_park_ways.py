@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
+from vico.geometry import distance, distances
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
@@ -264,7 +265,7 @@ def _reached(raster: _Raster, lanes: _Lanes, way: int) -> _Poses:
 
 def _curve(a: Floats, b: Floats) -> Floats | None:
     """Return points of a smooth curve between two poses, shape ``(n, 2)``; None if it bends too much."""
-    run = float(np.hypot(*(b[:2] - a[:2])))
+    run = distance(b[:2], a[:2])
     if run < 0.3:
         return None
     t = np.linspace(0.0, 1.0, max(int(run / 0.4), 5))[:, None]
@@ -300,7 +301,7 @@ def _joined(poses: Floats, raster: _Raster, lane: int, *, at_end: bool) -> Float
                 continue
             along = np.diff(points, axis=0)
             yaw = np.arctan2(along[:, 1], along[:, 0])
-            near = np.hypot(*(points[1:] - spot).T) < 3.0
+            near = distances(points[1:], spot) < 3.0
             clear = raster.free(points[1:, 0], points[1:, 1], yaw, lane)
             if (clear | near).all():
                 line.extend(points[1:])

@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData
+from vico.geometry import distance
 from vico.seeds import rng
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.objects.kinds import on_the_ground, thing_of
@@ -113,7 +114,7 @@ def _stands(area: OsmArea) -> list[Wish]:
     """Stands along the longer side of a bicycle park."""
     box = shapely.oriented_envelope(area.polygon)
     corners = np.array(box.exterior.coords[:3])
-    sides = sorted(float(np.hypot(*(corners[k + 1] - corners[k]))) for k in range(2))
+    sides = sorted(distance(corners[k + 1], corners[k]) for k in range(2))
     yaw = _along(area)
     along = np.array([math.cos(yaw), math.sin(yaw)])
     count = max(1, min(8, int(sides[1] // 3.6)))
@@ -187,7 +188,7 @@ def _pitch(area: OsmArea) -> list[Wish]:
     if ring.geom_type != "Polygon":
         return []
     corners = np.array(ring.exterior.coords[:3])
-    long = max(float(np.hypot(*(corners[k + 1] - corners[k]))) for k in range(2))
+    long = max(distance(corners[k + 1], corners[k]) for k in range(2))
     middle = np.array(ring.centroid.coords[0])
     scale = float(np.clip(long / 60.0, 1.0, 2.0)) if name == "goal" else 1.0
     out = long / 2 - 1.0 * scale

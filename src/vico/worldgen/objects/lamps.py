@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.geometry import distance, distances
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.streets import carriageway_width
 from vico.worldgen.objects.wishes import Wish
@@ -92,7 +93,7 @@ def _in_town(xy: NDArray[np.float64], houses: shapely.STRtree) -> bool:
 
 
 def _distance(points: NDArray[np.float64], xy: NDArray[np.float64]) -> float:
-    return float(np.hypot(*(points - xy).T).min(initial=math.inf))
+    return float(distances(points, xy).min(initial=math.inf))
 
 
 def _steps(way: OsmWay) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
@@ -104,7 +105,7 @@ def _steps(way: OsmWay) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     found = []
     for share in (np.arange(count) + 0.5) / count:
         a, b = (np.array(line.interpolate(share * line.length + d).coords[0]) for d in (-0.5, 0.5))
-        along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+        along = (b - a) / max(distance(b, a), 1e-9)
         found.append(((a + b) / 2.0, np.array([-along[1], along[0]])))
     return found
 

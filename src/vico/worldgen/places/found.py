@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from vico.geo.places.model import FoundPlace
+from vico.geometry import distance
 from vico.world.model import Category, Dropped
 from vico.worldgen.facts.named_places import NamedPlace
 from vico.worldgen.places.kinds import meaning_of
@@ -105,7 +106,7 @@ class _Known:
         near = [(self._mapped[i], float(self._tree.geometries[i].distance(point))) for i in hits]
         i, j = _bin(*place.xy)
         for cell in [(a, b) for a in (i - 1, i, i + 1) for b in (j - 1, j, j + 1)]:
-            near += [(named, float(np.hypot(*(named.xy - place.xy)))) for named in self._added.get(cell, [])]
+            near += [(named, distance(named.xy, place.xy)) for named in self._added.get(cell, [])]
         best: tuple[float, NamedPlace] | None = None
         for named, away in near:
             alike = likeness(place.name, named.name)

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.geo.quantities import quantity
+from vico.geometry import distances
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.facts.streets import Crossing, Street
@@ -46,10 +47,10 @@ def crossings_of(
     for node in osm.nodes:
         if node.id not in kinds or node.id not in by_node:
             continue
-        if len(middles) and np.hypot(*(middles - node.xy).T).min() < 6.0:
+        if len(middles) and distances(middles, node.xy).min() < 6.0:
             continue
         street = by_node[node.id]
-        k = int(np.hypot(*(street.line - node.xy).T).argmin())
+        k = int(distances(street.line, node.xy).argmin())
         along = street.line[min(k + 1, len(street.line) - 1)] - street.line[max(k - 1, 0)]
         along = along / max(float(np.hypot(*along)), 1e-9)
         across = np.array([-along[1], along[0]]) * (street.width / 2)

@@ -19,7 +19,7 @@ from defusedxml.ElementTree import fromstring
 from numpy.typing import NDArray
 
 from vico.geo import overlay
-from vico.geometry import arc_lengths, points_along
+from vico.geometry import arc_lengths, distance, points_along
 
 Floats = NDArray[np.float64]
 
@@ -150,7 +150,7 @@ def _join(chain: list[str], paths: dict[str, _Path]) -> None:
     if not inner or min(len(path.line) for path in (before, after, *inner)) < 2:
         return
     whole = np.concatenate([inner[0].line, *(path.line[1:] for path in inner[1:])])
-    chord = float(np.hypot(*(whole[-1] - whole[0])))
+    chord = distance(whole[-1], whole[0])
     start, end = _heading(before.line, -1), _heading(after.line, 0)
     turn = abs(_wrapped(end - start))
     if chord < _SHORTEST or (turn > _TURNS_BACK and chord > _WIDE):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geometry import arc_lengths
+from vico.geometry import arc_lengths, distances
 
 Floats = NDArray[np.float64]
 
@@ -196,7 +196,7 @@ def _points_along(line: shapely.LineString, out: float) -> tuple[Floats, Floats]
     along = (np.arange(count) + 0.5) * (line.length / count)
     at = shapely.get_coordinates(shapely.line_interpolate_point(line, along))
     on = shapely.get_coordinates(shapely.line_interpolate_point(line, np.minimum(along + 0.1, line.length)))
-    step = (on - at) / np.maximum(np.hypot(*(on - at).T), 1e-9)[:, None]
+    step = (on - at) / np.maximum(distances(on, at), 1e-9)[:, None]
     return at, out * np.stack([-step[:, 1], step[:, 0]], axis=1)
 
 

@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.geometry import distances
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
@@ -94,9 +95,9 @@ def _planned(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.flo
     wanted = where_people_go(site)
     chosen: list[NDArray[np.float64]] = []
     for centre in k_means(wanted if len(wanted) else spots, count, rng(seed, "transit", "racks")):
-        away = np.hypot(*(spots - centre).T)
+        away = distances(spots, centre)
         for other in chosen:
-            away = np.where(np.hypot(*(spots - other).T) < _APART, np.inf, away)
+            away = np.where(distances(spots, other) < _APART, np.inf, away)
         if len(away) and np.isfinite(away).any():
             chosen.append(spots[int(np.argmin(away))])
     return chosen

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.geo.osm import OsmData
+from vico.geometry import distances
 from vico.seeds import rng
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
@@ -84,7 +85,7 @@ def planned_berths(site: SiteFacts, kerbs: Kerbs, seed: int) -> list[Berth]:
     for centre in centres:
         away = ((xy - centre) ** 2).sum(axis=1)
         for taken in chosen:
-            away = np.where(np.hypot(*(xy - xy[taken]).T) < _APART, np.inf, away)
+            away = np.where(distances(xy, xy[taken]) < _APART, np.inf, away)
         if np.isfinite(away).any():
             chosen.append(int(np.argmin(away)))
     return [Berth(f"planned{k}", f"Stop {k + 1}", *spots[i]) for k, i in enumerate(sorted(chosen))]

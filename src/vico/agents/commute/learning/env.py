@@ -40,6 +40,7 @@ from vico.agents.commute.learning.fields import (
 )
 from vico.agents.commute.learning.kernels import clear_at, see_all, step_all
 from vico.errors import EmptyInputError, InputError
+from vico.geometry import distance
 from vico.seeds import rng
 
 #: Seconds after the start of an appointment at which a commute is given up.
@@ -208,7 +209,7 @@ class CommuteVectorEnv(VectorEnv[Any, Any, Any]):
         """Draw a start as far from a goal as commutes are."""
         start = city.starts[int(self._chance.integers(len(city.starts)))]
         for _ in range(_TRIES):
-            if self.draws.least <= float(np.hypot(*(start - goal))) <= self.draws.most:
+            if self.draws.least <= distance(start, goal) <= self.draws.most:
                 break
             start = city.starts[int(self._chance.integers(len(city.starts)))]
         return start
@@ -218,7 +219,7 @@ class CommuteVectorEnv(VectorEnv[Any, Any, Any]):
         goal = city.goals[int(chance.integers(len(city.goals)))]
         kind = float(chance.random())
         start = self._near(city, goal) if kind < draws.near_share else self._far(city, goal)
-        away = float(np.hypot(*(start - goal)))
+        away = distance(start, goal)
         time = 3600.0 * chance.uniform(*draws.hours)
         state = self.states[i]
         state[:] = 0.0

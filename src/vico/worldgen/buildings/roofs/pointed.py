@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo import overlay
+from vico.geometry import distances
 from vico.worldgen.facts.outlines.roof_shapes import Roof, prism, rings_of
 
 _DOME = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, math.pi / 2, 8)[1:-1]]
@@ -58,7 +59,7 @@ def _sees_all(ring: NDArray[np.float64], centre: NDArray[np.float64]) -> bool:
     b = np.roll(a, -1, axis=0)
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # A hand's breadth of every edge's line: a roof that is nearly folded over itself is none.
-    return bool((cross > 0.1 * np.maximum(np.hypot(*(b - a).T), 1e-9)).all())
+    return bool((cross > 0.1 * np.maximum(distances(b, a), 1e-9)).all())
 
 
 def _loft(

@@ -16,6 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.geometry import distance
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
 from vico.worldgen.facts.expendable import expendable
@@ -88,7 +89,7 @@ def _mouths(
         if node not in walked:
             continue
         here, inside = way.line[end], way.line[beyond]
-        u = (inside - here) / max(float(np.hypot(*(inside - here))), 1e-9)
+        u = (inside - here) / max(distance(inside, here), 1e-9)
         across = np.array([-u[1], u[0]]) * (width / 2 + 0.6)
         face = shapely.LineString([here + u * 1.5 - across, here + u * 1.5 + across])
         # A wall across another street or into a house is worse than none; the street that leads in ends there. A

@@ -22,7 +22,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
-from vico.geometry import arc_lengths
+from vico.geometry import arc_lengths, distance, distances
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
@@ -297,7 +297,7 @@ def _open_length(network: Network, rows: Sequence[int], is_open: NDArray[np.bool
         row, run = network.rows[k], 0.0
         for a, b in pairwise(row.tolist()):
             both = is_open[a] and is_open[b] and known[a] and known[b]
-            run = run + float(np.hypot(*(network.points[b] - network.points[a]))) if both else 0.0
+            run = run + distance(network.points[b], network.points[a]) if both else 0.0
             longest = max(longest, run)
     return longest
 
@@ -323,7 +323,7 @@ def _is_usable(bore: Bore, mouths: Floats, built: shapely.STRtree, paved: BaseGe
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_open, [False]]).astype(np.int8)))
     for first, last in edges.reshape(-1, 2).tolist():
         ends = bore.line[first], bore.line[last - 1]
-        begins = [len(mouths) > 0 and float(np.hypot(*(mouths - end).T).min()) < 0.1 for end in ends]
+        begins = [len(mouths) > 0 and float(distances(mouths, end).min()) < 0.1 for end in ends]
         at_end = first == 0, last == len(bore.line)
         if not any(begin and end for begin, end in zip(begins, at_end, strict=True)):
             return False
@@ -372,7 +372,7 @@ def _blind(bores: Sequence[Bore], mouths: Floats, window: Box) -> set[int]:
     found: set[int] = set()
     for bore in bores:
         for node, point in ((bore.way.nodes[0], bore.line[0]), (bore.way.nodes[-1], bore.line[-1])):
-            is_mouth = len(mouths) > 0 and float(np.hypot(*(mouths - point).T).min()) < 0.1
+            is_mouth = len(mouths) > 0 and float(distances(mouths, point).min()) < 0.1
             if at[node] < 2 and node not in inner and not is_mouth and _within(point, window):
                 found.add(bore.way.id)
     return found

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vico.assets.models.street import street_models
 from vico.geo.detections.model import Detections
 from vico.geo.osm import OsmData, OsmNode
+from vico.geometry import distances
 from vico.world.detected import DetectedObject
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
@@ -124,7 +125,7 @@ def _partners(seen: Sequence[_Seen], known: Sequence[Wish], same: float) -> dict
     places = np.array([wish.xy for wish in known]).reshape(-1, 2)
     pairs: list[tuple[float, int, int]] = []
     for k, one in enumerate(seen):
-        off = np.hypot(*(places - one.spot.xy).T)
+        off = distances(places, one.spot.xy)
         near = np.flatnonzero((off <= same) & (kinds == models[one.wish.prototype].kind))
         pairs += [(float(off[j]), k, int(j)) for j in near]
     partner: dict[int, tuple[Wish, float]] = {}
