@@ -1,22 +1,80 @@
-"""The verbs of `vico city`."""
+"""`vico city build`, `info`, `check` and `export`: cities of tiles."""
 
 from __future__ import annotations
 
 import os
 import sys
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Annotated
 
-from vico.cli.city_options import CityBuildOptions
-from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
+import tyro
+from tyro.conf import Positional
+from tyro.extras import SubcommandApp
+
+from vico.cli.options import Files, RayAddress
 from vico.errors import InputError
-from vico.world.city import read_city
-from vico.world.city_world import CityWorld
-from vico.world.model import FLAT_GROUND
+
+_FLAT = tyro.conf.arg(name="")
+
+city = SubcommandApp()
 
 
-def build(options: CityBuildOptions) -> int:
-    """Build a city; 1 if a tile could not be built."""
+@dataclass(frozen=True)
+class CityBuildOptions:
+    """What `vico city build` is asked for.
+
+    Attributes
+    ----------
+    osm
+        Map extract, .osm or .osm.pbf, of the whole city.
+    out
+        Folder to make, or to go on in.
+    center
+        Latitude and longitude of the middle tile; the middle of the extract without.
+    size
+        Side of the square to cover, metres; whole tiles are built.
+    bbox
+        Box to cover instead: west, south, east and north, degrees, as in 24.93,60.16,24.96,60.18. Its middle is the
+        centre where --center names none.
+    dem
+        Elevation files; flat ground without.
+    tile
+        Side of a tile, metres, a multiple of 8.
+    seed
+        Decides what the map leaves open.
+    workers
+        Processes side by side; 0 is one a processor.
+    ray
+        Hand the tiles to a Ray cluster instead (the extra "ray"): its address; without one, that which runs here.
+    json
+        Print the result as JSON.
+    """
+
+    osm: Path
+    out: Path
+    center: str = ""
+    size: float = 2000.0
+    bbox: str = ""
+    dem: Files = ()
+    tile: float = 400.0
+    seed: int = 0
+    workers: int = 0
+    ray: RayAddress = None
+    json: bool = False
+
+
+@city.command(name="build")
+def city_build(options: Annotated[CityBuildOptions, _FLAT]) -> int:
+    """Build a city of tiles that meet without a seam; each is a world of its own.
+
+    A build that was stopped goes on where it was, and one with a changed map builds anew the tiles that changed.
+
+    Example: vico city build --osm region.osm.pbf --center 60.1690,24.9435 --size 2000 --out city --workers 2
+    """
+    from vico.cli.output import progress_bars
+    from vico.world.model import FLAT_GROUND
     from vico.worldgen.city_build import build_city, city_request
     from vico.worldgen.pipeline import extract_centre
     from vico.worldgen.sources import Sources
@@ -38,34 +96,26 @@ def build(options: CityBuildOptions) -> int:
         seed=options.seed,
     )
     with progress_bars() as report:
-        city = build_city(request, workers=options.workers or os.cpu_count() or 1, ray=options.ray, progress=report)
-    info(options.out, json=options.json)
+        built = build_city(request, workers=options.workers or os.cpu_count() or 1, ray=options.ray, progress=report)
+    city_info(options.out, json=options.json)
     if not options.dem:
         print(f"{options.out}: {FLAT_GROUND}", file=sys.stderr)
-    return 1 if city.manifest.failed else 0
+    return 1 if built.manifest.failed else 0
 
 
-def _degrees(text: str) -> tuple[float, float]:
-    parts = text.split(",")
-    try:
-        lat, lon = map(float, parts)
-    except ValueError:
-        raise InputError(f"center: {text!r}; give latitude and longitude, as in --center 60.1690,24.9435") from None
-    return lat, lon
+@city.command(name="info")
+def city_info(path: Positional[Path], json: bool = False) -> int:
+    """Say which tiles a city has, and what is in them.
 
+    Example: vico city info city
 
-def _box(text: str) -> tuple[float, float, float, float]:
-    try:
-        west, south, east, north = map(float, text.split(","))
-    except ValueError:
-        raise InputError(
-            f"bbox: {text!r}; give west, south, east and north, as in --bbox 24.93,60.16,24.96,60.18"
-        ) from None
-    return west, south, east, north
+    Args:
+        path: City folder.
+        json: Print JSON.
+    """
+    from vico.cli.output import print_json, print_table
+    from vico.world.city import read_city
 
-
-def info(path: Path, *, json: bool = False) -> int:
-    """Say what a city holds."""
     manifest = read_city(path).manifest
     if json:
         print_json(manifest.model_dump(mode="json"))
@@ -87,40 +137,87 @@ def info(path: Path, *, json: bool = False) -> int:
     return 0
 
 
-def check(path: Path, *, tiles: bool = True, json: bool = False) -> int:
-    """Check a city; 1 if anything is wrong."""
+@city.command(name="check")
+def city_check(path: Positional[Path], borders: bool = False, json: bool = False) -> int:
+    """Check every tile of a city, and every border between two; exit 1 if anything is wrong.
+
+    Example: vico city check city --borders
+
+    Args:
+        path: City folder.
+        borders: Borders alone.
+        json: Print JSON.
+    """
+    from vico.cli.output import print_json, progress_bars
     from vico.world.borders import border_findings
     from vico.world.check import check_whole, check_world
+    from vico.world.city import read_city
+    from vico.world.city_world import CityWorld
 
-    city = read_city(path)
+    read = read_city(path)
     findings: list[str] = []
     with progress_bars() as report:
-        borders = city.borders()
-        for k, (first, second, axis) in enumerate(borders, 1):
-            findings += border_findings(city, first, second, axis)
-            report("borders", k, len(borders))
-        for k, tile in enumerate(city.manifest.tiles if tiles else [], 1):
-            found = check_world(city.world((tile.column, tile.row)), part=True)
+        pairs = read.borders()
+        for k, (first, second, axis) in enumerate(pairs, 1):
+            findings += border_findings(read, first, second, axis)
+            report("borders", k, len(pairs))
+        for k, tile in enumerate(read.manifest.tiles if not borders else [], 1):
+            found = check_world(read.world((tile.column, tile.row)), part=True)
             findings += [f"{tile.name}: {one.where}: {one.what}" for one in found]
-            report("tiles", k, len(city.manifest.tiles))
-        if tiles:
-            findings += [f"{one.where}: {one.what}" for one in check_whole(CityWorld(city))]
+            report("tiles", k, len(read.manifest.tiles))
+        if not borders:
+            findings += [f"{one.where}: {one.what}" for one in check_whole(CityWorld(read))]
             report("streets", 1, 1)
-    findings += [f"{name}: not built: {reason}" for name, reason in city.manifest.failed.items()]
+    findings += [f"{name}: not built: {reason}" for name, reason in read.manifest.failed.items()]
     if json:
-        print_json({"ok": not findings, "borders": len(borders), "findings": findings})
+        print_json({"ok": not findings, "borders": len(pairs), "findings": findings})
     else:
         for finding in findings:
             print(finding)
-        print(f"{path}: {len(findings)} findings" if findings else f"{path}: {len(borders)} borders, all is well")
+        print(f"{path}: {len(findings)} findings" if findings else f"{path}: {len(pairs)} borders, all is well")
     return 1 if findings else 0
 
 
-def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool = False, json: bool = False) -> int:
-    """Write a city in another format."""
+@city.command(name="export")
+def city_export(
+    path: Positional[Path], to: str, out: Path, rooms: bool = False, force: bool = False, json: bool = False
+) -> int:
+    """Write a city in another format: streets and places as one, meshes tile by tile.
+
+    Example: vico city export city --to gltf --out city_gltf
+
+    Args:
+        path: City folder.
+        to: gltf, usd, mjcf, geojson or xodr.
+        out: Folder to make; refused if it exists, unless --force.
+        rooms: With what lies indoors.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
+        json: Print JSON.
+    """
+    from vico.cli.output import check_output, print_export
+    from vico.world.city import read_city
     from vico.world.exports import EXPORT_FOLDER, export_city
 
     check_output(out, path, force=force, kind=EXPORT_FOLDER)
     counts = export_city(read_city(path), to, out, rooms=rooms, force=force)
     print_export(out, to, counts, json=json)
     return 0
+
+
+def _degrees(text: str) -> tuple[float, float]:
+    parts = text.split(",")
+    try:
+        lat, lon = map(float, parts)
+    except ValueError:
+        raise InputError(f"center: {text!r}; give latitude and longitude, as in --center 60.1690,24.9435") from None
+    return lat, lon
+
+
+def _box(text: str) -> tuple[float, float, float, float]:
+    try:
+        west, south, east, north = map(float, text.split(","))
+    except ValueError:
+        raise InputError(
+            f"bbox: {text!r}; give west, south, east and north, as in --bbox 24.93,60.16,24.96,60.18"
+        ) from None
+    return west, south, east, north

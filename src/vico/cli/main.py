@@ -24,10 +24,10 @@ from tyro.extras import SubcommandApp
 from vico.cli import viewer_verbs
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.asset_verbs import assets
-from vico.cli.city_verbs import city
+from vico.cli.city import city
 from vico.cli.dataset_verbs import dataset
 from vico.cli.interrupts import ended_by_signals, exit_code
-from vico.cli.motion_verbs import motion
+from vico.cli.motion import motion
 from vico.cli.options import (
     CommaSeparated,
     CommunityBuildOptions,

@@ -1,37 +1,81 @@
-"""`vico motion`: motions of other programs, and those of a recorded run."""
+"""`vico motion import` and `vico motion of-run`: motions of other programs, and those of a recorded run."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-from PIL import Image
+from tyro.conf import Positional
+from tyro.extras import SubcommandApp
 
-from vico.assets.motions import MotionClip, import_motion, read_gltf_motion, smplx_of
-from vico.cli.output import check_output, print_json, print_table
-from vico.errors import InputError
-from vico.io.files import new_file
-from vico.sim.recording.joint_poses import motion_of
-from vico.sim.recording.run import read_run
-from vico.viewer.motion_sheet import motion_sheet
+if TYPE_CHECKING:
+    from vico.assets.motions import MotionClip
+
+motion = SubcommandApp()
 
 
-def convert(path: Path, *, out: Path, animation: str, sheet: Path | None, force: bool, json: bool) -> int:
-    """Read a motion and write it as ours (.motion) or as SMPL-X (.npz)."""
+@motion.command(name="import")
+def motion_import(
+    path: Positional[Path],
+    out: Path,
+    animation: str = "",
+    sheet: Path | None = None,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Read a motion of a BVH, AMASS (.npz) or glTF file, and write it on our skeleton.
+
+    Example: vico motion import 01_01.bvh --out jump.motion --sheet jump.png
+
+    Example: vico motion import dance.glb --animation samba --out samba.npz
+
+    Args:
+        path: The file; a .motion of ours can be turned into SMPL-X.
+        out: File to write: .motion (ours) or .npz (SMPL-X, as AMASS has it).
+        animation: Name of one of a glTF file's animations; the first without.
+        sheet: Draw the motion into this picture.
+        force: Replace files that are there.
+        json: Print what was read as JSON.
+    """
+    from vico.assets.motions import import_motion, read_gltf_motion
+
     clip = read_gltf_motion(path, animation=animation) if animation else import_motion(path)
-    code = _written(clip, path, out=out, sheet=sheet, force=force, json=json)
-    for note in clip.notes:
-        print(f"{path}: {note}", file=sys.stderr)
-    return code
+    return _write(clip, path, out=out, sheet=sheet, force=force, json=json)
 
 
-def of_run(run: Path, *, agent: str, out: Path, sheet: Path | None, force: bool, json: bool) -> int:
-    """Write the recorded motion of one person."""
-    return _written(motion_of(read_run(run), agent), run, out=out, sheet=sheet, force=force, json=json)
+@motion.command(name="of-run")
+def motion_of_run(
+    run: Positional[Path], agent: str, out: Path, sheet: Path | None = None, force: bool = False, json: bool = False
+) -> int:
+    """Write how one person moved in a recorded run, a frame a step.
+
+    Example: vico motion of-run out/run --agent resident_0 --out resident_0.npz
+
+    Args:
+        run: Run folder.
+        agent: The person's name.
+        out: File to write: .motion (ours) or .npz (SMPL-X, as AMASS has it).
+        sheet: Draw the motion into this picture.
+        force: Replace files that are there.
+        json: Print what was written as JSON.
+    """
+    from vico.sim.recording.joint_poses import motion_of
+    from vico.sim.recording.run import read_run
+
+    return _write(motion_of(read_run(run), agent), run, out=out, sheet=sheet, force=force, json=json)
 
 
-def _written(clip: MotionClip, source: Path, *, out: Path, sheet: Path | None, force: bool, json: bool) -> int:
+def _write(clip: MotionClip, source: Path, *, out: Path, sheet: Path | None, force: bool, json: bool) -> int:
+    """Write a clip in the format of the file's name, draw it where asked, and print what it is."""
+    import numpy as np
+    from PIL import Image
+
+    from vico.assets.motions import smplx_of
+    from vico.cli.output import check_output, print_json, print_table
+    from vico.errors import InputError
+    from vico.io.files import new_file
+    from vico.viewer.motion_sheet import motion_sheet
+
     if out.suffix not in (".motion", ".npz"):
         raise InputError(f"motion: {out}: write .motion (ours) or .npz (SMPL-X, as AMASS has it)")
     for path in (out, *([sheet] if sheet else [])):
