@@ -1,30 +1,132 @@
-"""`vico dataset`: make datasets of demonstrations, and look into them."""
+"""`vico dataset build`, `info`, `check`, `show` and `export`: demonstrations for trainers."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from vico.challenges.assistant.thresholds import SUBTASKS
-from vico.challenges.pick_place.task import SECONDS
-from vico.challenges.records import Setting
-from vico.cli.dataset_options import DatasetOptions
-from vico.cli.output import check_output, print_json, print_table, progress_bars
-from vico.datasets.build import BuildRequest, Contents, build_dataset
-from vico.datasets.checking import findings_of
-from vico.datasets.contact_sheet import write_contact_sheet
-from vico.datasets.folder import DATASET_FOLDER, Dataset
-from vico.datasets.splits import SplitRule
+import tyro
+from tyro.conf import Positional
+from tyro.extras import SubcommandApp
+
+from vico.cli.options import Files, RayAddress
 from vico.errors import InputError, OutputExistsError
-from vico.runner.foreign import Terms
-from vico.threads import workers as processors
+
+if TYPE_CHECKING:
+    from vico.challenges.records import Setting
+    from vico.datasets.build import BuildRequest
+
+_FLAT = tyro.conf.arg(name="")
+
+dataset = SubcommandApp()
 
 
-def build(options: DatasetOptions) -> int:
-    """Make a dataset; 1 if some of its episodes could not be made."""
+@dataclass(frozen=True)
+class DatasetOptions:
+    """What `vico dataset build` is asked for.
+
+    Attributes
+    ----------
+    out
+        Folder to make; refused if it exists, unless --force. A build that was stopped goes on where it was.
+    to
+        The format: LeRobot v3.0, WebDataset shards, or plain Parquet.
+    world
+        World folders to play in. With --runs: where their world is now. Of pick_place: without any, a level field.
+    challenge
+        What is played; pick_place: a mobile manipulator picks things up and puts them down (docs/imitation.md).
+    method
+        By whom: a planner of `vico eval assistant`, or my_module:MyAgent. Of pick_place: always the arm's own skills.
+    episodes
+        How many, over the worlds in turn.
+    steps
+        Seconds an episode may last; of pick_place never more than 120.
+    subtasks
+        How many of the six subtasks of a task are asked for: the first ones.
+    assistants
+        How many work together; each is an episode of its own.
+    first_seed
+        Of the first episode in each world.
+    runs
+        Take these recorded runs instead of playing: of vico run, of vico eval --record, played by hand.
+    agents
+        Whose demonstrations: names, or residents, assistants, robots; without it the assistants, else all whose
+        pictures were recorded.
+    outputs
+        Pictures, separated by commas: rgb (video), depth and segmentation (exact); or none.
+    size
+        Side of the pictures, pixels.
+    instruction
+        What to say was asked for, where neither a task nor a schedule says it.
+    successes
+        Keep only episodes in which all was done.
+    drop_below
+        Of pick_place: leave out steps whose largest increment is smaller, rad and metres; the paper has 0.01.
+    clip
+        Of pick_place: cut this share of the smallest and of the largest increments; the paper has 0.01.
+    test
+        Share of the episodes that are kept apart for testing.
+    validation
+        Share that is kept apart for validation.
+    split_by
+        What is never in two splits: a world, a person who acts or asks, or only an episode itself.
+    workers
+        Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
+    ray
+        Make the parts on a Ray cluster instead (the extra "ray"): its address; without one on that which runs here. OUT
+        and the worlds must be on a folder that all machines share.
+    deadline
+        Seconds an agent of yours has for an action; 0 waits for it as long as it takes.
+    force
+        Replace what this verb made there before; refused if the folder holds anything else.
+    json
+        Print what was made as JSON.
+    """
+
+    out: Path
+    to: Literal["lerobot", "webdataset", "parquet"]
+    world: Files = ()
+    challenge: Literal["carry", "delivery", "search", "pick_place"] = "delivery"
+    method: str = "heuristic"
+    episodes: int = 0
+    steps: int = 1500
+    subtasks: int = 6
+    assistants: int = 1
+    first_seed: int = 0
+    runs: Files = ()
+    agents: tuple[str, ...] = ()
+    outputs: str = "rgb"
+    size: int = 128
+    instruction: str = ""
+    successes: bool = False
+    drop_below: float = 0.0
+    clip: float = 0.0
+    test: float = 0.1
+    validation: float = 0.0
+    split_by: Literal["world", "person", "episode"] = "episode"
+    workers: int = 0
+    ray: RayAddress = None
+    deadline: float = 60.0
+    force: bool = False
+    json: bool = False
+
+
+@dataset.command(name="build")
+def dataset_build(options: Annotated[DatasetOptions, _FLAT]) -> int:
+    """Make a dataset of demonstrations: episodes played for it, or runs that were recorded. Exit 1 if some are missing.
+
+    Example: vico dataset build --world helsinki --episodes 200 --subtasks 1 --steps 150 --to lerobot --out demos
+
+    Example: vico dataset build --runs try/runs/* --to webdataset --outputs rgb --out demos
+    """
+    from vico.cli.output import check_output, print_json, print_table, progress_bars
+    from vico.datasets.build import build_dataset
+    from vico.datasets.folder import DATASET_FOLDER
+
     request = request_of(options)
     check_output(options.out, *chain(*options.world, *options.runs), force=options.force, kind=DATASET_FOLDER)
     with progress_bars() as report:
@@ -40,8 +142,118 @@ def build(options: DatasetOptions) -> int:
     return 1 if built.missing else 0
 
 
+@dataset.command(name="info")
+def dataset_info(path: Positional[Path], json: bool = False) -> int:
+    """Say what a dataset holds.
+
+    Example: vico dataset info demos
+
+    Args:
+        path: Folder of a dataset.
+        json: Print JSON.
+    """
+    from vico.cli.output import print_json, print_table
+    from vico.datasets.folder import Dataset
+
+    about = Dataset(path).about.model_dump(mode="json")
+    if json:
+        print_json(about)
+    else:
+        print_table(str(path), _rows(about))
+    return 0
+
+
+@dataset.command(name="check")
+def dataset_check(path: Positional[Path], json: bool = False) -> int:
+    """Read a whole dataset and look for what is wrong with it. Exit 1 if anything is.
+
+    Example: vico dataset check demos
+
+    Args:
+        path: Folder of a dataset.
+        json: Print JSON.
+    """
+    from vico.cli.output import print_json, progress_bars
+    from vico.datasets.checking import findings_of
+    from vico.datasets.folder import Dataset
+
+    dataset = Dataset(path)
+    with progress_bars() as report:
+        findings = findings_of(dataset, report=lambda done, total: report("episodes", done, total))
+    if json:
+        print_json({"episodes": dataset.about.episodes, "frames": dataset.about.frames, "findings": findings})
+    else:
+        for finding in findings:
+            print(finding)
+        print(f"{path}: {dataset.about.episodes} episodes, {dataset.about.frames} frames, {len(findings)} findings")
+    return 1 if findings else 0
+
+
+@dataset.command(name="show")
+def dataset_show(
+    path: Positional[Path], out: Path, episode: int = 0, frames: int = 12, force: bool = False, json: bool = False
+) -> int:
+    """Draw a contact sheet of an episode: frames, what was asked for, what was done.
+
+    Example: vico dataset show demos --episode 3 --out episode_3.png
+
+    Args:
+        path: Folder of a dataset.
+        out: Picture to make (.png).
+        episode: Which.
+        frames: How many frames, evenly over the episode.
+        force: Replace a picture that is there.
+        json: Print the frames' values as JSON.
+    """
+    from vico.cli.output import print_json
+    from vico.datasets.contact_sheet import write_contact_sheet
+    from vico.datasets.folder import Dataset
+
+    if out.exists() and not force:
+        raise OutputExistsError(f"{out}: exists; give another name, or --force")
+    shown = write_contact_sheet(out, Dataset(path), episode, frames=frames)
+    if json:
+        print_json(shown)
+    else:
+        print(out)
+    return 0
+
+
+@dataset.command(name="export")
+def dataset_export(
+    run: Positional[Path], to: Literal["rerun"], out: Path, world: Path | None = None, force: bool = False
+) -> int:
+    """Write a recorded run for another viewer: Rerun (.rrd). Needs the extra "rerun".
+
+    Example: vico dataset export morning --to rerun --out morning.rrd
+
+    Args:
+        run: Run folder.
+        to: The format.
+        out: File to make.
+        world: The world it ran in, if it is no longer where it was.
+        force: Replace a file that is there.
+    """
+    from vico.cli.output import progress_bars
+    from vico.datasets.rerun_export import write_rerun  # an extra's
+
+    if out.exists() and not force:
+        raise OutputExistsError(f"{out}: exists; give another name, or --force")
+    with progress_bars() as report:
+        write_rerun(out, run, world=world, report=lambda done, total: report("steps", done, total))
+    print(out)
+    return 0
+
+
 def request_of(options: DatasetOptions) -> BuildRequest:
     """Return what the library is asked for."""
+    from vico.challenges.assistant.thresholds import SUBTASKS
+    from vico.challenges.pick_place.task import SECONDS
+    from vico.datasets.build import BuildRequest, Contents
+    from vico.datasets.splits import SplitRule
+    from vico.runner.foreign import Terms
+    from vico.threads import workers as processors
+
     outputs = () if options.outputs.strip() == "none" else tuple(_names(options.outputs))
     if not 0 <= options.workers <= 256:
         raise InputError(f"--workers {options.workers}; give a number of processes in 1..256, or 0 for one a processor")
@@ -68,54 +280,6 @@ def request_of(options: DatasetOptions) -> BuildRequest:
         workers=options.workers or processors(),
         ray=options.ray,
     )
-
-
-def info(path: Path, *, json: bool) -> int:
-    """Say what a dataset holds."""
-    about = Dataset(path).about.model_dump(mode="json")
-    if json:
-        print_json(about)
-    else:
-        print_table(str(path), _rows(about))
-    return 0
-
-
-def check(path: Path, *, json: bool) -> int:
-    """Read a whole dataset; 1 if anything is wrong with it."""
-    dataset = Dataset(path)
-    with progress_bars() as report:
-        findings = findings_of(dataset, report=lambda done, total: report("episodes", done, total))
-    if json:
-        print_json({"episodes": dataset.about.episodes, "frames": dataset.about.frames, "findings": findings})
-    else:
-        for finding in findings:
-            print(finding)
-        print(f"{path}: {dataset.about.episodes} episodes, {dataset.about.frames} frames, {len(findings)} findings")
-    return 1 if findings else 0
-
-
-def show(path: Path, *, out: Path, episode: int, frames: int, force: bool, json: bool) -> int:
-    """Draw a contact sheet of an episode."""
-    if out.exists() and not force:
-        raise OutputExistsError(f"{out}: exists; give another name, or --force")
-    shown = write_contact_sheet(out, Dataset(path), episode, frames=frames)
-    if json:
-        print_json(shown)
-    else:
-        print(out)
-    return 0
-
-
-def export(run: Path, *, out: Path, world: Path | None, force: bool) -> int:
-    """Write a run for Rerun."""
-    from vico.datasets.rerun_export import write_rerun  # an extra's
-
-    if out.exists() and not force:
-        raise OutputExistsError(f"{out}: exists; give another name, or --force")
-    with progress_bars() as report:
-        write_rerun(out, run, world=world, report=lambda done, total: report("steps", done, total))
-    print(out)
-    return 0
 
 
 def _names(text: str) -> list[str]:

@@ -25,7 +25,7 @@ from vico.cli import viewer_verbs
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.asset_verbs import assets
 from vico.cli.city import city
-from vico.cli.dataset_verbs import dataset
+from vico.cli.dataset import dataset
 from vico.cli.interrupts import ended_by_signals, exit_code
 from vico.cli.motion import motion
 from vico.cli.options import (
