@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from command_line import vico
-from vico.cli import small_world
+from vico.worldgen import pipeline
 
 PLANTED = Path(__file__).parents[1] / "planted_agents.py"
 
@@ -23,7 +23,7 @@ def built(helsinki_path: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
         folders.append(out)
         shutil.copytree(helsinki_path, out)
 
-    monkeypatch.setattr(small_world, "build_world", copied)
+    monkeypatch.setattr(pipeline, "build_world", copied)
     monkeypatch.setenv("VICO_CACHE", str(tmp_path / "cache"))
     return folders
 

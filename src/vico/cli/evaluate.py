@@ -25,7 +25,6 @@ from vico.challenges.tables.files import EVALUATION_FOLDER, results_content, wri
 from vico.challenges.tables.markdown import fault_lines, not_played_lines, results_page, time_lines
 from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
-from vico.cli import leaderboard
 from vico.cli.evaluation_options import (
     AssistantOptions,
     CommuteOptions,
@@ -34,6 +33,7 @@ from vico.cli.evaluation_options import (
     RobotOptions,
     TeamingOptions,
 )
+from vico.cli.leaderboard import add_to_leaderboard
 from vico.cli.live import city_of, told
 from vico.cli.output import check_output, print_json
 from vico.errors import InputError, OutputError, OutputExistsError
@@ -190,7 +190,7 @@ def judge(
     with written(challenge, play, options) as (folder, outcomes):
         _tell(challenge, outcomes, options)
         if options.leaderboard is not None:
-            leaderboard.add(folder, file=options.leaderboard, date=options.date, replace=False, told=not options.json)
+            add_to_leaderboard(folder, file=options.leaderboard, date=options.date, replace=False, quiet=options.json)
     return 1 if any(outcome.record is None for outcome in outcomes) else 0
 
 

@@ -1,48 +1,56 @@
-"""`vico leaderboard`: add results to a leaderboard file, and show it."""
+"""`vico leaderboard add` and `show`: results of several methods in one file."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.markdown import Markdown
+from tyro.conf import Positional
+from tyro.extras import SubcommandApp
 
-from vico.challenges.registry import load_challenge
-from vico.challenges.tables.files import read_results
-from vico.challenges.tables.leaderboard import (
-    BoardMetric,
-    Entry,
-    Leaderboard,
-    add_entries,
-    boards,
-    entries_of,
-    read_leaderboard,
-    write_leaderboard,
-)
-from vico.challenges.tables.markdown import setting_words, table
-from vico.cli.output import print_json
 from vico.errors import EmptyInputError
 
+if TYPE_CHECKING:
+    from vico.challenges.tables.leaderboard import BoardMetric, Entry
 
-def add(results: Path, *, file: Path, date: str | None, replace: bool, json: bool = False, told: bool = True) -> int:
-    """Add the entries of a results folder, or of its ``results.json``; say nothing of it if not `told`."""
-    path = results / "results.json" if results.is_dir() else results
-    content, _ = read_results(path)
-    entries = entries_of(path, load_challenge(content["challenge"]), date=date)
-    if not entries:
-        raise EmptyInputError(f"{path}: no episode was played; there is nothing to add")
-    board = read_leaderboard(file) if file.exists() else Leaderboard()
-    write_leaderboard(file, add_entries(board, entries, replace=replace))
-    if json:
-        print_json([entry.model_dump(mode="json") for entry in entries])
-    elif told:
-        for entry in entries:
-            print(f"{file}: {entry.method}, {entry.category}: {_cell(entry.metrics[entry.rank_by])}")
+leaderboard = SubcommandApp()
+
+
+@leaderboard.command(name="add")
+def leaderboard_add(
+    results: Positional[Path], file: Path, date: str | None = None, replace: bool = False, json: bool = False
+) -> int:
+    """Add what an evaluation came to to a leaderboard file; it is made if it is not there.
+
+    Example: vico leaderboard add results --file leaderboard.json --date 2026-11-30
+
+    Args:
+        results: Folder that vico eval has written, or its results.json.
+        file: The leaderboard.
+        date: Of the entries, YYYY-MM-DD; left out without.
+        replace: Replace entries of the same method, version and tasks that came to something else.
+        json: Print the entries as JSON.
+    """
+    add_to_leaderboard(results, file=file, date=date, replace=replace, json=json)
     return 0
 
 
-def show(file: Path, *, json: bool = False) -> int:
-    """Print a leaderboard."""
+@leaderboard.command(name="show")
+def leaderboard_show(file: Positional[Path], json: bool = False) -> int:
+    """Show a leaderboard, a table for each challenge, category, setting and set of tasks.
+
+    Example: vico leaderboard show leaderboard.json
+
+    Args:
+        file: The leaderboard.
+        json: Print it as JSON.
+    """
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    from vico.challenges.tables.leaderboard import boards, read_leaderboard
+    from vico.cli.output import print_json
+
     board = read_leaderboard(file)
     if json:
         print_json(board.model_dump(mode="json"))
@@ -53,8 +61,39 @@ def show(file: Path, *, json: bool = False) -> int:
     return 0
 
 
+def add_to_leaderboard(
+    results: Path, *, file: Path, date: str | None, replace: bool, json: bool = False, quiet: bool = False
+) -> None:
+    """Add the entries of a results folder, or of its ``results.json``; say nothing of it if `quiet`."""
+    from vico.challenges.registry import load_challenge
+    from vico.challenges.tables.files import read_results
+    from vico.challenges.tables.leaderboard import (
+        Leaderboard,
+        add_entries,
+        entries_of,
+        read_leaderboard,
+        write_leaderboard,
+    )
+    from vico.cli.output import print_json
+
+    path = results / "results.json" if results.is_dir() else results
+    content, _ = read_results(path)
+    entries = entries_of(path, load_challenge(content["challenge"]), date=date)
+    if not entries:
+        raise EmptyInputError(f"{path}: no episode was played; there is nothing to add")
+    board = read_leaderboard(file) if file.exists() else Leaderboard()
+    write_leaderboard(file, add_entries(board, entries, replace=replace))
+    if json:
+        print_json([entry.model_dump(mode="json") for entry in entries])
+    elif not quiet:
+        for entry in entries:
+            print(f"{file}: {entry.method}, {entry.category}: {_cell(entry.metrics[entry.rank_by])}")
+
+
 def board_lines(entries: list[Entry]) -> list[str]:
     """Return the markdown of one board, best first."""
+    from vico.challenges.tables.markdown import setting_words, table
+
     first = entries[0]
     keys = [first.rank_by, *(key for key in first.metrics if key != first.rank_by)]
     title = f"## {first.challenge}, {first.category}: {setting_words(first.setting) or 'as it comes'}"

@@ -22,11 +22,13 @@ from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from vico.cli import viewer_verbs
-from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.asset_verbs import assets
+from vico.cli.check_agent import check_agent
 from vico.cli.city import city
 from vico.cli.dataset import dataset
+from vico.cli.evaluation_verbs import evaluation
 from vico.cli.interrupts import ended_by_signals, exit_code
+from vico.cli.leaderboard import leaderboard
 from vico.cli.motion import motion
 from vico.cli.options import (
     CommaSeparated,

@@ -1,12 +1,10 @@
-"""The verbs for whoever writes agents: `vico check-agent`, `vico eval` and `vico leaderboard`."""
+"""`vico eval`: judge agents on a challenge."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import tyro
-from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from vico.cli.evaluation_options import (
@@ -21,37 +19,6 @@ from vico.cli.evaluation_options import (
 _FLAT = tyro.conf.arg(name="")
 
 evaluation = SubcommandApp()
-leaderboard = SubcommandApp()
-
-
-def check_agent(
-    agent: Positional[Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")]],
-    world: Path | None = None,
-    steps: int = 40,
-    seed: int = 0,
-    deadline: float = 1.0,
-    in_process: bool = False,
-    json: bool = False,
-) -> int:
-    """Check that an agent of yours keeps the contract, a line a finding. Exit 1 if anything is wrong.
-
-    It is made in a process of its own, it answers with actions and in time, it repeats itself, one restored from its
-    state goes on as it does, it leaves what it is given as it is, and it does not reach for what it is not given.
-
-    Example: vico check-agent my_agents:Walker
-
-    Args:
-        agent: my_module:MyAgent, or path/to/file.py:MyAgent.
-        world: World folder it plays an assistant in; a small one of the packaged place without.
-        steps: How long, seconds.
-        seed: Of the simulation and the agent.
-        deadline: Seconds an action may take.
-        in_process: Ask it in this process instead, for a debugger; nothing is watched then.
-        json: Print JSON.
-    """
-    from vico.cli import check_agent as verb
-
-    return verb.check(agent, world=world, steps=steps, seed=seed, deadline=deadline, isolate=not in_process, json=json)
 
 
 @evaluation.command(name="assistant")
@@ -118,38 +85,3 @@ def evaluate_teaming(options: Annotated[TeamingOptions, _FLAT]) -> int:
     from vico.cli import evaluate as verb
 
     return verb.teaming(options)
-
-
-@leaderboard.command(name="add")
-def leaderboard_add(
-    results: Positional[Path], file: Path, date: str | None = None, replace: bool = False, json: bool = False
-) -> int:
-    """Add what an evaluation came to to a leaderboard file; it is made if it is not there.
-
-    Example: vico leaderboard add results --file leaderboard.json --date 2026-11-30
-
-    Args:
-        results: Folder that vico eval has written, or its results.json.
-        file: The leaderboard.
-        date: Of the entries, YYYY-MM-DD; left out without.
-        replace: Replace entries of the same method, version and tasks that came to something else.
-        json: Print the entries as JSON.
-    """
-    from vico.cli import leaderboard as verb
-
-    return verb.add(results, file=file, date=date, replace=replace, json=json)
-
-
-@leaderboard.command(name="show")
-def leaderboard_show(file: Positional[Path], json: bool = False) -> int:
-    """Show a leaderboard, a table for each challenge, category, setting and set of tasks.
-
-    Example: vico leaderboard show leaderboard.json
-
-    Args:
-        file: The leaderboard.
-        json: Print it as JSON.
-    """
-    from vico.cli import leaderboard as verb
-
-    return verb.show(file, json=json)
