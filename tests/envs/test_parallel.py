@@ -216,3 +216,10 @@ def test_learners_may_enter_rooms_and_choose_where_to_put() -> None:
     assert put[1]["target"] == 77
     assert put[2]["target"] == [1.0, 2.0, 0.5]
     assert all(isinstance(parse(action), Command) for action in put.values())
+
+
+def test_an_action_for_nobody_is_refused() -> None:
+    environment = env()
+    environment.reset(seed=0)
+    with pytest.raises(InputError, match=r"no agent is called 'asistant_0'; there are resident_0.*assistant_0"):
+        environment.step({"asistant_0": {"type": "wait"}})

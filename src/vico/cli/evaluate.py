@@ -219,7 +219,9 @@ def _in_store(challenge: Challenge, play: Play, options: EvaluationOptions) -> I
     store = store_at(options.out)
     if store.has("results.json") and not options.resume:
         if not options.force:
-            raise OutputExistsError(f"{store}: exists already; choose another --out, or replace it with --force")
+            raise OutputExistsError(
+                f"{store}: exists already; go on with --resume, choose another --out, or replace it with --force"
+            )
         store.remove("")
     outcomes = _played(play, store)
     with TemporaryDirectory(prefix="vico-") as temporary:

@@ -65,8 +65,7 @@ def city_of(world: World) -> Path:
     """Return the folder of a world's files for the page; made the first time, which takes some seconds."""
     from vico.viewer.city import city_folder
 
-    print("making the city's files for the page ...", file=sys.stderr, flush=True)
-    return city_folder(world)
+    return city_folder(world, making=lambda: print("making the city's files for the page ...", file=sys.stderr))
 
 
 def told(url: str) -> None:

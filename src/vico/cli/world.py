@@ -27,7 +27,7 @@ from vico.worldgen.request import BuildOptions
 from vico.worldgen.sources import Sources
 
 _DEFAULTS = BuildOptions()
-_DROPPED = "features of the map left out; manifest.json says which and why"
+_DROPPED = "features of the map left out, mended or noted; world.json says which and why"
 # What `world info` tells, in words.
 _MEANINGS = {
     "half": "metres from the middle to each side",

@@ -183,11 +183,11 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         Raises
         ------
         InputError
-            If the episode is over, or has not begun.
+            If the episode is over, or has not begun, or an action is for nobody of the environment.
         """
         if not self.agents:
             raise InputError("env: the episode is over (or has not begun); call reset() before step()")
-        short = {name: self.forms[name].decode(action) for name, action in actions.items() if name in self.forms}
+        short = {name: self.forms[self._known(name)].decode(action) for name, action in actions.items()}
         result = self.sim.step(short, agent_faults)
         if self.sim.metrics.steps >= self.max_steps:
             if len(result.observations) < len(self.agents):

@@ -37,7 +37,7 @@ def results_page(
     lines = [
         f"# {challenge.name}: {setting_words(summary.setting) or 'as it comes'}",
         "",
-        f"vico {__version__}; {len(worlds)} worlds ({', '.join(worlds)}), seeds {', '.join(map(str, seeds))}. "
+        f"vico {__version__}; worlds {', '.join(worlds)}; seeds {', '.join(map(str, seeds))}. "
         "Intervals are 95 % (Student's t, clustered by world).",
         "",
     ]

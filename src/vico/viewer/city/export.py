@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,11 @@ CITY_FORMAT = 6
 MANIFEST = "manifest.json"
 
 
-def city_folder(world: World) -> Path:
-    """Return the folder of what a browser draws of a world, writing it if it is not there."""
+def city_folder(world: World, *, making: Callable[[], None] = lambda: None) -> Path:
+    """Return the folder of what a browser draws of a world; where it is not there, call `making` and write it."""
     folder = cache_folder() / "viewer" / "cities" / f"{world.digest[:24]}-{CITY_FORMAT}-{__version__}"
     if not (folder / MANIFEST).exists():
+        making()
         folder.parent.mkdir(parents=True, exist_ok=True)
         with new_folder(folder, force=True) as members:
             write_city(world, members)
