@@ -5,23 +5,10 @@ from __future__ import annotations
 import time
 
 import pytest
-from pydantic import BaseModel, ConfigDict
 
+from asked_person import ANNA, DRAFT, GOOD, Person
 from vico.llm.objects import is_one_object, objects_in
 from vico.llm.replies import read
-
-
-class Person(BaseModel):
-    """What is asked for."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    name: str
-    age: int
-
-
-DRAFT, GOOD = '{"name": "Bea", "age": 30}', '{"name": "Anna", "age": 41}'
-ANNA = Person(name="Anna", age=41)
 
 
 @pytest.mark.parametrize(

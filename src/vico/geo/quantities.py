@@ -55,7 +55,7 @@ _UNITS: dict[Kind, dict[str, float]] = {
         **dict.fromkeys(("metern", "metros", "metri", "metrów", "mètre", "mètres", "м", "метр", "метров", "米"), 1.0),
         **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 0.01),
         **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 0.001),
-        **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1000.0),
+        **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers", "км", "公里"), 1000.0),
         **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
         **dict.fromkeys(("mi", "mile", "miles"), 1609.344),
         **dict.fromkeys(_FEET, FOOT),

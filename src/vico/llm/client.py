@@ -25,11 +25,8 @@ T = TypeVar("T", bound=BaseModel)
 
 _REFUSED = (400, 415, 422, 501)  # may be meant for a part of the request that we can do without
 _FAILED = 500  # may be meant for a schema
-_ELSEWHERE = (
-    401,
-    403,
-    404,
-)  # of keys and names, unless they speak of a part: routers look for a provider that takes it
+# Statuses of keys and names, unless they speak of a part: routers look for a provider that takes it.
+_ELSEWHERE = (401, 403, 404)
 # Parts of a request that can be left out, the likeliest to be refused first.
 _PARTS = ("response_format", "seed", "temperature", "max_tokens")
 _MOST_QUOTED = 20_000  # characters of a bad reply that are shown to the model again

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from vico.errors import MissingFileError, SchemaError
+from vico.geo.quantities import Kind, read
 from vico.io.delimited import DelimitedText, decimal, table_of
 from vico.worldgen.sources import LEAST_RADIUS, SERVICES
 
@@ -56,13 +57,8 @@ _SPELLINGS: dict[str, tuple[str, ...]] = {
     ),
     "dem": ("elevation", "elevation file"),
 }
-# Of a radius, metres.
-_UNITS = {"": 1.0, "m": 1.0, "metre": 1.0, "meter": 1.0, "km": 1000.0, "ft": 0.3048, "feet": 0.3048, "foot": 0.3048}
-_UNITS |= {"mi": 1609.344, "mile": 1609.344, "м": 1.0, "км": 1000.0, "米": 1.0, "公里": 1000.0}
 _DASHES = re.compile("[\N{MINUS SIGN}\N{EN DASH}\N{HYPHEN}]")
-_APART = re.compile(r"(?<=\d)[\s'’](?=\d{3}(?!\d))")
-_LENGTH = re.compile(r"([+-]?\d[\d.,]*)\s*([^\W\d_]*?)s?\.?", re.IGNORECASE)
-_THOUSANDS = re.compile(r"[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
+_THOUSANDS = re.compile(r"[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*(?![\d.,])")
 _UNIT_OF_HEADER = re.compile(r"(?<![^\W_])(km|ft|feet|mi)(?![^\W_])", re.IGNORECASE)
 # 52.1, 52,1°, N 52.1, 52°06'00.0"N
 _ANGLE = re.compile(
@@ -232,21 +228,22 @@ def _degrees(text: str, what: str, letters: str) -> float:
 
 
 def _radius(text: str, unit: str) -> float:
-    """Return a radius, metres (``1000``, ``1,000``, ``1.000 m``, ``0,4 km``)."""
+    """Return a radius, metres (``1000``, ``1,000``, ``1.000 m``, ``0,4 km``).
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
     if not text:
         return PlaceRow.radius
-    match = _LENGTH.fullmatch(_APART.sub("", text.strip()))
-    factor = None if match is None else _UNITS.get((match[2] or unit).lower())
-    value = None
-    if match is not None and factor is not None:
-        number = match[1]
-        if "," in number and "." in number:  # the one that comes first parts thousands
-            number = number.replace(min(",.", key=number.index), "")
-        value = decimal(number)
-        # Three digits after the separator are decimals only where that gives a world.
-        if _THOUSANDS.fullmatch(number) and (value is None or value * factor < LEAST_RADIUS):
-            value = float(re.sub(r"[.,]", "", number))
-        value = None if value is None else value * factor
+    text = re.sub(r"(?<=\d)['’](?=\d{3}(?!\d))", "", text.strip())  # "1'000" is a thousand in Switzerland, not feet
+    said = text if not unit or re.search(r"[^\W\d_]", text) else f"{text} {unit}"
+    found = read(said, Kind.LENGTH)
+    value = found.value if not found.rule or "thousands" in found.rule else None
+    # Three digits after the separator are decimals only where that gives a world.
+    if (thousands := _THOUSANDS.match(text)) and (value is None or value < LEAST_RADIUS):
+        value = read(said.replace(thousands[0], re.sub("[.,]", "", thousands[0])), Kind.LENGTH).value
     if value is None or value <= 0.0:
         raise ValueError(f"radius {text[:40]!r} is no positive number of metres")
     return value
