@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from vico.rules import BIKE_ASTRAY, BIKE_RATE, BUS_FARE
 from vico.sim import rides
 from vico.sim.actions.check import check
 from vico.sim.actions.model import Refusal
@@ -16,7 +17,6 @@ from vico.sim.config import SimConfig
 from vico.sim.overlaps import overlapping
 from vico.sim.simulation import Simulation
 from vico.sim.state import RADIUS, Posture, Vehicle
-from vico.sim.transit import BIKE_ASTRAY, BIKE_RATE, FARE
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World
 
@@ -46,7 +46,7 @@ def at_the_bus(sim: Simulation) -> None:
 def test_boarding_costs_the_fare_and_carries_one_along(sim: Simulation) -> None:
     at_the_bus(sim)
     state = act(sim, type="enter_bus")
-    assert (state["action_status"], state["vehicle"], state["cash"]) == ("ok", "bus", 50.0 - FARE)
+    assert (state["action_status"], state["vehicle"], state["cash"]) == ("ok", "bus", 50.0 - BUS_FARE)
     before = sim.state.people.position[0].copy()
     for _ in range(600):
         act(sim, type="wait")

@@ -9,11 +9,12 @@ import pytest
 from road_city import HALF, road_city
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
+from vico.rules import BUS_DWELL, BUS_FARE, ride_price
 from vico.sim.bodies import BICYCLE, RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.population import PATIENCE
-from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
+from vico.sim.transit import TransitSystem, plan_buses
 from vico.world.heights import HeightField
 
 
@@ -114,7 +115,7 @@ def empty() -> _Stands:
         for bus in range(traffic.buses):
             stop = int(transit.stop[bus])
             if transit.stopped_at(bus):
-                due[bus] = stop, transit.begun[bus] + transit.line_of(bus).travel[stop] + DWELL
+                due[bus] = stop, transit.begun[bus] + transit.line_of(bus).travel[stop] + BUS_DWELL
             elif bus in due:
                 left, when = due.pop(bus)
                 seen.early.append(when - transit.clock[0] if left else 0.0)
@@ -130,7 +131,7 @@ def test_a_bus_stands_at_a_stop_for_thirty_seconds_and_until_its_time(empty: _St
     # The first one counted was under way when the run began.
     assert empty.stood[1:]
     # What was kept of a leg's time for traffic that is not there.
-    assert all(DWELL - 0.3 < steps / 10 < DWELL + 45.0 for _, steps in empty.stood[1:])
+    assert all(BUS_DWELL - 0.3 < steps / 10 < BUS_DWELL + 45.0 for _, steps in empty.stood[1:])
 
 
 def test_a_bus_that_has_just_left_when_a_run_begins_drives_its_round() -> None:
@@ -169,7 +170,7 @@ def test_a_stopped_bus_can_be_boarded_from_the_place_to_wait() -> None:
     stop = transit.stopped_at(0)
     assert stop is not None
     assert transit.bus_at(waits[stop]) == 0
-    assert transit.board(0, 7) == FARE
+    assert transit.board(0, 7) == BUS_FARE
     assert transit.aboard(0) == 1
 
 

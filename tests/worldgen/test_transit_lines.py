@@ -15,9 +15,11 @@ from vico.geo.frame import LocalFrame
 from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, GtfsStop, Pattern
 from vico.geo.gtfs.reader import read_gtfs
 from vico.geo.osm import OsmData, OsmNode, OsmRelation, read_osm
-from vico.sim.transit import DWELL, departure, plan_buses
+from vico.rules import BUS_DWELL
+from vico.sim.transit import plan_buses
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
+from vico.world.timetable import departure
 from vico.world.transit_model import Line, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import empty_network
@@ -177,7 +179,7 @@ def test_heidelberg_drives_by_its_timetable(shared_data: Path) -> None:
 def _idle(line: Line) -> float:
     """Seconds that buses wait at their first stop for their time, after people boarded."""
     headway = float(np.median(np.diff(line.departures)))
-    round_trip = line.travel[-1] + DWELL
+    round_trip = line.travel[-1] + BUS_DWELL
     return float(np.ceil(round_trip / headway) * headway - round_trip)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from vico.agents.base import Goal, Plan, PublicMap
+from vico.agents.base import Goal, Plan
 from vico.agents.stays import Stay
 from vico.clock import DAY, clock_of
+from vico.world.public import PublicMap
 
 # Of a day, so many stays are told.
 _AHEAD = 3

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.exact import apply_matrix
+from vico.rules import BUS_FARE
 from vico.sim.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.moves import follow_hands, gesture, wrapped
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import RADIUS, RIDER_REACH, Posture, Vehicle
-from vico.sim.transit import FARE, TransitSystem
+from vico.sim.transit import TransitSystem
 from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
 
 # Who gets off a bicycle steps beside it, no farther than this, metres.
@@ -44,7 +45,7 @@ def board(i: int, state: SimulationState) -> None:
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.BUS, transit.entity_of(bus)
     p.posture[i] = Posture.SITTING if transit.is_seated(bus, i) else Posture.STANDING
     what, line, name = transit.service_of(bus)
-    state.events.add("boarding", p.names[i], f"boards {what} {name}", p.position[i], line=line, fare=FARE)
+    state.events.add("boarding", p.names[i], f"boards {what} {name}", p.position[i], line=line, fare=BUS_FARE)
     p.vehicle_yaw[i] = p.yaw[i] = transit.seat(bus, i)[2]
     p.moved[i] = 0.0
     gesture("enter_vehicle", i, state)

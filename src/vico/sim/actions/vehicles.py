@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from vico.clock import DAY, clock_of
-from vico.rules import ReasonCode
+from vico.rules import BIKE_RATE, BIKE_REACH, BUS_DOOR_REACH, BUS_FARE, ReasonCode
 from vico.sim import rides
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
-from vico.sim.transit import BIKE_RATE, BIKE_REACH, DOOR_REACH, FARE, TransitSystem
+from vico.sim.transit import TransitSystem
 
 _NEAR_STOP = 6.0  # metres from the place to wait within which a stop is told of
 _NO_TRANSIT = "this run has no transit"
@@ -28,7 +28,9 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
         if line is not None:
             said = f"enter_bus: bus {line} does not come by here: it goes round a street that is closed"
             return Refusal(ReasonCode.CLOSED, said)
-        said = f"enter_bus: no bus or tram stands with a door within {DOOR_REACH:g} m{_from_depot(i, state, transit)}"
+        said = (
+            f"enter_bus: no bus or tram stands with a door within {BUS_DOOR_REACH:g} m{_from_depot(i, state, transit)}"
+        )
         return Refusal(ReasonCode.NO_VEHICLE, said)
     if transit.ends(bus):
         what, _, name = transit.service_of(bus)
@@ -36,7 +38,7 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
     if transit.aboard(bus) >= transit.capacity(bus):
         what, _, name = transit.service_of(bus)
         return Refusal(ReasonCode.FULL, f"enter_bus: {what} {name} is full with {transit.capacity(bus)} people")
-    return _refuse_unless_paid("enter_bus", "the fare is", FARE, i, state)
+    return _refuse_unless_paid("enter_bus", "the fare is", BUS_FARE, i, state)
 
 
 def _from_depot(i: int, state: SimulationState, transit: TransitSystem) -> str:

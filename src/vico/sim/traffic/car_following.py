@@ -1,4 +1,4 @@
-"""How fast a vehicle drives: the Intelligent Driver Model behind its leader, limits and stops ahead.
+"""How fast a vehicle drives: the Intelligent Driver Model behind its leader.
 
 Treiber, Hennecke, Helbing: Congested traffic states in empirical observations and microscopic simulations (2000).
 """
@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled, inlined
+from vico.io.compiled import compiled
 from vico.sim.traffic.leader import NO_GAP
-from vico.sim.traffic.letting_in import room_to_change
 from vico.sim.traffic.path import footprint
 from vico.sim.traffic.records import NONE
-from vico.sim.traffic.route import NEVER, is_lane_of_stop
-from vico.sim.traffic.stopping import distance_to_place, speed_into_place
+from vico.sim.traffic.route import NEVER
 
 COMFORTABLE_BRAKING = 2.0  # m/s^2 on dry ground; what vehicles do now is `vehicle.braking`
 TIME_GAP = 1.2  # s on dry ground; now: `vehicle.time_gap`
@@ -21,7 +19,6 @@ CLOSING_UP = 1.2  # m nearer to its leader than usual stands who would else stan
 
 _JAM_GAP = 1.8  # m kept behind a leader that stands
 _LEAST_GAP = 0.3  # no step leaves less to the leader, m
-_BEFORE_LANE_END = 1.0  # m kept before a path's end
 _BEYOND_STOP = 3.0  # m beyond the place where a vehicle stops, others do not count
 _LEAST_SPEED = 0.02  # slower is standing, m/s
 
@@ -36,71 +33,6 @@ def look_ahead(vehicle):  # type: ignore[no-untyped-def]
 def braking_distance(vehicle):  # type: ignore[no-untyped-def]
     """Return the metres a vehicle needs to stop comfortably, and a little more."""
     return vehicle.speed * vehicle.speed / (2 * vehicle.braking) + 8.0
-
-
-@compiled
-def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
-    """Return the metres to a bus's stop if that is on its lane, or to a car's place; `NEVER` otherwise."""
-    is_here = vehicle.stop_route_index >= 0 and vehicle.route_index == vehicle.stop_route_index
-    if vehicle.route >= 0 and is_here and vehicle.stop_offset > vehicle.offset - 1.0:
-        return max(vehicle.stop_offset - vehicle.offset, 0.0)
-    return distance_to_place(vehicle)
-
-
-@inlined
-def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
-    """Return the speed a vehicle drives at on an empty lane, m/s."""
-    return speed_into_place(vehicle, min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed))
-
-
-@inlined
-def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted):  # type: ignore[no-untyped-def]
-    """Return where a vehicle has to stop and how fast it may be now.
-
-    It stops at its bus stop, before a junction it may not enter, where it lets a bus in, and at its path's end; it
-    slows down in time for lower limits ahead.
-
-    Parameters
-    ----------
-    look
-        Metres ahead that count.
-    stop_distance
-        Metres to a bus stop on its own lane, `NEVER` for none.
-    let_in_distance
-        Metres to where it lets a bus in, `NEVER` for none.
-    wanted
-        Desired speed on its own lane, m/s.
-
-    Returns
-    -------
-    tuple
-        Metres to where it stops (`NEVER` for nowhere), and the most speed, m/s.
-    """
-    limit_now = wanted
-    ahead = net.lanes[vehicle.lane].length - vehicle.offset
-    stop = stop_distance
-    is_bus = vehicle.route >= 0
-    for k in range(vehicle.planned_count):
-        if stop < NEVER or ahead > look:
-            break
-        lane = vehicle.planned_lanes[k]
-        if net.lanes[lane].junction >= 0 and k >= vehicle.granted_count:
-            stop = max(ahead - net.lanes[vehicle.lane if k == 0 else vehicle.planned_lanes[k - 1]].stop_line, 0.0)
-            break
-        limit = min(net.lanes[lane].speed * vehicle.speed_factor, vehicle.target_speed if is_bus else wanted)
-        limit_now = min(limit_now, np.sqrt(limit * limit + 2 * vehicle.braking * max(ahead, 0.0)))
-        if is_lane_of_stop(net, vehicle, k + 1):
-            stop = ahead + vehicle.stop_offset
-        ahead += net.lanes[lane].length
-    if is_bus and stop >= NEVER:
-        # The route goes on in the lane beside: wait for room to change.
-        ahead -= room_to_change(net, vehicle) if vehicle.planned_count == 0 else _BEFORE_LANE_END
-        if ahead < look:
-            stop = max(ahead, 0.0)
-    stop = min(stop, let_in_distance)
-    if stop < NEVER:
-        limit_now = min(limit_now, np.sqrt(2 * vehicle.braking * stop))
-    return stop, limit_now
 
 
 @compiled

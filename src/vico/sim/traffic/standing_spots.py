@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from vico.sim.traffic.records import NONE, SPOT, STOP, TALK, WINDOW, Records
 from vico.sim.traffic.state import WalkwayNetwork
 from vico.world.model import Category, Point2
-from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.walkable import CROSSING as CROSSING_CLASS
+from vico.world.walkable import ROADWAY
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.world.world import World
 
@@ -222,7 +223,7 @@ def _add_stop(
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     points = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))] + np.array(wait)
     free = (world.walkable.clearance_at(points) >= _STOP_ROOM) & world.walkable.is_connected(points)
-    free &= ~np.isin(world.walkable.class_at(points), (ROADWAY, CROSSING))
+    free &= ~np.isin(world.walkable.class_at(points), (ROADWAY, CROSSING_CLASS))
     beside = -np.sin(pose[2]) * (points[:, 0] - pose[0]) + np.cos(pose[2]) * (points[:, 1] - pose[1])
     free &= np.abs(beside) > _FROM_LANE
     spots = shapely.points(points)

@@ -15,14 +15,11 @@ from vico.sim.traffic.backing_up import leaves_room_for, vehicles_backing_up
 from vico.sim.traffic.car_following import (
     CLOSING_UP,
     braking_distance,
-    desired_speed,
-    distance_to_stop,
     idm_acceleration,
     leader_speed,
     look_ahead,
     mind_only_before,
     next_speed,
-    stop_and_speed_limit,
 )
 from vico.sim.traffic.car_parks import stay_in_car_park
 from vico.sim.traffic.claims import holds_junction, note_claims, release_all_junctions, release_junctions
@@ -46,7 +43,7 @@ from vico.sim.traffic.leader import (
     touched_at,
     touches,
 )
-from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in
+from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in, room_to_change
 from vico.sim.traffic.lights import shown_lights
 from vico.sim.traffic.moving import move_vehicle
 from vico.sim.traffic.path import (
@@ -61,9 +58,23 @@ from vico.sim.traffic.path import (
 )
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.records import APPROACHING, AWAY, DRIVING, NONE, PRESENT
-from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lanes, step_back_lane
+from vico.sim.traffic.route import (
+    NEVER,
+    advance_lane,
+    can_step_back,
+    is_lane_of_stop,
+    plan_lanes,
+    step_back_lane,
+)
 from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
-from vico.sim.traffic.stopping import choose_place, come_to_place, is_behind_delivery, stay_at_place
+from vico.sim.traffic.stopping import (
+    choose_place,
+    come_to_place,
+    distance_to_place,
+    is_behind_delivery,
+    speed_into_place,
+    stay_at_place,
+)
 from vico.sim.traffic.track_crossings import asks_with_track, distance_to_track, look_over, track_ahead, waits_for_tram
 
 STANDING = 0.1  # slower is standing, m/s ...
@@ -76,6 +87,7 @@ _OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks f
 _KEEPS_OUT_FOR = 60.0  # s of waiting for which others stay back on the lane whose vehicles are in its way
 _BEFORE_JUNCTION = 1.0  # m before a lane's end at which a bus taken out of a jam goes on
 _COMING_BACK = 8.0  # m before and behind a bus that are free where it comes back
+_BEFORE_LANE_END = 1.0  # m kept before a path's end
 _BEYOND_JUNCTION = 60.0  # m seen beyond a junction that is asked for
 
 
@@ -180,6 +192,71 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             choose_place(net, fleet, vehicle)
             continue
         _change_lane(net, fleet, vehicle, view, stop_distance, (leader, gap, leading, wanted))
+
+
+@compiled
+def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
+    """Return the metres to a bus's stop if that is on its lane, or to a car's place; `NEVER` otherwise."""
+    is_here = vehicle.stop_route_index >= 0 and vehicle.route_index == vehicle.stop_route_index
+    if vehicle.route >= 0 and is_here and vehicle.stop_offset > vehicle.offset - 1.0:
+        return max(vehicle.stop_offset - vehicle.offset, 0.0)
+    return distance_to_place(vehicle)
+
+
+@inlined
+def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return the speed a vehicle drives at on an empty lane, m/s."""
+    return speed_into_place(vehicle, min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed))
+
+
+@inlined
+def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted):  # type: ignore[no-untyped-def]
+    """Return where a vehicle has to stop and how fast it may be now.
+
+    It stops at its bus stop, before a junction it may not enter, where it lets a bus in, and at its path's end; it
+    slows down in time for lower limits ahead.
+
+    Parameters
+    ----------
+    look
+        Metres ahead that count.
+    stop_distance
+        Metres to a bus stop on its own lane, `NEVER` for none.
+    let_in_distance
+        Metres to where it lets a bus in, `NEVER` for none.
+    wanted
+        Desired speed on its own lane, m/s.
+
+    Returns
+    -------
+    tuple
+        Metres to where it stops (`NEVER` for nowhere), and the most speed, m/s.
+    """
+    limit_now = wanted
+    ahead = net.lanes[vehicle.lane].length - vehicle.offset
+    stop = stop_distance
+    is_bus = vehicle.route >= 0
+    for k in range(vehicle.planned_count):
+        if stop < NEVER or ahead > look:
+            break
+        lane = vehicle.planned_lanes[k]
+        if net.lanes[lane].junction >= 0 and k >= vehicle.granted_count:
+            stop = max(ahead - net.lanes[vehicle.lane if k == 0 else vehicle.planned_lanes[k - 1]].stop_line, 0.0)
+            break
+        limit = min(net.lanes[lane].speed * vehicle.speed_factor, vehicle.target_speed if is_bus else wanted)
+        limit_now = min(limit_now, np.sqrt(limit * limit + 2 * vehicle.braking * max(ahead, 0.0)))
+        if is_lane_of_stop(net, vehicle, k + 1):
+            stop = ahead + vehicle.stop_offset
+        ahead += net.lanes[lane].length
+    if is_bus and stop >= NEVER:
+        # The route goes on in the lane beside: wait for room to change.
+        ahead -= room_to_change(net, vehicle) if vehicle.planned_count == 0 else _BEFORE_LANE_END
+        if ahead < look:
+            stop = max(ahead, 0.0)
+    stop = min(stop, let_in_distance)
+    if stop < NEVER:
+        limit_now = min(limit_now, np.sqrt(2 * vehicle.braking * stop))
+    return stop, limit_now
 
 
 @inlined

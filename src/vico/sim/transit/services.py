@@ -11,11 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from vico.assets.bus import BUS_FLOOR, BUS_SIZE, bus_places
 from vico.assets.tram import TRAM_FLOOR, tram_places
 from vico.errors import InputError
-from vico.rules import BUS_CAPACITY as CAPACITY
-from vico.rules import BUS_DOOR_REACH as DOOR_REACH
-from vico.rules import BUS_DWELL as DWELL
-from vico.rules import BUS_FARE as FARE
-from vico.rules import TRAM_SECTIONS
+from vico.rules import BUS_CAPACITY, BUS_DOOR_REACH, BUS_DWELL, BUS_FARE, TRAM_SECTIONS
 from vico.sim.traffic import Traffic
 from vico.sim.transit.bus_plan import BusPlan
 from vico.sim.transit.trams import AWAY, Trams
@@ -38,7 +34,7 @@ class Services:
         Index in its line of the stop each bus stands at or drives to.
     riders
         Who is at each place of each bus, seats first (`vico.assets.bus.bus_places`), -1 for nobody, int32, shape
-        ``(buses, CAPACITY)``; the caller's numbers.
+        ``(buses, BUS_CAPACITY)``; the caller's numbers.
     open
         How far each bus's doors are open, 0..1.
     trams
@@ -50,9 +46,9 @@ class Services:
         self._plan = plan
         buses = traffic.buses
         self._vehicle = np.arange(traffic.cars, traffic.cars + buses)
-        self.dwell = np.full(buses, DWELL / 2)
+        self.dwell = np.full(buses, BUS_DWELL / 2)
         self.stop = np.array(plan.first_stops, np.int32)
-        self.riders = np.full((buses, CAPACITY), -1, np.int32)
+        self.riders = np.full((buses, BUS_CAPACITY), -1, np.int32)
         self.open = np.ones(buses)
 
     def stopped_at(self, bus: int) -> str | None:
@@ -165,7 +161,7 @@ class Services:
     def _place_of(self, bus: int, rider: int) -> int:
         return int(np.flatnonzero(self._riders_of(bus) == rider)[0])
 
-    def bus_at(self, xy: ArrayLike, reach: float = DOOR_REACH) -> int | None:
+    def bus_at(self, xy: ArrayLike, reach: float = BUS_DOOR_REACH) -> int | None:
         """Return the bus that stands at a stop with the nearest door within `reach` of a point; None without one."""
         point = np.asarray(xy, np.float64)[:2]
         best: tuple[float, int] | None = None
@@ -190,7 +186,7 @@ class Services:
         if self.aboard(bus) >= self.capacity(bus):
             raise InputError("enter_bus: the bus is full")
         self.take_in(bus, rider)
-        return FARE
+        return BUS_FARE
 
     def take_in(self, bus: int, rider: int) -> None:
         """Give a rider the first free place; there has to be one."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.bus import bus_door_leaves, bus_leaf
 from vico.assets.vehicles import vehicle_prototypes
-from vico.rules import BUS_DWELL as DWELL
+from vico.rules import BUS_DWELL
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.state import FIRST_TRAM
 from vico.sim.traffic import Traffic
@@ -143,9 +143,9 @@ class TransitSystem(Services):
             holds = bool(at_stop[v]) and self._holds_doors(bus)
             self.open[bus] = moved_doors(float(self.open[bus]), holds, dt)
             if not at_stop[v]:
-                self.dwell[bus] = DWELL
+                self.dwell[bus] = BUS_DWELL
                 continue
-            if self.dwell[bus] == DWELL:
+            if self.dwell[bus] == BUS_DWELL:
                 self._note_arrival(bus)
                 if self.passengers is not None:
                     self.passengers.arrive(bus)
@@ -188,7 +188,7 @@ class TransitSystem(Services):
 
     def _mind_depot(self, bus: int, v: int) -> None:
         """Call a bus in the depot back shortly before the departure that it is to take."""
-        self.dwell[bus], self.open[bus] = DWELL / 2, 0.0  # a stop there is no arrival
+        self.dwell[bus], self.open[bus] = BUS_DWELL / 2, 0.0  # a stop there is no arrival
         soon = float(self.clock[0]) + DEPOT_UNTIL
         self.traffic.call_back(v, self._next_departure(bus) <= soon and self.comes_from_depot(bus) <= soon)
 
@@ -267,14 +267,14 @@ class TransitSystem(Services):
     def may_leave_stop(self, bus: int) -> bool:
         """Return whether a bus that stands at a stop leaves it now.
 
-        It dwells for `DWELL` seconds, and until the time that the timetable has it leave at, if that is not past.
+        It dwells for `BUS_DWELL` seconds, and until the time that the timetable has it leave at, if that is not past.
         """
         return bool(self.dwell[bus] <= 0.0 and self.clock[0] >= self._departs(bus))
 
     def _departs(self, bus: int) -> float:
         """Return when a bus is to leave its stop, seconds: the first at the next departure that no other has taken."""
         stop = int(self.stop[bus])
-        return self._due(bus, stop) + DWELL if stop else self._next_departure(bus)
+        return self._due(bus, stop) + BUS_DWELL if stop else self._next_departure(bus)
 
     def _next_departure(self, bus: int) -> int:
         """Return the departure a bus at its first stop is to take, seconds."""
