@@ -27,7 +27,7 @@ from scipy.ndimage import distance_transform_edt
 from vico.assets.robots import robot_names
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.physics import engine_names
-from vico.sim.physics.frames import COARSE, FINE
+from vico.sim.physics.records import COARSE, FINE
 from vico.sim.robots import RobotPopulation, RobotScene
 from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK

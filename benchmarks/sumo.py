@@ -27,8 +27,8 @@ from reporting import machine, publish
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
-from vico.sim.traffic.junction_rule import JunctionRule
-from vico.sim.traffic.records import TOP_SPEED
+from vico.sim.traffic.junctions import JunctionRule
+from vico.sim.traffic.state import TOP_SPEED
 from vico.world.folder import read_world
 from vico.world.lanes import LaneGraph
 from vico.world.world import World

@@ -21,7 +21,7 @@ from vico.sim.base import SimulationBase
 from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
-from vico.sim.traffic.records import RED
+from vico.sim.traffic.state import RED
 from vico.world.folder import read_world
 
 _STANDS = 60.0  # s of standing from which on a car counts as one that gets nowhere

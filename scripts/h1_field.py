@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from vico.assets.robots.h1 import JOINTS, REST, STAND, STRIDE, h1_mjcf, limit_of
 from vico.io.compiled import compiled
 from vico.sim.physics.mujoco_model import FRICTION, _set_options
-from vico.sim.robots.tracking import planar_motion
-from vico.sim.robots.two_legs import (
+from vico.sim.robots.biped import (
     ACTION,
     COMMAND,
     LEG,
@@ -31,6 +30,7 @@ from vico.sim.robots.two_legs import (
     leg_targets,
     observe,
 )
+from vico.sim.robots.controller import planar_motion
 
 PERIOD = 0.02
 FIELD, CELL = 64.0, 0.5

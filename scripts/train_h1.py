@@ -2,7 +2,7 @@
 
     OPENBLAS_NUM_THREADS=1 python scripts/train_h1.py --out runs/h1 --minutes 60 [--threads 1] [--seed 1]
 
-The network corrects the plain steps of `vico.sim.robots.two_legs` and sees what it will see there; kernels are shared.
+The network corrects the plain steps of `vico.sim.robots.biped` and sees what it will see there; kernels are shared.
 Robots train on a field of level ground, slopes, kerbs as the ground of a world has them, and bumps; they are pushed,
 and friction and the length of physics' steps vary. Writes `policy.npz` and `curve.csv` after every 20 iterations.
 """
@@ -22,7 +22,7 @@ import numpy as np
 from h1_field import PERIOD, TERMS, Field
 from numpy.typing import NDArray
 
-from vico.sim.robots.two_legs import LEGS, OBSERVED
+from vico.sim.robots.biped import LEGS, OBSERVED
 
 GAMMA, LAMBDA, CLIP, STEPS = 0.985, 0.95, 0.2, 48
 

@@ -12,9 +12,8 @@ from road_city import HALF, road_city
 from vico.sim.bodies import PEDESTRIAN, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
-from vico.sim.traffic.car_park_ways import places_in_car_parks
-from vico.sim.traffic.records import APPROACHING, BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, STANDING
-from vico.sim.traffic.stopping_places import with_places
+from vico.sim.traffic.state import APPROACHING, BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, STANDING
+from vico.sim.traffic.stopping_places import places_in_car_parks, with_places
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
 from vico.world.street_model import ParkingSpot

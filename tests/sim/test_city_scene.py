@@ -20,7 +20,7 @@ from vico.sim.city_scene import CityRenderer, Neighbourhood
 from vico.sim.config import SimConfig
 from vico.sim.drawn_people import DrawnPeople
 from vico.sim.physics import mujoco_scene
-from vico.sim.physics.city_chunks import CityChunks, surroundings_of
+from vico.sim.physics.surroundings import CityChunks, surroundings_of
 from vico.sim.rooms_in_sight import RoomsInSight
 from vico.sim.simulation import Simulation
 from vico.world.city_silhouettes import CitySilhouettes

@@ -13,8 +13,8 @@ from vico.sim.config import SimConfig
 from vico.sim.passers_by import pedestrian_motion
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
-from vico.sim.traffic.records import STOP
-from vico.sim.traffic.walking_gaits import PedestrianGaits
+from vico.sim.traffic.drawing import PedestrianGaits
+from vico.sim.traffic.state import STOP
 from vico.world.world import World
 
 

@@ -6,8 +6,7 @@ from helsinki_traffic import traffic_by
 from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule, Traffic
-from vico.sim.traffic.companions import note_distance
-from vico.sim.traffic.leaving import leave_crossing
+from vico.sim.traffic.pedestrian_routes import leave_crossing, note_distance
 from vico.sim.traffic.pedestrians import asked_to_go
 from vico.world.walkways import CORNER, CROSSING
 

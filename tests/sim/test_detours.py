@@ -8,7 +8,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic
 from vico.sim.transit import TransitSystem, plan_buses
-from vico.sim.transit.detours import round_past
+from vico.sim.transit.buses import round_past_closures
 from vico.world.heights import HeightField
 
 # When bus 0 drives to its third stop, which the street that is shut cuts off.
@@ -45,7 +45,7 @@ def _advance(traffic: Traffic, transit: TransitSystem, seconds: int) -> list[int
 def test_a_way_round_is_driveable_keeps_the_order_and_leaves_what_is_shut() -> None:
     _, transit, shut = _systems()
     lanes, plan = road_city().lanes, transit._plan
-    found = round_past(plan.routes[0], plan.places[0][0], shut, lanes)
+    found = round_past_closures(plan.routes[0], plan.places[0][0], shut, lanes)
     assert found is not None
     assert not shut[list(found.lanes)].any()
     for here, there in zip(found.lanes, (*found.lanes[1:], found.lanes[0]), strict=True):
@@ -53,7 +53,7 @@ def test_a_way_round_is_driveable_keeps_the_order_and_leaves_what_is_shut() -> N
     kept = [at for at in found.origin if at >= 0]
     assert kept == sorted(kept)
     assert [plan.routes[0][at] for at in kept] == [one for one, at in zip(*found, strict=True) if at >= 0]
-    assert round_past(plan.routes[0], plan.places[0][0], np.zeros(len(lanes), bool), lanes) is None
+    assert round_past_closures(plan.routes[0], plan.places[0][0], np.zeros(len(lanes), bool), lanes) is None
 
 
 def test_a_bus_goes_round_a_shut_street_skips_what_it_cannot_reach_and_comes_back() -> None:

@@ -12,9 +12,8 @@ from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotMode, RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.airspace import CEILING, OVER, Airspace
-from vico.sim.robots.rotors import FlightPhase
-from vico.sim.robots.wind import air_at, gusts_of
+from vico.sim.robots.path_planning import CEILING, OVER, Airspace
+from vico.sim.robots.quadrotor import FlightPhase, air_at, gusts_of
 from vico.sim.simulation import Simulation
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World

@@ -8,9 +8,9 @@ import pytest
 from robot_field import ENGINES, HALF, field, people
 from vico.sim.bodies import Bodies
 from vico.sim.robots import RobotMode, RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.airspace import CEILING
-from vico.sim.robots.batteries import EXCHANGE
-from vico.sim.robots.rotors import Flight, FlightPhase
+from vico.sim.robots.hardware import EXCHANGE
+from vico.sim.robots.path_planning import CEILING
+from vico.sim.robots.quadrotor import Flight, FlightPhase
 from vico.world.heights import HeightField
 
 #: A house of 4.5 m: middle, extents.

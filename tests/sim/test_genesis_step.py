@@ -36,7 +36,7 @@ PERSON = Bodies(
 
 @pytest.mark.parametrize("name", [engine for engine in ENGINES if getattr(engine, "values", ())[:1] == ("genesis",)])
 def test_a_step_is_that_of_genesis_and_finds_the_same_contacts(name: str) -> None:
-    from vico.sim.physics.genesis_contacts import read_contacts
+    from vico.sim.physics.genesis_scene import read_contacts
 
     models = tuple(robot_model(kind, packs=False) for kind in ("husky", "go2"))
     built: Any = make_scene(name, STATIC, models, Capacity(people=3, vehicles=2, objects=2))

@@ -13,8 +13,7 @@ from vico.assets.robots import robot_model
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.standing import sole
-from vico.sim.robots.two_legs import STEPPING
+from vico.sim.robots.biped import STEPPING, sole_slope
 from vico.world.heights import HeightField, Steps
 
 
@@ -164,7 +163,9 @@ def test_it_feels_its_soles_where_they_are() -> None:
             foot = data.body(f"{side}_ankle")
             height = float(foot.xpos[2] + foot.xmat.reshape(3, 3)[2] @ model.controller.places[-1])
             slope = -float(np.arcsin(foot.xmat[6]))
-            found = sole(model.controller.places, rotation, data.qpos[7 + 5 * leg : 12 + 5 * leg], 1.0 - 2.0 * leg)
+            found = sole_slope(
+                model.controller.places, rotation, data.qpos[7 + 5 * leg : 12 + 5 * leg], 1.0 - 2.0 * leg
+            )
             assert found == pytest.approx((slope, height), abs=1e-9)
 
 

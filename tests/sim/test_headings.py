@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vico.sim.traffic.follow_point import FollowPoint
+from vico.sim.traffic.pedestrian_routes import FollowPoint
 from vico.sim.traffic.pedestrians import best_heading, may_step_to
 from vico.sim.traffic.shapes import Shapes
 

@@ -8,7 +8,7 @@ import pytest
 from robot_field import field
 from vico.assets.shapes import box
 from vico.sim.config import SimConfig
-from vico.sim.physics.loose import ENTER, LEAVE
+from vico.sim.physics.surroundings import ENTER, LEAVE
 from vico.sim.simulation import Simulation
 from vico.world.world import World
 

@@ -9,7 +9,7 @@ from vico.kinematics.arm import hand_pose, reach_pose
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.work import Stage
+from vico.sim.robots.manipulator import TaskStage
 from vico.sim.simulation import Simulation
 
 SIZE = (0.12, 0.18, 0.2)
@@ -182,7 +182,7 @@ def test_from_before_a_carrier_it_goes_beside_it_to_reach_the_deck(engine: str) 
     while not robots.run.work[0].arrays.held[0, 0]:
         sim.advance(1.0)
     work, beside = robots.run.work[0].arrays, []
-    sim.state.on_substep = lambda: beside.append(objects.position[0, 2]) if work.stage[0] == Stage.ALIGN else None
+    sim.state.on_substep = lambda: beside.append(objects.position[0, 2]) if work.stage[0] == TaskStage.ALIGN else None
     robots.place(0, int(robots.entities[1]))
     assert until_done(sim, 60)
     assert min(beside) > 0.6

@@ -7,7 +7,7 @@ import pytest
 
 from vico.errors import InputError
 from vico.sim.physics import Capacity, PhysicsEngine, StaticScene, make_scene
-from vico.sim.physics.object_parts import box_parts, parts_of
+from vico.sim.physics.collision_shapes import box_parts, parts_of
 from vico.sim.physics.records import BALL, BOX, CYLINDER, RigidObject, RigidPart
 from vico.world.heights import HeightField
 

@@ -9,8 +9,7 @@ import pytest
 
 from vico.assets.robots import robot_model
 from vico.sim.physics.records import Base
-from vico.sim.robots.navigation import NEIGHBOUR
-from vico.sim.robots.path_follower import PathFollower
+from vico.sim.robots.path_following import NEIGHBOUR, PathFollower
 
 NOBODY = np.zeros(0, NEIGHBOUR)
 DT = 0.1

@@ -11,12 +11,11 @@ from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
-from vico.sim.physics import StaticScene, factory, make_engine, make_scene
-from vico.sim.physics.frames import COARSE, FINE, FrameCount, FrameNeeds, frame_length
+from vico.sim.physics import StaticScene, engine, make_engine, make_scene
+from vico.sim.physics.collision_shapes import SolidCells, find_near
 from vico.sim.physics.mujoco_engine import MujocoEngine
 from vico.sim.physics.mujoco_physics import MujocoScene
-from vico.sim.physics.records import PhysicsError
-from vico.sim.physics.solids import SolidCells, find_near
+from vico.sim.physics.records import COARSE, FINE, FrameCount, FrameNeeds, PhysicsError, frame_length
 from vico.sim.physics.surroundings import convex_parts
 from vico.sim.robots import RobotPopulation
 from vico.world.heights import HeightField
@@ -123,7 +122,7 @@ def test_an_engine_nobody_knows_and_one_that_is_not_installed_are_refused(monkey
     scene = StaticScene(HeightField.flat(50.0))
     with pytest.raises(InputError, match="no engine 'bullet'; choose among genesis, mujoco"):
         make_scene("bullet", scene, [])
-    monkeypatch.setitem(factory._ENGINES, "warp", ("no_such_package", "pip install vico[warp]", "x", "y"))
+    monkeypatch.setitem(engine._ENGINES, "warp", ("no_such_package", "pip install vico[warp]", "x", "y"))
     with pytest.raises(InputError, match=r"needs the package no_such_package.*: pip install vico\[warp\]"):
         make_scene("warp", scene, [])
 

@@ -11,8 +11,7 @@ from vico.assets.robots import ActionSpace, NoController, RobotModel, Sensors, r
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import CAR, OBJECT, RESIDENT, Bodies
 from vico.sim.physics import Capacity, PhysicsEngine, PhysicsScene, StaticScene, make_scene
-from vico.sim.physics.frames import COARSE, FINE
-from vico.sim.physics.records import Party, RigidObject
+from vico.sim.physics.records import COARSE, FINE, Party, RigidObject
 from vico.world.heights import HeightField
 
 FLAT = HeightField.flat(50.0)

@@ -12,7 +12,7 @@ from road_city import HALF
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
 from vico.sim.traffic import Traffic, TrafficSetup
-from vico.sim.traffic.placed import placed_traffic
+from vico.sim.traffic.placement import placed_traffic
 from vico.world.heights import HeightField
 from vico.world.walkways import SIDEWALK
 

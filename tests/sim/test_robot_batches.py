@@ -6,7 +6,7 @@ import pytest
 from robot_field import PACKS
 from vico.assets.robots import robot_model
 from vico.sim.physics.records import Motion
-from vico.sim.robots.controllers import controller_for
+from vico.sim.robots.scene import controller_for
 
 
 def motion(kind: str, packs: bool, count: int) -> Motion:

@@ -6,7 +6,7 @@ import pytest
 from robot_field import HALF, field, people
 from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
-from vico.sim.robots.navigation import NEIGHBOUR, SIGHT, NearbyBodies, free_ahead
+from vico.sim.robots.path_following import NEIGHBOUR, SIGHT, NearbyBodies, free_ahead
 from vico.world.heights import HeightField
 
 HALF_LENGTH, HALF_WIDTH = 0.25, 0.3

@@ -7,8 +7,8 @@ from robot_field import field
 from vico.assets.robots import robot_names
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.robots import RobotPopulation, decisions
-from vico.sim.robots.batteries import EXCHANGE, watch_batteries
+from vico.sim.robots import RobotPopulation, commands
+from vico.sim.robots.hardware import EXCHANGE, watch_batteries
 from vico.sim.simulation import Simulation
 from vico.world.walkable import CROSSING, ROADWAY, SIDEWALK
 
@@ -117,11 +117,11 @@ def test_errands_end_with_a_low_battery_but_not_where_vehicles_drive(monkeypatch
     made = RobotPopulation(field(), ("husky",), [[0, 0, 0]], packs=False)
     made.run.arrays.errand[0] = 1
     asked = []
-    monkeypatch.setattr(decisions, "next_errand", lambda run, robot: asked.append(robot))
+    monkeypatch.setattr(commands, "errand_path", lambda run, robot: asked.append(robot))
     ground = made.run.scene.world.walkable
     for charge, below, goes in ((0.5, SIDEWALK, 1), (0.05, SIDEWALK, 0), (0.05, ROADWAY, 1), (0.05, CROSSING, 1)):
         monkeypatch.setattr(type(ground), "class_of", lambda self, x, y, below=below: below)
         made.run.arrays.charge[0] = charge
         asked.clear()
-        decisions._rest(made.run, 0, 6.0)
+        commands._rest(made.run, 0, 6.0)
         assert len(asked) == goes

@@ -8,7 +8,7 @@ from vico.sim.bodies import CAR, Bodies
 from vico.sim.config import SimConfig
 from vico.sim.environment.agenda import EventEffects
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.ways import way_to
+from vico.sim.robots.trips import outdoor_path
 from vico.sim.simulation import Simulation
 from vico.world.heights import HeightField
 from vico.world.walkable import ROADWAY
@@ -49,7 +49,7 @@ def test_ways_lead_round_ground_that_is_too_steep() -> None:
     slope = np.where(y > 12.0, 0.1, 0.25)
     hill = HeightField(np.clip((x - 5.0) * slope, 0.0, 1.0).astype(np.float32), HALF)
     robots = RobotPopulation(field(height=hill), ["manipulator", "husky"], [[0, 0, 0], [0, -6, 0]], packs=False)
-    straight, round_it = (way_to(robots.run, robot, np.array([19.0, -3.0])) for robot in (1, 0))
+    straight, round_it = (outdoor_path(robots.run, robot, np.array([19.0, -3.0])) for robot in (1, 0))
     assert straight is not None
     assert round_it is not None
     assert straight[:, 1].max() < 0.0

@@ -15,7 +15,7 @@ from vico.errors import InputError
 from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation, RobotStatus
-from vico.sim.robots.gait import LegGeometry, leg_angles
+from vico.sim.robots.quadruped import LegGeometry, leg_angles
 from vico.sim.simulation import Simulation
 from vico.world.heights import HeightField
 

@@ -12,8 +12,8 @@ from vico.assets.robots import robot_model
 from vico.sim.config import SimConfig
 from vico.sim.moves import place_in_room
 from vico.sim.overlaps import overlaps_of
-from vico.sim.robots import decisions
-from vico.sim.robots.rooms import fits_doors
+from vico.sim.robots import commands
+from vico.sim.robots.path_planning import fits_doors
 from vico.sim.simulation import Simulation
 from vico.world.model import LIFT, Doorway, Room
 from vico.world.world import World
@@ -194,7 +194,7 @@ def test_with_something_in_its_hand_a_robot_waits_outside_for_whom_it_follows(mo
     sim, husky = simulation("mujoco", ("husky",)), "robot_0"
     place_in_room(0, sim.state.indoor.index["r_back"], sim.state, near=np.array([-1.0, 9.0]))
     with monkeypatch.context() as patch:
-        patch.setattr(decisions, "in_hand", lambda run, robot: 7)
+        patch.setattr(commands, "object_in_hand", lambda run, robot: 7)
         go(sim, {husky: {"type": "follow", "agent": "assistant_0"}}, 30, "in r_back")
         assert room_of(sim, husky) == ""
     go(sim, {}, 60, "in r_back")

@@ -9,7 +9,7 @@ from robot_field import ENGINES, field, people
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.config import PHYSICS_ENGINES, SimConfig
-from vico.sim.physics import factory
+from vico.sim.physics import engine
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.simulation import Simulation
 
@@ -112,9 +112,9 @@ def test_a_population_restored_on_its_way_goes_on_bit_for_bit(scene: RobotScene,
 
 
 def test_engines_that_are_not_there_are_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert tuple(factory.known_engines()) == PHYSICS_ENGINES
+    assert tuple(engine.known_engines()) == PHYSICS_ENGINES
     with pytest.raises(InputError, match="no physics 'bullet'; choose among mujoco, genesis"):
         SimConfig(physics="bullet")
-    monkeypatch.setattr(factory, "find_spec", lambda name: None)
+    monkeypatch.setattr(engine, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"'genesis' needs the package genesis.*pip install '.*\[genesis\]'"):
         Simulation(WORLD, None, SimConfig(robots=("husky",), physics="genesis", observe=()))

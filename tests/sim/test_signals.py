@@ -12,8 +12,8 @@ from vico.agents.wayfinding import shows_red
 from vico.errors import SchemaError
 from vico.sim.bodies import Bodies
 from vico.sim.traffic import JunctionRule, Traffic
-from vico.sim.traffic.records import AMBER, DARK, GREEN, RED
 from vico.sim.traffic.signals import SignalClock
+from vico.sim.traffic.state import AMBER, DARK, GREEN, RED
 from vico.world.lane_reader import read_lanes
 
 NOWHERE = Bodies.none()

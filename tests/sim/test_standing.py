@@ -12,8 +12,8 @@ from road_city import HALF, road_city
 from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
-from vico.sim.traffic.records import STOP, TALK
-from vico.sim.traffic.standing_spots import with_spots
+from vico.sim.traffic.state import STOP, TALK
+from vico.sim.traffic.stopping_places import with_spots
 from vico.sim.transit import TransitSystem, plan_buses
 from vico.world.heights import HeightField
 from vico.world.walkable import OPEN, WalkableMap

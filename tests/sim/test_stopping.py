@@ -14,7 +14,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.lights import LEFT, RIGHT
-from vico.sim.traffic.records import APPROACHING, BACKING_IN, DRIVING, LEAVING, NONE, STANDING, STOPPING_PLACE
+from vico.sim.traffic.state import APPROACHING, BACKING_IN, DRIVING, LEAVING, NONE, STANDING, STOPPING_PLACE
 from vico.sim.traffic.stopping_places import with_places, with_stopping_places
 from vico.world.heights import HeightField
 

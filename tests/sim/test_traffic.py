@@ -11,12 +11,11 @@ from vico.errors import InputError
 from vico.sim.bodies import OBJECT, RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
-from vico.sim.traffic.backing_up import vehicles_backing_up
+from vico.sim.traffic.jams import vehicles_backing_up
 from vico.sim.traffic.pedestrians import place_pedestrian
-from vico.sim.traffic.records import Records
 from vico.sim.traffic.route import step_back_lane
 from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.state import LaneNetwork, new_fleet
+from vico.sim.traffic.state import LaneNetwork, Records, new_fleet
 from vico.world.heights import HeightField
 from vico.world.walkways import SIDEWALK
 

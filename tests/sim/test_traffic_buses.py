@@ -7,10 +7,10 @@ from road_city import HALF, road_city
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
-from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in, room_to_change
+from vico.sim.traffic.lane_change import distance_to_let_in, places_to_let_in, room_to_change
+from vico.sim.traffic.network import BEFORE_JUNCTION, stop_lines
 from vico.sim.traffic.population import PATIENCE
 from vico.sim.traffic.state import BusRoutes
-from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, stop_lines
 from vico.sim.transit import plan_buses
 from vico.world.heights import HeightField
 

@@ -6,10 +6,10 @@ from helsinki_traffic import network
 from road_city import HALF
 from vico.sim.bodies import Bodies
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
-from vico.sim.traffic.placed import placed_traffic
-from vico.sim.traffic.records import TRACK_CROSSING
+from vico.sim.traffic.placement import placed_traffic
 from vico.sim.traffic.route import STANDING_ROOM
-from vico.sim.transit.tram_crossings import TramCrossings
+from vico.sim.traffic.state import TRACK_CROSSING
+from vico.sim.transit.tram_network import TramCrossings
 from vico.world.heights import HeightField
 from vico.world.rails import Track
 

@@ -5,8 +5,8 @@ import numpy as np
 from helsinki_traffic import traffic_by
 from road_city import road_city
 from vico.sim.traffic import JunctionRule
-from vico.sim.traffic.records import AMBER, GREEN, RED
-from vico.sim.transit.tram_signals import TramSignal, metres_to_signal, signals_of
+from vico.sim.traffic.state import AMBER, GREEN, RED
+from vico.sim.transit.tram_network import TramSignal, metres_to_signal, signals_of
 from vico.sim.transit.trams import Trams
 
 EIGHT = 8 * 3600

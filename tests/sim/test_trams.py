@@ -22,8 +22,7 @@ from vico.sim.simulation import Simulation
 from vico.sim.state import Posture, Vehicle
 from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.system import TransitSystem
-from vico.sim.transit.tram_network import TramNetwork
-from vico.sim.transit.tram_zones import zones_of
+from vico.sim.transit.tram_network import TramNetwork, zones_of
 from vico.world.public import PublicMap
 from vico.world.rails import TRAM_LENGTH, Track
 from vico.world.transit_model import TramLine, TramStop

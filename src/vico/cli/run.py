@@ -44,7 +44,7 @@ from vico.sim.recording.checkpoints import checkpoint_steps
 from vico.sim.recording.manifest import read_manifest
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.sim.simulation import Simulation
-from vico.sim.traffic.starting import NoRoomError
+from vico.sim.traffic.placement import NoRoomError
 from vico.threads import use_workers, workers
 from vico.world.folder import read_world
 from vico.world.public import PublicMap

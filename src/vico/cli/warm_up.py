@@ -14,7 +14,7 @@ import numpy as np
 from vico.assets.people import PASSERS_BY, body_of, passer_by
 from vico.cli import community, replay, run, world
 from vico.cli.options import CommunityBuildOptions, RunOptions
-from vico.sim.robots.navigation import NEIGHBOUR, room_to_turn
+from vico.sim.robots.path_following import NEIGHBOUR, room_to_turn
 from vico.world.walkable import fill_polygon
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources

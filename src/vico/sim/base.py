@@ -27,8 +27,7 @@ from vico.sim.robots.scene import RobotScene
 from vico.sim.seats import Seats
 from vico.sim.tills import Till, tills_of
 from vico.sim.traffic.network import TrafficNetwork
-from vico.sim.traffic.standing_spots import with_spots
-from vico.sim.traffic.stopping_places import with_stopping_places
+from vico.sim.traffic.stopping_places import with_spots, with_stopping_places
 from vico.sim.transit import BusPlan, plan_buses
 from vico.sim.transit.tram_network import TramNetwork
 from vico.world.city_world import CityWorld

@@ -16,12 +16,12 @@ from vico.errors import InputError
 from vico.render.quality import RenderQuality
 from vico.render.sensors.batch import RENDERERS, USUAL_OUTPUTS, checked_outputs
 from vico.render.sensors.lens import Lens
-from vico.sim.traffic.junction_rule import JunctionRule
+from vico.sim.traffic.junctions import JunctionRule
 
 #: The day of runs whose world is without a community: midsummer, with light from early on.
 NO_DAY = Date(2026, 6, 21)
 
-#: As `vico.sim.physics.factory` has them, which is slow to import.
+#: As `vico.sim.physics.engine` has them, which is slow to import.
 PHYSICS_ENGINES = ("mujoco", "genesis")
 
 #: How many of whom one run may have: placing them takes seconds at most then, and a second of them takes less than
@@ -57,7 +57,7 @@ class SimSettings:
         Vehicles and people nobody plays.
     junctions
         Who may be in a junction: ``"one"``, ``"shared"``, ``"signals"`` or ``"both"``
-        (`vico.sim.traffic.junction_rule.JunctionRule`).
+        (`vico.sim.traffic.junctions.JunctionRule`).
     traffic
         Cars and pedestrians placed by hand, beside those: ``"none"``, or the content of a file of traffic
         (docs/traffic.md).

@@ -16,8 +16,8 @@ from vico.sim.animation import Transition, clip_index, stride_length
 from vico.sim.animation.gait import WALK_START
 from vico.sim.animation.stride import pace_on
 from vico.sim.environment.weather import Weather
-from vico.sim.traffic.records import STOP, TALK
-from vico.sim.traffic.walking_gaits import PedestrianGaits
+from vico.sim.traffic.drawing import PedestrianGaits
+from vico.sim.traffic.state import STOP, TALK
 
 # Who talks goes on for so long, then the other does, s.
 _TURN_TO_TALK = 6.0

@@ -13,7 +13,7 @@ from vico.sim.bodies import Bodies, Subsystem
 from vico.sim.carrying import DeckPose
 
 if TYPE_CHECKING:
-    from vico.sim.robots.sensing import Reading
+    from vico.sim.robots.hardware import Reading
 
 
 class RobotNote(Protocol):

@@ -217,7 +217,7 @@ class Simulation:
         """Let time pass, with all agents going on with what they do.
 
         However a time is cut into calls, the state after it is the same; robots' physics takes finer frames where a
-        cut at an odd hundredth of a second asks for them (`vico.sim.physics.frames`).
+        cut at an odd hundredth of a second asks for them (`vico.sim.physics.records`).
 
         Parameters
         ----------

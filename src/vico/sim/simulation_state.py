@@ -26,11 +26,11 @@ from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import FIRST_THING, FIRST_UMBRELLA, RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.tills import Lines, Till
+from vico.sim.traffic.drawing import PedestrianGaits
 from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.jams import Jam, JamLog
-from vico.sim.traffic.junction_rule import JunctionRule
+from vico.sim.traffic.junctions import JunctionRule
 from vico.sim.traffic.signals import SignalsShown
-from vico.sim.traffic.walking_gaits import PedestrianGaits
 from vico.sim.transit import TransitSystem
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface

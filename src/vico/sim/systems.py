@@ -16,7 +16,7 @@ from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC, FIRST_TRAM
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
-from vico.sim.traffic.placed import placed_traffic
+from vico.sim.traffic.placement import placed_traffic
 from vico.sim.transit import BusPlan, TransitSystem
 from vico.world.world import World
 

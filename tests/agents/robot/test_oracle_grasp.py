@@ -16,7 +16,7 @@ from vico.assets.shapes import box
 from vico.challenges.robot.bodies import arm_body
 from vico.errors import SchemaError
 from vico.sim.config import SimConfig
-from vico.sim.physics import loose
+from vico.sim.physics import surroundings
 from vico.sim.physics.mujoco_engine import MujocoEngine
 from vico.sim.simulation import Simulation
 
@@ -61,7 +61,7 @@ class Trial:
 @pytest.fixture
 def heavy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have things weigh more than friction holds."""
-    monkeypatch.setattr(loose, "mass_of", lambda size: 25.0)
+    monkeypatch.setattr(surroundings, "object_mass", lambda size: 25.0)
 
 
 def test_by_oracle_what_is_too_heavy_for_friction_is_lifted_kept_and_put_down(heavy: None) -> None:

@@ -13,7 +13,7 @@ from vico.sim.environment.event_spots import Spot
 from vico.sim.hands_scene import hands_of_pedestrians
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule, Traffic
-from vico.sim.traffic.records import CROWD
+from vico.sim.traffic.state import CROWD
 from vico.world.walkways import SIDEWALK
 from vico.world.world import World
 

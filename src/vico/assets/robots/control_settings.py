@@ -37,7 +37,7 @@ class ControllerSettings(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the controller, as in `vico.sim.robots.controllers.CONTROLLERS`."""
+        """Name of the controller, as in `vico.sim.robots.scene.CONTROLLERS`."""
 
 
 @dataclass(frozen=True)

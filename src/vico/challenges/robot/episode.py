@@ -72,8 +72,8 @@ def play_robot_task(
         ``my_module:MyRobot``, which plays both.
     setting
         ``period``: seconds between two actions of a robot. ``oracle_grasp``: whether hands never lose what they closed
-        on (`vico.sim.robots.oracle`); without it friction alone holds. ``policy``, ``policy_sha256``: of a method that
-        was learned.
+        on (`vico.sim.robots.manipulator`); without it friction alone holds. ``policy``, ``policy_sha256``: of a method
+        that was learned.
     terms
         On which terms robots from elsewhere take part.
     recording

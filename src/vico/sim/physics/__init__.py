@@ -1,7 +1,14 @@
 """Physics of robots: two small protocols, and the engines behind them."""
 
-from vico.sim.physics.engine import PhysicsBatch, PhysicsEngine, PhysicsScene
-from vico.sim.physics.factory import DEFAULT_ENGINE, engine_names, make_engine, make_scene
+from vico.sim.physics.engine import (
+    DEFAULT_ENGINE,
+    PhysicsBatch,
+    PhysicsEngine,
+    PhysicsScene,
+    engine_names,
+    make_engine,
+    make_scene,
+)
 from vico.sim.physics.records import Capacity, StaticScene
 
 __all__ = [

@@ -1,8 +1,8 @@
-"""What a physics engine has to do for the robots: two protocols that a further engine is written against.
+"""What a physics engine has to do for the robots, and engines by name.
 
-A `PhysicsScene` is everything that is fixed once it is built: ground, solids, robots, and a preallocated number of
-kinematic bodies and free rigid objects. It is built once a world and its robots, never changes, and any number of
-engines share it. A `PhysicsEngine` is the state of one run in it.
+A further engine is written against two protocols. A `PhysicsScene` is everything that is fixed once it is built:
+ground, solids, robots, and a preallocated number of kinematic bodies and free rigid objects. It is built once a world
+and its robots, never changes, and any number of engines share it. A `PhysicsEngine` is the state of one run in it.
 
 Engines that cannot add entities to what they have built park the unused ones out of reach, as MuJoCo's does. Nothing
 here says how contacts are solved: results of two engines agree loosely, those of one are the same bit for bit.
@@ -11,15 +11,18 @@ here says how contacts are solved: results of two engines agree loosely, those o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.errors import InputError
 from vico.sim.bodies import Bodies
-from vico.sim.physics.frames import COARSE
 from vico.sim.physics.records import (
+    COARSE,
     Base,
     Capacity,
     Contacts,
@@ -28,9 +31,30 @@ from vico.sim.physics.records import (
     ObjectMotion,
     Party,
     RigidObject,
+    StaticChunks,
     StaticScene,
 )
 
+__all__ = [
+    "DEFAULT_ENGINE",
+    "Actuate",
+    "Base",
+    "Capacity",
+    "Contacts",
+    "Imu",
+    "Motion",
+    "ObjectMotion",
+    "Party",
+    "PhysicsBatch",
+    "PhysicsEngine",
+    "PhysicsScene",
+    "RigidObject",
+    "StaticScene",
+    "engine_names",
+    "known_engines",
+    "make_engine",
+    "make_scene",
+]
 #: Told the seconds that have passed since the frame began, and those that the solver's step takes.
 Actuate = Callable[[float, float], None]
 
@@ -161,7 +185,7 @@ class PhysicsEngine(Protocol):
         holding: bool | None = None,
         actuate: Actuate | None = None,
     ) -> None:
-        """Move on by some frames of `FINE` or `COARSE` seconds (see `vico.sim.physics.frames`).
+        """Move on by some frames of `FINE` or `COARSE` seconds (see `vico.sim.physics.records`).
 
         Parameters
         ----------
@@ -255,18 +279,72 @@ class PhysicsScene(Protocol):
         """Return many copies of a new state, stepped on some threads (0: one a core)."""
 
 
-__all__ = [
-    "Actuate",
-    "Base",
-    "Capacity",
-    "Contacts",
-    "Imu",
-    "Motion",
-    "ObjectMotion",
-    "Party",
-    "PhysicsBatch",
-    "PhysicsEngine",
-    "PhysicsScene",
-    "RigidObject",
-    "StaticScene",
-]
+#: By name: the package an engine needs, how to install it, and the class of its scenes. Engines are imported when they
+#: are first asked for.
+_ENGINES = {
+    "mujoco": ("mujoco", "pip install mujoco", "vico.sim.physics.mujoco_physics", "MujocoScene"),
+    "genesis": (
+        "genesis",
+        "pip install 'virtual-community[genesis]'",
+        "vico.sim.physics.genesis_engine",
+        "GenesisScene",
+    ),
+}
+DEFAULT_ENGINE = "mujoco"
+
+
+def known_engines() -> tuple[str, ...]:
+    """Names of all engines, the default one first."""
+    return tuple(_ENGINES)
+
+
+def engine_names() -> tuple[str, ...]:
+    """Names of the engines whose packages are installed."""
+    return tuple(name for name, (package, *_) in _ENGINES.items() if find_spec(package) is not None)
+
+
+def make_scene(
+    name: str, static: StaticScene | StaticChunks, models: Sequence[RobotModel], capacity: Capacity | None = None
+) -> PhysicsScene:
+    """Build a scene: what engines of one world and its robots share.
+
+    Parameters
+    ----------
+    name
+        Of the engine, such as ``mujoco``.
+    static
+        What never moves; of chunks, those around robots are in physics.
+    models
+        The robots.
+    capacity
+        How many people, vehicles and objects there is room for near robots.
+
+    Raises
+    ------
+    InputError
+        If there is no such engine, or its package is not installed.
+    """
+    if name not in _ENGINES:
+        raise InputError(f"physics: there is no engine {name!r}; choose among {', '.join(sorted(_ENGINES))}")
+    package, install, module, kind = _ENGINES[name]
+    if find_spec(package) is None:
+        raise InputError(f"physics: engine {name!r} needs the package {package}, which is not installed: {install}")
+    maker: Callable[..., PhysicsScene] = getattr(import_module(module), kind)
+    return maker(static, tuple(models), capacity or Capacity())
+
+
+def make_engine(
+    name: str,
+    static: StaticScene | StaticChunks,
+    models: Sequence[RobotModel],
+    places: NDArray[np.float64],
+    capacity: Capacity | None = None,
+) -> PhysicsEngine:
+    """Build a scene and an engine in it; for more than one engine, build the scene once by `make_scene`.
+
+    Parameters
+    ----------
+    places
+        Where each robot stands at first: x, y, yaw, shape ``(n, 3)``; the rest is as for `make_scene`.
+    """
+    return make_scene(name, static, models, capacity).engine(np.asarray(places, np.float64))

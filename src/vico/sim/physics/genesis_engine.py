@@ -1,7 +1,8 @@
-"""The paper's physics engine: Genesis, an extra.
+"""The paper's physics engine, Genesis, behind the protocols: scenes, engines, batches and rays. It is an extra.
 
-A run in a scene that Genesis has built. Its numbers lie in that scene while it is stepped, and are kept here while
-another run of the same scene is.
+A run is in a scene that Genesis has built. Its numbers lie in that scene while it is stepped, and are kept here while
+another run of the same scene is. What lies below a point is asked of MuJoCo, of the same scene with everybody where
+Genesis has them.
 """
 
 from __future__ import annotations
@@ -13,19 +14,68 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.robots import RobotModel
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
+from vico.sim.physics.collision_shapes import KinematicBodies
 from vico.sim.physics.engine import Actuate
-from vico.sim.physics.frames import COARSE, FINE
-from vico.sim.physics.genesis_contacts import contacts_of, read_contacts
-from vico.sim.physics.genesis_index import GenesisIndex
-from vico.sim.physics.genesis_objects import ObjectSlots
-from vico.sim.physics.genesis_rays import RayTwin
-from vico.sim.physics.genesis_scene import BuiltScene
-from vico.sim.physics.movers import KinematicBodies
-from vico.sim.physics.mujoco_model import parked_robot, standing_pose
-from vico.sim.physics.mujoco_views import base_motion, motion_of
-from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, PhysicsError, RigidObject
+from vico.sim.physics.genesis_model import GenesisIndex
+from vico.sim.physics.genesis_scene import BuiltScene, ObjectSlots, contacts_of, read_contacts
+from vico.sim.physics.mujoco_engine import MujocoEngine
+from vico.sim.physics.mujoco_model import base_motion, motion_of, parked_robot, standing_pose
+from vico.sim.physics.mujoco_scene import CompiledScene
+from vico.sim.physics.records import (
+    COARSE,
+    FINE,
+    Base,
+    Capacity,
+    Contacts,
+    Imu,
+    Motion,
+    ObjectMotion,
+    PhysicsError,
+    RigidObject,
+    StaticChunks,
+    StaticScene,
+)
+
+
+class RayTwin:
+    """The same scene compiled by MuJoCo, which is never stepped: Genesis casts rays with sensors that are built in.
+
+    Parameters
+    ----------
+    scene
+        In Genesis; the twin is compiled when it is first asked, and shared.
+    """
+
+    def __init__(self, scene: BuiltScene) -> None:
+        if scene.twin is None:
+            scene.twin = CompiledScene(scene.static, scene.models, scene.capacity)
+        self._scene = scene
+        self._engine = MujocoEngine(scene.twin, np.zeros((len(scene.models), 3)))
+
+    def mirror(
+        self, positions: NDArray[np.float64], movers: KinematicBodies, objects: ObjectMotion, slots: ObjectSlots
+    ) -> None:
+        """Put everybody where Genesis has them."""
+        engine, mine = self._engine, self._scene
+        for slot, there in enumerate(objects.present.tolist()):
+            if there:
+                pose = objects.position[slot], objects.quaternion[slot]
+                engine.place_object(slot, RigidObject(slots.size[slot], float(slots.mass[slot]), *pose))
+            else:
+                engine.remove_object(slot)
+        engine.follow_movers(movers)
+        qpos, _ = engine.coordinates
+        for theirs, index in zip(engine.compiled.robots, mine.robots, strict=True):
+            qpos[theirs.root : theirs.root + 7] = positions[index.root : index.root + 7]
+            qpos[theirs.angle] = positions[index.angle]
+
+    def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `PhysicsEngine.clearance_below`."""
+        return self._engine.clearance_below(points)
+
 
 _GRAVITY = np.array([0.0, 0.0, 9.81])
 
@@ -396,3 +446,85 @@ class GenesisEngine:
             scene.holder = self
             self._put_parameters()
             self._note()
+
+
+class GenesisBatch:
+    """Copies of one scene; see `vico.sim.physics.engine.PhysicsBatch`.
+
+    Each copy is an engine, so it computes what an engine computes, bit for bit. They are stepped one after the other:
+    Genesis' own batches, on a GPU, compute with other bits than a scene alone.
+
+    Parameters
+    ----------
+    scene
+        What is fixed.
+    copies
+        How many.
+    places
+        Where the robots of every copy stand at first: x, y, yaw, shape ``(n, 3)``.
+    threads
+        Only one is used.
+    """
+
+    def __init__(self, scene: BuiltScene, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> None:
+        if copies < 1 or threads < 0:
+            raise InputError(f"physics: a batch needs 1 or more copies and 0 or more threads, not {copies}, {threads}")
+        self.engines = [GenesisEngine(scene, places) for _ in range(copies)]
+
+    def __len__(self) -> int:
+        return len(self.engines)
+
+    def restore(self, copies: NDArray[np.int64], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Put some copies into a saved state."""
+        for k in np.asarray(copies, np.int64).tolist():
+            self.engines[k].restore(arrays)
+
+    def arrays(self, copy: int) -> dict[str, NDArray[Any]]:
+        """State of one copy."""
+        return self.engines[copy].arrays()
+
+    def command(self, robot: int, targets: NDArray[np.float64]) -> None:
+        """Set what the servos of a robot follow in each copy, shape ``(copies, motors)``."""
+        for engine, values in zip(self.engines, targets, strict=True):
+            engine.command(robot, values)
+
+    def bases(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Poses and motions of a robot's base, shapes ``(copies, 7)`` and ``(copies, 6)``."""
+        found = [engine.base(robot) for engine in self.engines]
+        poses = [np.concatenate([one.position, one.quaternion]) for one in found]
+        motions = [np.concatenate([one.velocity, one.angular_velocity_body]) for one in found]
+        return np.stack(poses), np.stack(motions)
+
+    def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions and speeds of the joints, shape ``(copies, joints)`` each."""
+        found = [engine.joints(robot) for engine in self.engines]
+        return np.stack([one[0] for one in found]), np.stack([one[1] for one in found])
+
+    def objects(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Poses and motions of the objects, shapes ``(copies, slots, 7)`` and ``(copies, slots, 6)``."""
+        found = [engine.objects() for engine in self.engines]
+        poses = [np.concatenate([one.position, one.quaternion], axis=1) for one in found]
+        motions = [np.concatenate([one.velocity, one.angular_velocity_body], axis=1) for one in found]
+        return np.stack(poses), np.stack(motions)
+
+    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+        """Move all copies on by some frames."""
+        for engine in self.engines:
+            engine.step(frames, frame=frame)
+
+
+class GenesisScene(BuiltScene):
+    """See `vico.sim.physics.engine.PhysicsScene`; it has all of a city."""
+
+    name = "genesis"
+
+    def __init__(self, static: StaticScene | StaticChunks, models: tuple[RobotModel, ...], capacity: Capacity) -> None:
+        super().__init__(static if isinstance(static, StaticScene) else static.whole(), models, capacity)
+
+    def engine(self, places: NDArray[np.float64]) -> GenesisEngine:
+        """Return a new state with robots standing at `places`."""
+        return GenesisEngine(self, places)
+
+    def batch(self, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> GenesisBatch:
+        """Return many copies of a new state, which take turns on one thread."""
+        return GenesisBatch(self, copies, places, threads=threads)

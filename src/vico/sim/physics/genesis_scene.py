@@ -1,26 +1,28 @@
-"""A scene that Genesis has built, which its engines take turns to use."""
+"""A scene that Genesis has built, which its engines take turns to use: its bodies, contacts and free boxes.
+
+Of free boxes there is a fixed number, hung up without weight where nobody comes until they are needed.
+"""
 
 from __future__ import annotations
 
 import gc
 import threading
 import warnings
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.errors import InputError, SchemaError
 from vico.io.compiled import compiled
 from vico.quaternions import matrix_of
 from vico.sim.physics.engine import Actuate
-from vico.sim.physics.frames import COARSE, FINE
-from vico.sim.physics.genesis_index import GenesisIndex
-from vico.sim.physics.genesis_model import build_scene
-from vico.sim.physics.genesis_runtime import genesis, state_of, view
+from vico.sim.physics.genesis_model import GenesisIndex, build_scene, genesis, numpy_view, state_of
+from vico.sim.physics.mujoco_model import parked_object, place_bodies
 from vico.sim.physics.mujoco_scene import CompiledScene
-from vico.sim.physics.mujoco_views import place_bodies
-from vico.sim.physics.records import Capacity, Party, StaticScene
+from vico.sim.physics.records import COARSE, FINE, Capacity, Contacts, ObjectMotion, Party, RigidObject, StaticScene
 
 #: Steps in which Genesis solves a frame: 1/200 s each in fine frames, 1/100 s in coarse ones. Fine ones in which
 #: nothing has to be held are solved in one.
@@ -28,7 +30,7 @@ STEPS = {FINE: 2, COARSE: 2}
 
 
 @compiled
-def _rotated(q, v):  # type: ignore[no-untyped-def]
+def _rotate_vector(q, v):  # type: ignore[no-untyped-def]
     """Return a vector turned by a quaternion w, x, y, z."""
     w, x, y, z = q
     tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
@@ -60,13 +62,13 @@ def _push_sites(sites, wrench, poses, pushed, turned):  # type: ignore[no-untype
             continue
         link = links[k]
         q = quaternion[link]
-        arm = position[link] + _rotated(q, place[k]) - centre[link]
+        arm = position[link] + _rotate_vector(q, place[k]) - centre[link]
         local = np.zeros((2, 3))
         for i in range(3):
             for j in range(3):
                 local[0, i] += turn[k, i, j] * wrench[k, j]
                 local[1, i] += turn[k, i, j] * wrench[k, 3 + j]
-        _add_wrench(link, arm, _rotated(q, local[0]), _rotated(q, local[1]), pushed, turned)
+        _add_wrench(link, arm, _rotate_vector(q, local[0]), _rotate_vector(q, local[1]), pushed, turned)
 
 
 @compiled
@@ -84,7 +86,7 @@ def _fit_boxes(geoms, corners, poses, boxes):  # type: ignore[no-untyped-def]
     for geom in geoms:
         low[geom], high[geom] = np.inf, -np.inf
         for k in range(8):
-            corner = position[geom] + _rotated(quaternion[geom], corners[geom, k])
+            corner = position[geom] + _rotate_vector(quaternion[geom], corners[geom, k])
             for axis in range(3):
                 low[geom, axis] = min(low[geom, axis], corner[axis])
                 high[geom, axis] = max(high[geom, axis], corner[axis])
@@ -150,28 +152,31 @@ class BuiltScene:
         solver = self.built.solver
         self.solver = solver
         self.state = {name: array for name, array in state_of(solver) if array.size}
-        self.positions, self.speeds = view(solver.rigid_info.qpos)[:, 0], view(solver.dyn_state.dofs.vel)[:, 0]
-        self.applied = view(solver.dyn_state.dofs.qf_applied)[:, 0]
+        self.positions, self.speeds = (
+            numpy_view(solver.rigid_info.qpos)[:, 0],
+            numpy_view(solver.dyn_state.dofs.vel)[:, 0],
+        )
+        self.applied = numpy_view(solver.dyn_state.dofs.qf_applied)[:, 0]
         dofs = solver.dyn_state.dofs
-        self.controls = tuple(view(array)[:, 0] for array in (dofs.ctrl_pos, dofs.ctrl_vel, dofs.ctrl_force))
-        self.link_position = view(solver.dyn_state.links.pos)[:, 0]
-        self.link_quaternion = view(solver.dyn_state.links.quat)[:, 0]
-        self.grip = view(solver.dyn_state.geoms.friction_ratio)[:, 0]
-        self.gain, self.bias = view(solver.dyn_info.dofs.act_gain), view(solver.dyn_info.dofs.act_bias)
-        self.limit = view(solver.dyn_info.dofs.force_range)
-        self.weightless = view(solver.dyn_info.entities.gravity_compensation)
-        self._step = view(solver.rigid_info.substep_dt)
+        self.controls = tuple(numpy_view(array)[:, 0] for array in (dofs.ctrl_pos, dofs.ctrl_vel, dofs.ctrl_force))
+        self.link_position = numpy_view(solver.dyn_state.links.pos)[:, 0]
+        self.link_quaternion = numpy_view(solver.dyn_state.links.quat)[:, 0]
+        self.grip = numpy_view(solver.dyn_state.geoms.friction_ratio)[:, 0]
+        self.gain, self.bias = numpy_view(solver.dyn_info.dofs.act_gain), numpy_view(solver.dyn_info.dofs.act_bias)
+        self.limit = numpy_view(solver.dyn_info.dofs.force_range)
+        self.weightless = numpy_view(solver.dyn_info.entities.gravity_compensation)
+        self._step = numpy_view(solver.rigid_info.substep_dt)
         from vico.sim.physics._genesis_step import SolverStep
 
         self._solver_step = SolverStep(solver)
         geoms = solver.dyn_state.geoms
-        self._geom_position, self._geom_quaternion = view(geoms.pos)[:, 0], view(geoms.quat)[:, 0]
-        self._placed = view(geoms.verts_updated)[:, 0]
-        self._failed = view(solver._errno)
+        self._geom_position, self._geom_quaternion = numpy_view(geoms.pos)[:, 0], numpy_view(geoms.quat)[:, 0]
+        self._placed = numpy_view(geoms.verts_updated)[:, 0]
+        self._failed = numpy_view(solver._errno)
         self.sparse = _SPARSE
         links = solver.dyn_state.links
-        self._centre, self._middle = view(links.root_COM)[:, 0], view(links.i_pos)[:, 0]
-        self._pushed, self._turned = view(links.cfrc_applied_vel)[:, 0], view(links.cfrc_applied_ang)[:, 0]
+        self._centre, self._middle = numpy_view(links.root_COM)[:, 0], numpy_view(links.i_pos)[:, 0]
+        self._pushed, self._turned = numpy_view(links.cfrc_applied_vel)[:, 0], numpy_view(links.cfrc_applied_ang)[:, 0]
         self._site_link = np.concatenate([np.zeros(0, np.int64), *(robot.site_link for robot in self.robots)])
         self._site_place = np.concatenate([np.zeros((0, 3)), *(robot.site_place for robot in self.robots)])
         self._site_turn = np.concatenate([np.zeros((0, 3, 3)), *(robot.site_turn for robot in self.robots)])
@@ -180,7 +185,7 @@ class BuiltScene:
         self._nothing = np.zeros((0, 6))
         self._kinds: dict[bytes, tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = {}
         self._index_links()
-        self._boxes = view(geoms.aabb_min)[:, 0], view(geoms.aabb_max)[:, 0]
+        self._boxes = numpy_view(geoms.aabb_min)[:, 0], numpy_view(geoms.aabb_max)[:, 0]
         self._fit_boxes(np.arange(len(solver.geoms)))
         #: The state that Genesis is in when it has been built.
         self.pristine = self.save()
@@ -330,3 +335,131 @@ class BuiltScene:
 
 #: Kept for every pair of shapes that could ever touch: hundreds of thousands in a city, nearly all of them zero.
 _SPARSE = ("collider_state.contact_cache.normal", "collider_state.contact_cache.penetration")
+
+
+def read_contacts(solver: Any) -> NDArray[np.float64]:
+    """Return the last step's contacts: two links, position, normal from the first to the second, and normal force.
+
+    Returns
+    -------
+    ndarray
+        float64, shape ``(n, 9)``.
+    """
+    solver.collider._contact_data_cache.clear()
+    found = solver.collider.get_contacts(as_tensor=False, to_torch=False)
+    kept = np.zeros((len(found["link_a"]), 9))
+    # Genesis' normal points from the second to the first.
+    kept[:, 0], kept[:, 1] = found["link_b"], found["link_a"]
+    kept[:, 2:5], kept[:, 5:8] = found["position"], found["normal"]
+    kept[:, 8] = np.abs(np.einsum("ni,ni->n", found["force"], found["normal"]))
+    return kept
+
+
+def contacts_of(scene: BuiltScene, kept: NDArray[np.float64], entity: NDArray[np.int32]) -> Contacts:
+    """Return contacts as the protocol has them, given who stands in each place for movers."""
+    links = kept[:, :2].astype(np.int64)
+    party, owner = scene.party[links], scene.owner[links]
+    movers = party == Party.BODY
+    owner = np.where(movers, entity[np.where(movers, owner, 0)], owner).astype(np.int32)
+    columns = (kept[:, column].copy() for column in (slice(2, 5), slice(5, 8), 8))
+    return Contacts(party, owner, scene.number[links], *columns)
+
+
+#: Slower than this, m/s and rad/s, for so many seconds an object rests.
+_SLOW, _CALM_TIME = 0.03, 0.2
+
+
+class ObjectSlots:
+    """What is in which slot.
+
+    Parameters
+    ----------
+    count
+        How many slots there are.
+
+    Attributes
+    ----------
+    present
+        Which are taken, bool.
+    size, mass
+        Extents, metres, shape ``(n, 3)``, and kilograms.
+    calm
+        Seconds for which each has been slow.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.present, self.calm = np.zeros(count, np.bool_), np.zeros(count)
+        self.size, self.mass = np.ones((count, 3)), np.ones(count)
+
+    def check(self, slot: int) -> None:
+        """Refuse a slot that is not there."""
+        if not 0 <= slot < len(self.present):
+            raise InputError(f"physics: there is no slot {slot} for objects; there are {len(self.present)}")
+
+    def place(self, scene: BuiltScene, slot: int, thing: RigidObject) -> None:
+        """Put an object into a slot."""
+        self.check(slot)
+        size = np.asarray(thing.size, np.float64)
+        if size.shape != (3,) or not (np.isfinite(size).all() and size.min() > 0.0 and thing.mass > 0.0):
+            raise InputError(
+                f"physics: an object needs three positive extents and a mass, not {size.tolist()}, {thing.mass} kg"
+            )
+        self.size[slot], self.mass[slot], self.present[slot], self.calm[slot] = size, thing.mass, True, 0.0
+        self._write(scene, slot)
+        q, v = int(scene.object_q[slot]), int(scene.object_v[slot])
+        scene.positions[q : q + 7] = np.concatenate([thing.position, thing.quaternion])
+        scene.speeds[v : v + 6] = np.concatenate([thing.velocity, thing.angular_velocity_body])
+
+    def remove(self, scene: BuiltScene, slot: int) -> None:
+        """Take an object out of the scene."""
+        self.check(slot)
+        if not self.present[slot]:
+            return
+        self.present[slot], self.calm[slot] = False, 0.0
+        scene.weightless[scene.object_entity[slot]] = 1.0
+        q, v = int(scene.object_q[slot]), int(scene.object_v[slot])
+        scene.positions[q : q + 7] = [*parked_object(slot), 1.0, 0.0, 0.0, 0.0]
+        scene.speeds[v : v + 6] = 0.0
+
+    def put(self, scene: BuiltScene) -> None:
+        """Write extents and masses of all slots into a scene that another run had."""
+        scene.weightless[scene.object_entity] = 1.0
+        for slot in np.flatnonzero(self.present).tolist():
+            self._write(scene, slot)
+
+    def _write(self, scene: BuiltScene, slot: int) -> None:
+        scene.weightless[scene.object_entity[slot]] = 0.0
+        scene.built.shapes.resize(scene.object_geom[slot : slot + 1], self.size[slot : slot + 1])
+        link, squares, mass = [int(scene.built.objects[slot])], self.size[slot] ** 2, float(self.mass[slot])
+        inertia = np.diag(mass / 12.0 * (squares.sum() - squares))
+        scene.solver.set_links_mass([mass], link)
+        scene.solver.set_links_inertia(inertia[None], link)
+
+    def watch(self, scene: BuiltScene, seconds: float) -> None:
+        """Note who was slow in the last so many seconds."""
+        if self.present.any():
+            motion = scene.speeds[scene.object_v[:, None] + np.arange(6)]
+            self.calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self.calm + seconds, 0.0)
+
+    def motion(self, scene: BuiltScene, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> ObjectMotion:
+        """Where all objects are."""
+        pose = qpos[scene.object_q[:, None] + np.arange(7)].reshape(-1, 7)
+        motion = qvel[scene.object_v[:, None] + np.arange(6)].reshape(-1, 6)
+        resting = self.calm >= _CALM_TIME - 1e-9
+        return ObjectMotion(self.present.copy(), pose[:, :3], pose[:, 3:], motion[:, :3], motion[:, 3:], resting)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return what is in the slots."""
+        return {
+            "present": self.present.copy(),
+            "calm": self.calm.copy(),
+            "object_size": self.size.copy(),
+            "object_mass": self.mass.copy(),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        if arrays["present"].shape != self.present.shape:
+            raise SchemaError("physics: the saved state has room for another number of objects")
+        self.present[:], self.calm = arrays["present"], np.array(arrays["calm"])
+        self.size[:], self.mass[:] = arrays["object_size"], arrays["object_mass"]

@@ -1,4 +1,4 @@
-"""The physics engine of the default install: MuJoCo.
+"""The physics engine of the default install: MuJoCo, and the warnings that it gives.
 
 People, cars and buses near a robot are kinematic ("mocap") shapes, movable things near it free boxes, both out of a
 fixed number that is parked far below the ground. Free boxes that lie still sleep and cost next to nothing.
@@ -7,6 +7,7 @@ fixed number that is parked far below the ground. Free boxes that lie still slee
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,22 +17,91 @@ from numpy.typing import NDArray
 from vico.errors import InputError, SchemaError
 from vico.io.mujoco import mujoco
 from vico.sim.bodies import Bodies
+from vico.sim.physics.collision_shapes import KinematicBodies, parts_of
 from vico.sim.physics.engine import Actuate
-from vico.sim.physics.frames import COARSE, FINE, SOLVER_STEPS
-from vico.sim.physics.movers import KinematicBodies
 from vico.sim.physics.mujoco_model import (
     FRICTION,
     SOLID_GROUPS,
+    base_motion,
+    begin_frame,
+    motion_of,
     parked_object,
     parked_robot,
+    place_bodies,
+    solved_contacts,
     standing_pose,
 )
-from vico.sim.physics.mujoco_parameters import Parameters
-from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
-from vico.sim.physics.mujoco_views import base_motion, begin_frame, motion_of, place_bodies, solved_contacts
-from vico.sim.physics.mujoco_warnings import heard, listen, report, solve
-from vico.sim.physics.object_parts import parts_of
-from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, RigidObject
+from vico.sim.physics.mujoco_scene import CompiledScene, EngineParameters, SharedModel
+from vico.sim.physics.records import (
+    COARSE,
+    FINE,
+    SOLVER_STEPS,
+    Base,
+    Contacts,
+    Imu,
+    Motion,
+    ObjectMotion,
+    Party,
+    PhysicsError,
+    RigidObject,
+)
+
+
+class PhysicsWarning(RuntimeWarning):
+    """MuJoCo says that something is about to go wrong."""
+
+
+# MuJoCo calls back from C, where an exception would end the process: what it says is kept until the step is over.
+_WARNINGS: list[str] = []
+
+
+def _keep_warning(message: str) -> None:
+    if len(_WARNINGS) < 10:
+        _WARNINGS.append(message)
+
+
+def collect_warnings() -> None:
+    """Have MuJoCo say here what it would append to a file in the folder people happen to be in."""
+    if mujoco.get_mju_user_warning() is None:
+        mujoco.set_mju_user_warning(_keep_warning)
+
+
+def step_solver(model: Any, data: Any, steps: int) -> None:
+    """Have MuJoCo take some steps.
+
+    Raises
+    ------
+    PhysicsError
+        If it runs out of its working memory.
+    """
+    try:
+        mujoco.mj_step(model, data, steps)
+    except mujoco.FatalError as error:
+        raise PhysicsError(
+            f"physics: MuJoCo gave up at {data.time:.2f} s ({error}); report it with the snapshot"
+        ) from None
+
+
+def take_warnings() -> list[str]:
+    """Return what MuJoCo has said since this was last asked."""
+    said, _WARNINGS[:] = _WARNINGS[:], ()
+    return said
+
+
+def report_warnings(said: Sequence[str], seconds: float, *, finite: bool) -> None:
+    """Warn of what MuJoCo has said.
+
+    Raises
+    ------
+    PhysicsError
+        If not all speeds are `finite`.
+    """
+    if not finite:
+        why = f" ({said[0]})" if said else ""
+        raise PhysicsError(f"physics: the robots' motion diverged at {seconds:.2f} s{why}; report it with the snapshot")
+    for message in said:
+        warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=4)
+
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
@@ -52,7 +122,7 @@ class MujocoEngine:
     """
 
     def __init__(self, scene: CompiledScene, places: NDArray[np.float64]) -> None:
-        listen()
+        collect_warnings()
         places = np.asarray(places, np.float64)
         if places.shape != (len(scene.models), 3):
             raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
@@ -95,7 +165,7 @@ class MujocoEngine:
         self._ctrl = self._data.ctrl
         self._link_motion = self._data.xpos, self._data.cvel, self._data.subtree_com
         self._size = mujoco.mj_stateSize(self._model, STATE)
-        self._parameters = Parameters(scene)
+        self._parameters = EngineParameters(scene)
         # Seconds since MuJoCo computed where links are and how they move; negative: that was of another state.
         self._links_age = -1.0
         scene.reset(self._data)
@@ -384,7 +454,7 @@ class MujocoEngine:
     ) -> None:
         """Move on by some frames; people and vehicles move first, at every one."""
         self.stay_in_scene()
-        heard()  # what was said of other models' steps says nothing of this one
+        take_warnings()  # what was said of other models' steps says nothing of this one
         self.step_in(self.compiled.shared, frames, frame, holding=holding, actuate=actuate)
         self.judge()
 
@@ -419,11 +489,11 @@ class MujocoEngine:
                 begin_frame(frame, self._links_age, *told)
                 s.choose_pairs(shared, self._links_meet, somebody)
                 if actuate is None:
-                    solve(shared.model, self._data, steps)
+                    step_solver(shared.model, self._data, steps)
                 else:
                     for k in range(steps):
                         actuate(k * frame / steps, frame / steps)
-                        solve(shared.model, self._data, 1)
+                        step_solver(shared.model, self._data, 1)
                         self._forget()
                 self._links_age = frame / steps
                 if s.slots:
@@ -434,9 +504,9 @@ class MujocoEngine:
 
     def judge(self) -> None:
         """Raise or warn if MuJoCo said something."""
-        said, finite = heard(), math.isfinite(float(np.add.reduce(self._qvel)))
+        said, finite = take_warnings(), math.isfinite(float(np.add.reduce(self._qvel)))
         if said or not finite:
-            report(said, self._data.time, finite=finite)
+            report_warnings(said, self._data.time, finite=finite)
 
     def _last_contacts(self) -> NDArray[np.float64]:
         """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them.

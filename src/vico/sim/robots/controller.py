@@ -1,11 +1,18 @@
-"""What a controller is: from velocities to motor targets, of all robots of a kind in one call."""
+"""Controllers of robots: from velocities to motor targets, of all robots of a kind in one call.
+
+`MotorController` is the base of all of them. Commands are let through slowly, and corrected by what is missing of
+them. Wheels that skid turn a velocity of the base into speeds of the wheels.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
+from vico.assets.robots import RobotModel, SkidSteering
+from vico.io.compiled import compiled
 from vico.sim.physics.records import Base, Motion
 
 Array = NDArray[np.float64]
@@ -64,7 +71,7 @@ class MotorController:
         Parameters
         ----------
         setpoints
-            As `vico.sim.robots.rotors.FlightArrays` has them, shape ``(k, 8)``: moved on in place.
+            As `vico.sim.robots.quadrotor.FlightArrays` has them, shape ``(k, 8)``: moved on in place.
         """
         return self.targets(motion, setpoints, memory)
 
@@ -108,3 +115,130 @@ class DirectMotors(MotorController):
     def lying_targets(self, lying: float, base: Base) -> tuple[Array, Gains | None] | None:
         """Commands go on."""
         return None
+
+
+class TrimSettings(NamedTuple):
+    """How a command is corrected by the integral of what is missing of it; vx, vy, wz.
+
+    Attributes
+    ----------
+    gain
+        Correction a second for each unit that is missing, 1/s, shape ``(3,)``.
+    limit
+        Largest correction, m/s and rad/s, shape ``(3,)``.
+    smoothing
+        Seconds over which the motion is smoothed.
+    period
+        Seconds between two corrections.
+    """
+
+    gain: NDArray[np.float64]
+    limit: NDArray[np.float64]
+    smoothing: float
+    period: float
+
+
+#: What a trim remembers: smoothed motion, correction (3 + 3).
+TRIM_SIZE = 6
+_SMOOTHED, _CORRECTION = 0, 3
+
+
+@compiled
+def approach(values, goal, step):  # type: ignore[no-untyped-def]
+    """Bring `values` nearer to `goal`, each by at most its `step`."""
+    for k in range(len(values)):
+        values[k] += min(max(goal[k] - values[k], -step[k]), step[k])
+
+
+@compiled
+def planar_motion(rotation, velocity, angular_velocity_body):  # type: ignore[no-untyped-def]
+    """Return vx, vy, wz in the base's frame."""
+    out = np.empty(3)
+    for k in range(2):
+        out[k] = rotation[0, k] * velocity[0] + rotation[1, k] * velocity[1] + rotation[2, k] * velocity[2]
+    out[2] = angular_velocity_body[2]
+    return out
+
+
+@compiled
+def trim_command(trim, motion, command, memory):  # type: ignore[no-untyped-def]
+    """Return a command corrected by the integral of what is missing of it."""
+    out = np.empty(3)
+    share = trim.period / (trim.smoothing + trim.period)
+    for k in range(3):
+        smoothed, correction = _SMOOTHED + k, _CORRECTION + k
+        memory[smoothed] += (motion[k] - memory[smoothed]) * share
+        memory[correction] += trim.gain[k] * (command[k] - memory[smoothed]) * trim.period
+        memory[correction] = min(max(memory[correction], -trim.limit[k]), trim.limit[k])
+        out[k] = command[k] + memory[correction]
+    return out
+
+
+class WheelGeometry(NamedTuple):
+    """Of wheels that skid, as in `vico.assets.robots.SkidSteering`."""
+
+    radius: float
+    half_track: float
+    slip: float
+
+
+# What wheels remember: their command as far as it was let through, the trim, and how far they have rolled since they
+# stand, metres.
+_COMMAND = slice(0, 3)
+_TRIM = slice(3, 3 + TRIM_SIZE)
+_ROLLED = 3 + TRIM_SIZE
+# On a slope wheels give way, slowly: they drive back by so much a second of what they have rolled, at most so fast,
+# m/s.
+_BACK, _BACK_SPEED = 4.0, 0.2
+
+
+@compiled
+def _skid(trim, slew, top, wheels, motion, command, memory):  # type: ignore[no-untyped-def]
+    """Return wheel speeds of one robot, rad/s; left and right in turn."""
+    wanted_now, trim_memory = memory[_COMMAND], memory[_TRIM]
+    approach(wanted_now, command, slew)
+    out = np.zeros(len(top))
+    if not command.any() and not wanted_now.any():  # brakes
+        trim_memory[:] = 0.0
+        memory[_ROLLED] += motion[0] * trim.period
+        out[:] = min(max(-_BACK * memory[_ROLLED], -_BACK_SPEED), _BACK_SPEED) / wheels.radius
+        return out
+    memory[_ROLLED] = 0.0
+    wanted = trim_command(trim, motion, wanted_now, trim_memory)
+    for k in range(len(top)):
+        side = -1.0 if k % 2 == 0 else 1.0
+        speed = (wanted[0] + side * wanted[2] * wheels.half_track * wheels.slip) / wheels.radius
+        out[k] = min(max(speed, -top[k]), top[k])
+    return out
+
+
+@compiled
+def _skid_all(settings, rotation, velocity, angular_velocity_body, command, memory):  # type: ignore[no-untyped-def]
+    """Return wheel speeds of all robots, shape ``(k, wheels)``."""
+    trim, slew, top, wheels = settings
+    out = np.empty((len(command), len(top)))
+    for k in range(len(command)):
+        motion = planar_motion(rotation[k], velocity[k], angular_velocity_body[k])
+        out[k] = _skid(trim, slew, top, wheels, motion, command[k], memory[k])
+    return out
+
+
+class SkidSteer(MotorController):
+    """Wheels in pairs, those of a side alike. Turning means skidding, so how fast the base turns is measured."""
+
+    def __init__(self, model: RobotModel) -> None:
+        super().__init__(model)
+        assert isinstance(model.controller, SkidSteering)
+        c, period = model.controller, model.control_period
+        trim = TrimSettings(np.array((2.0, 0.0, 2.0)), np.array((0.4, 0.0, 1.0)), 0.1, period)
+        # Metres a second and radians a second the command may change by in one period.
+        slew = np.array([1.0, 0.0, 2.5]) * period
+        self._settings = (trim, slew, model.motor_limits[1], WheelGeometry(c.wheel_radius, c.half_track, c.slip))
+        self.memory = _ROLLED + 1
+
+    def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
+        """Wheel speeds, rad/s."""
+        found: Array = _skid_all(
+            self._settings, motion.rotation, motion.velocity, motion.angular_velocity_body, command, memory
+        )
+        return found

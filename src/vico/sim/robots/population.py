@@ -13,22 +13,18 @@ from vico.errors import InputError
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
 from vico.sim.physics import PhysicsEngine
-from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
-from vico.sim.physics.loose import LooseObjects
-from vico.sim.robots import commands, drawing, flying, sensing, tasks, trips
-from vico.sim.robots.batteries import charge_of, watch_batteries
-from vico.sim.robots.decisions import decide
+from vico.sim.physics.records import FrameCount, FrameNeeds, frame_length
+from vico.sim.physics.surroundings import LooseObjects
+from vico.sim.robots import arm_tasks, commands, drawing, flying, hardware, trips
+from vico.sim.robots.commands import decide
 from vico.sim.robots.falls import watch_falls
-from vico.sim.robots.motors import AllRotors, command_motors, velocities
-from vico.sim.robots.oracle import Hand, OracleGrasp
-from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.rooms import turning_radius
-from vico.sim.robots.scene import RobotScene
-from vico.sim.robots.spawns import spawns
-from vico.sim.robots.state import NOTES, Circles, RobotArrays, RobotEvent, RobotMode, RobotRun
-from vico.sim.robots.trip_state import NONE
-from vico.sim.robots.ways import way_to
-from vico.sim.robots.work import Kind
+from vico.sim.robots.hardware import AllRotors, charge_of, command_motors, commanded_velocities, watch_batteries
+from vico.sim.robots.manipulator import Hand, OracleGrasp, TaskKind
+from vico.sim.robots.path_following import RobotStatus
+from vico.sim.robots.path_planning import turning_radius
+from vico.sim.robots.scene import RobotScene, spawn_poses
+from vico.sim.robots.state import NONE, NOTES, Circles, RobotArrays, RobotEvent, RobotMode, RobotRun
+from vico.sim.robots.trips import outdoor_path
 from vico.sim.state import MovableObjects, People
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
@@ -90,7 +86,7 @@ class RobotPopulation:
         self.names = [f"robot_{i}" for i in range(len(kinds))]
         self.entities = np.arange(first_entity, first_entity + len(kinds)).astype(np.int32)
         self.errands = errands
-        where = spawns(world, len(kinds), seed) if places is None else np.asarray(places, np.float64)
+        where = spawn_poses(world, len(kinds), seed) if places is None else np.asarray(places, np.float64)
         if where.shape != (len(kinds), 3):
             raise InputError(f"robots: {len(kinds)} robots need as many places of x, y, yaw, not {where.shape}")
         engine = self.scene.engine(where)
@@ -165,7 +161,7 @@ class RobotPopulation:
             return not self.scene.airspace.refusal(flying.cruise_point(self.run, np.asarray(xy, np.float64)))
         if self.run.trips.room[robot] >= 0:
             return not self.trip_refusal(robot, -1, xy)
-        return way_to(self.run, robot, np.asarray(xy, np.float64)) is not None
+        return outdoor_path(self.run, robot, np.asarray(xy, np.float64)) is not None
 
     def go_to(self, robot: int, xy: ArrayLike, room: int = -1) -> bool:
         """Find a way to a point of a room (-1: outdoors) and take it; False, and nothing changes, if there is none."""
@@ -197,11 +193,11 @@ class RobotPopulation:
 
     def has_arm(self, robot: int) -> bool:
         """Return whether a robot has an arm."""
-        return tasks.work_of(self.run, robot) is not None
+        return arm_tasks.arm_tasks_of(self.run, robot) is not None
 
     def in_hand(self, robot: int) -> int:
         """Return the entity of what a robot's hand holds; 0 for nothing."""
-        return tasks.in_hand(self.run, robot)
+        return arm_tasks.object_in_hand(self.run, robot)
 
     def give_oracle_grasp(self) -> None:
         """Have hands never lose what they closed on, from now on; before the first step."""
@@ -219,30 +215,30 @@ class RobotPopulation:
 
     def can_grasp(self, robot: int, size: NDArray[np.float64]) -> bool:
         """Return whether a robot's jaw is wide enough for a thing of some extents, metres."""
-        return tasks.can_grasp(self.run, robot, size)
+        return arm_tasks.can_grasp(self.run, robot, size)
 
     def offer(self, robot: int, person: ArrayLike) -> None:
         """Hold out what the hand holds to a person who stands at a point, ENU metres, until it is taken."""
-        tasks.offer(self.run, robot, np.asarray(person, np.float64))
+        arm_tasks.begin_offer(self.run, robot, np.asarray(person, np.float64))
 
     def reach(self, robot: int, target: ArrayLike) -> None:
         """Bring the hand to a point, ENU metres."""
-        tasks.begin(self.run, robot, Kind.REACH, np.asarray(target, np.float64))
+        arm_tasks.begin_task(self.run, robot, TaskKind.REACH, np.asarray(target, np.float64))
 
     def pick(self, robot: int, entity: int) -> None:
         """Pick a thing up from above."""
-        tasks.pick(self.run, robot, entity)
+        arm_tasks.begin_pick(self.run, robot, entity)
 
     def place(self, robot: int, target: ArrayLike | int) -> None:
         """Put what the hand holds down at a point, ENU metres, or on the deck of the robot with an entity."""
         if isinstance(target, int):
-            tasks.place_on(self.run, robot, target)
+            arm_tasks.begin_place_on(self.run, robot, target)
             return
-        tasks.begin(self.run, robot, Kind.PLACE, np.asarray(target, np.float64))
+        arm_tasks.begin_task(self.run, robot, TaskKind.PLACE, np.asarray(target, np.float64))
 
     def follow(self, robot: int, path: ArrayLike) -> None:
         """Follow a polyline, ENU metres, shape ``(k, 2)``, ``k >= 2``."""
-        commands.take(self.run, robot, path)
+        commands.follow_path(self.run, robot, path)
 
     def follow_body(self, robot: int, entity: int) -> None:
         """Keep near a body, wherever it goes outdoors."""
@@ -269,7 +265,7 @@ class RobotPopulation:
         whole = dt if substep is None else substep
         if since == 0.0:
             self.engine.set_dynamic_obstacles(obstacles, whole)
-            trips.surround(self.run, whole)
+            trips.set_room_obstacles(self.run, whole)
             decide(self.run, whole, obstacles, self.bodies(), errands=self.errands)
             if len(self._loose):
                 self._loose.update(self._near_ground())
@@ -296,7 +292,7 @@ class RobotPopulation:
         holding = needs.forces_matter
         # Robots that walk and drive, by velocities or None.
         driven = [
-            (group, memory, velocities(self.run, group))
+            (group, memory, commanded_velocities(self.run, group))
             for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
             if flight is None
         ]
@@ -423,7 +419,7 @@ class RobotPopulation:
 
     def trip_refusal(self, robot: int, room: int, point: ArrayLike) -> str:
         """Why a robot can't go to a point of a room (-1: outdoors), in words; "" if it can."""
-        return trips.refusal(self.run, robot, room, np.asarray(point, np.float64))
+        return trips.trip_refusal(self.run, robot, room, np.asarray(point, np.float64))
 
     def at_doors(self) -> list[tuple[int, int]]:
         """Return the robots that wait at doors, and the rooms behind those (-1: outdoors)."""
@@ -446,7 +442,7 @@ class RobotPopulation:
     def pass_door(self, robot: int, room: int, taken: NDArray[np.float64]) -> bool:
         """Have a robot come through a door into a room (-1: outdoors); False if no spot there is clear of discs."""
         run = self.run
-        spot = trips.arrival(run, robot, room, int(run.trips.room[robot]), taken)
+        spot = trips.arrival_spot(run, robot, room, int(run.trips.room[robot]), taken)
         if spot is None:
             return False
         trips.pass_door(run, robot, room, spot)
@@ -482,13 +478,13 @@ class RobotPopulation:
         """Return whether a robot has a camera."""
         return self.models[robot].sensors.camera is not None
 
-    def readings(self, robot: int) -> Mapping[str, sensing.Reading]:
+    def readings(self, robot: int) -> Mapping[str, hardware.Reading]:
         """Return shape and bounds of what a robot feels of itself, by name."""
-        return sensing.readings_of(self.models[robot])
+        return hardware.readings_of(self.models[robot])
 
     def observation(self, robot: int) -> dict[str, NDArray[Any]]:
-        """Return what a robot feels of itself; see `vico.sim.robots.sensing.observation`."""
-        return sensing.observation(self.run, robot)
+        """Return what a robot feels of itself; see `vico.sim.robots.hardware.proprioception`."""
+        return hardware.proprioception(self.run, robot)
 
     def base_poses(self) -> NDArray[np.float64]:
         """Return where the bases are: x, y, z, quaternion w, x, y, z, float64, shape ``(n, 7)``."""

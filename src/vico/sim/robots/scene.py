@@ -1,8 +1,12 @@
-"""What is fixed about the robots of a run: built once a world and kinds of robots, shared by all its simulations."""
+"""What is fixed about the robots of a run: models, controllers by name, groups, outlines, and where they start.
+
+A `RobotScene` is built once a world and kinds of robots, and all its simulations share it. Others meet an upright box
+around each robot.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,18 +15,48 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import TICK, RobotModel, robot_model
 from vico.assets.robots.ground import narrow_ground
-from vico.sim.bodies import ROBOT
+from vico.errors import InputError
+from vico.seeds import rng
+from vico.sim.bodies import ROBOT, Bodies
 from vico.sim.indoor import Indoor
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
-from vico.sim.physics.city_chunks import surroundings_of
 from vico.sim.physics.records import Capacity, StaticScene
-from vico.sim.robots.airspace import Airspace
-from vico.sim.robots.controller import MotorController
-from vico.sim.robots.controllers import controller_for
-from vico.sim.robots.rooms import RobotRooms
+from vico.sim.physics.surroundings import surroundings_of
+from vico.sim.robots.biped import TwoLegWalker
+from vico.sim.robots.controller import DirectMotors, MotorController, SkidSteer
+from vico.sim.robots.manipulator import ArmOnWheels
+from vico.sim.robots.path_planning import Airspace, RobotRooms
+from vico.sim.robots.quadrotor import FourRotors
+from vico.sim.robots.quadruped import Legs
 from vico.world.heights import HeightField
 from vico.world.routing import Router
 from vico.world.world import World
+
+#: Makers of controllers by name.
+CONTROLLERS: dict[str, Callable[[RobotModel], MotorController]] = {
+    "motors": DirectMotors,
+    "skid_steer": SkidSteer,
+    "four_legs": Legs,
+    "mobile_manipulator": ArmOnWheels,
+    "quadrotor": FourRotors,
+    "two_legs": TwoLegWalker,
+}
+
+
+def controller_for(model: RobotModel) -> MotorController:
+    """Return what drives a kind of robot.
+
+    Raises
+    ------
+    InputError
+        If there is no controller of the name the model gives.
+    """
+    name = model.controller.name
+    if name not in CONTROLLERS:
+        known = ", ".join(CONTROLLERS)
+        raise InputError(f"robot {model.name!r}: no controller is called {name!r}; choose among {known}")
+    return CONTROLLERS[name](model)
+
 
 #: Half the side of floors in physics, metres, and who can be near a robot in a room: people, and walls and furniture.
 _FLOOR, _IN_A_ROOM = 50.0, Capacity(people=12, vehicles=48, objects=0)
@@ -196,3 +230,58 @@ def _groups(models: Sequence[RobotModel]) -> tuple[RobotGroup, ...]:
         for robots in members.values()
         for model in (models[robots[0]],)
     )
+
+
+#: Metres a robot has to be above where it stands on the ground to count as being in the air.
+_AIRBORNE = 0.5
+
+
+def bodies_of(
+    scene: RobotScene, engine: PhysicsEngine, entities: NDArray[np.int32], rooms: NDArray[np.int32]
+) -> Bodies:
+    """Return upright boxes around the robots: on the ground, on the floor of their rooms, or where they fly."""
+    outlines = scene.outlines
+    bases = [engine.base(i) for i in range(len(entities))]
+    position = np.array([base.position for base in bases]).reshape(-1, 3)
+    ground = scene.world.height(position)
+    inside = np.flatnonzero(rooms >= 0)
+    if len(inside):
+        ground[inside] = scene.rooms.indoor.floor[rooms[inside]]
+    bottom = position[:, 2] - outlines.stand
+    in_the_air = (bottom > ground + _AIRBORNE) | scene.outlines.flies
+    position[:, 2] = np.where(in_the_air, bottom, ground)
+    return Bodies(
+        entities,
+        outlines.kind,
+        position,
+        np.array([base.yaw for base in bases]),
+        outlines.half_length,
+        outlines.half_width,
+        outlines.height,
+        np.array([base.velocity for base in bases]).reshape(-1, 3)[:, :2].copy(),
+    )
+
+
+# Metres of free ground around each, and between two.
+_ROOM, _APART = 1.0, 3.0
+
+
+def spawn_poses(world: World, count: int, seed: int) -> NDArray[np.float64]:
+    """Return reachable places apart from each other: x, y, yaw, shape ``(count, 3)``.
+
+    Raises
+    ------
+    InputError
+        If there is no room for so many.
+    """
+    found: list[NDArray[np.float64]] = []
+    for i in range(count):
+        stream = rng(seed, "robot spawn", i)
+        for _ in range(200):
+            xy = world.walkable.random_point(stream, clearance=_ROOM)
+            if all(np.linalg.norm(xy - other[:2]) >= _APART for other in found):
+                break
+        else:
+            raise InputError(f"robots: no room for {count} robots {_APART} m apart; take fewer")
+        found.append(np.array([*xy, stream.uniform(-np.pi, np.pi)]))
+    return np.array(found).reshape(-1, 3)

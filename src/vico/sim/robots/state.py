@@ -1,4 +1,4 @@
-"""Everything about the robots of a run that changes, beside the physics: arrays, and the ways they follow."""
+"""State of the robots of a run, beside the physics: arrays, paths they follow, and where they are indoors."""
 
 from __future__ import annotations
 
@@ -15,16 +15,66 @@ from vico.errors import SchemaError
 from vico.seeds import rng
 from vico.sim.bodies import Bodies
 from vico.sim.physics import PhysicsEngine
-from vico.sim.physics.housed import HousedEngine
-from vico.sim.robots.oracle import OracleGrasp
-from vico.sim.robots.outlines import bodies_of
-from vico.sim.robots.path_follower import PathFollower, RobotStatus
-from vico.sim.robots.rotors import Flight
-from vico.sim.robots.scene import RobotScene
-from vico.sim.robots.trip_state import RobotTrips
-from vico.sim.robots.wind import gusts_of
-from vico.sim.robots.work import Work
+from vico.sim.physics.composite_engine import CompositeEngine
+from vico.sim.robots.manipulator import ArmTasks, OracleGrasp
+from vico.sim.robots.path_following import PathFollower, RobotStatus
+from vico.sim.robots.path_planning import OUTDOORS
+from vico.sim.robots.quadrotor import Flight, gusts_of
+from vico.sim.robots.scene import RobotScene, bodies_of
 from vico.sim.state import REASON_LENGTH, MovableObjects, People
+
+Array = NDArray[np.float64]
+
+#: No room, no door.
+NONE = -2
+
+
+@dataclass
+class RobotTrips:
+    """Where robots are indoors, and where they go; row = robot.
+
+    Attributes
+    ----------
+    room
+        Room it is in, `OUTDOORS` for none, int32, shape ``(n,)``.
+    goal_room, goal
+        Space it goes to, `NONE` without a trip, and the point there, ENU metres, shape ``(n, 3)``.
+    leg
+        Space behind the door that its path leads to, `NONE` where that leads to the goal, int32, shape ``(n,)``.
+    door
+        Space behind the door that it stands at and waits to go through, else `NONE`, int32, shape ``(n,)``.
+    ride
+        Seconds it has ridden in a lift, float64, shape ``(n,)``.
+    """
+
+    room: NDArray[np.int32]
+    goal_room: NDArray[np.int32]
+    goal: Array
+    leg: NDArray[np.int32]
+    door: NDArray[np.int32]
+    ride: Array
+
+    @classmethod
+    def none(cls, robots: int) -> RobotTrips:
+        """All robots are outdoors, and go nowhere."""
+        nowhere = np.full(robots, NONE, np.int32)
+        outdoors = np.full(robots, OUTDOORS, np.int32)
+        return cls(outdoors, nowhere, np.zeros((robots, 3)), nowhere.copy(), nowhere.copy(), np.zeros(robots))
+
+    def end(self, robot: int) -> None:
+        """Forget where a robot was going."""
+        self.goal_room[robot] = self.leg[robot] = self.door[robot] = NONE
+        self.goal[robot], self.ride[robot] = 0.0, 0.0
+
+    def saved(self) -> dict[str, NDArray[Any]]:
+        """Every number, copied."""
+        return {f"trip_{name}": array.copy() for name, array in vars(self).items()}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `saved` returned."""
+        for name, array in vars(self).items():
+            array[...] = arrays[f"trip_{name}"]
+
 
 #: Circles on the ground: x, y and radius, ENU metres.
 Circles = tuple[tuple[float, float, float], ...]
@@ -201,7 +251,7 @@ class RobotRun:
     memory: list[NDArray[np.float64]] = field(init=False)
     followers: list[PathFollower] = field(init=False)
     flights: list[Flight | None] = field(init=False)
-    work: list[Work | None] = field(init=False)
+    work: list[ArmTasks | None] = field(init=False)
     trips: RobotTrips = field(init=False)
     objects: MovableObjects = field(default_factory=MovableObjects.none)
     people: People | None = None
@@ -221,7 +271,7 @@ class RobotRun:
             for group in self.scene.groups
         ]
         self.work = [
-            Work(group.model, group.robots) if isinstance(group.model.controller, MobileManipulator) else None
+            ArmTasks(group.model, group.robots) if isinstance(group.model.controller, MobileManipulator) else None
             for group in self.scene.groups
         ]
 
@@ -243,15 +293,15 @@ class RobotRun:
 
     # Robots in rooms have engines of their own.
 
-    def housed(self) -> HousedEngine:
+    def housed(self) -> CompositeEngine:
         """Return the engine as one in which robots can be indoors."""
-        if not isinstance(self.engine, HousedEngine):
-            self.engine = HousedEngine(self.engine)
+        if not isinstance(self.engine, CompositeEngine):
+            self.engine = CompositeEngine(self.engine)
         return self.engine
 
     def unhouse(self) -> None:
         """Go back to the engine outdoors alone, which is quicker, where nobody is indoors."""
-        if isinstance(self.engine, HousedEngine) and not self.engine.inside:
+        if isinstance(self.engine, CompositeEngine) and not self.engine.inside:
             self.engine = self.engine.outdoors
 
     def forget(self, robot: int) -> None:
@@ -344,7 +394,7 @@ class RobotRun:
     def _house_again(self) -> None:
         """Have the robots be indoors that are so by their trips; their engines' states come after."""
         inside = np.flatnonzero(self.trips.room >= 0).tolist()
-        if isinstance(self.engine, HousedEngine):
+        if isinstance(self.engine, CompositeEngine):
             self.engine.inside.clear()
         for robot in inside:
             centre = np.array(self.scene.rooms.room(int(self.trips.room[robot])).centre)

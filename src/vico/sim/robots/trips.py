@@ -1,7 +1,8 @@
-"""Robots' ways through doors: in which room each is, where it is going, and at which door it waits.
+"""Trips of robots: paths outdoors, from door to door, and through doors into rooms.
 
-A way to another room is gone leg by leg: to the next door, through it, on from behind it. Whether a door can be gone
-through is for the simulation to say (`vico.sim.robot_doors`), which knows who stands behind it.
+A path outdoors is wide enough for the robot and clear of others. A trip to another room is gone leg by leg: to the next
+door, through it, on from behind it. Whether a door can be gone through is for the simulation to say
+(`vico.sim.robot_doors`), which knows who stands behind it.
 """
 
 from __future__ import annotations
@@ -14,13 +15,78 @@ from numpy.typing import NDArray
 from vico.assets.robots import MobileManipulator, SkidSteering
 from vico.geometry import distance
 from vico.sim.bodies import Bodies
-from vico.sim.physics.housed import HousedEngine
-from vico.sim.robots.rooms import DOORWAY, OUTDOORS, fits_doors, turning_radius
-from vico.sim.robots.state import RobotRun
-from vico.sim.robots.trip_state import NONE
-from vico.sim.robots.ways import way_to
+from vico.sim.physics.composite_engine import CompositeEngine
+from vico.sim.robots.path_planning import DOORWAY, OUTDOORS, fits_doors, turning_radius
+from vico.sim.robots.state import NONE, RobotRun
 from vico.sim.state import People
 from vico.world.model import Entrance
+
+_NOBODY = np.zeros((0, 3))
+
+
+def outdoor_path(
+    run: RobotRun,
+    robot: int,
+    goal: NDArray[np.float64],
+    closed: NDArray[np.float64] = _NOBODY,
+    *,
+    start: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64] | None:
+    """Return a way outdoors to a point that keeps clear of discs and of closed ground; None if there is none.
+
+    Whoever stands on ground that is closed may take any way out of it.
+
+    Parameters
+    ----------
+    goal
+        ENU metres; its x and y count.
+    closed
+        Discs to keep out of: x, y, radius, metres, shape ``(m, 3)``.
+    start
+        Where it begins, ENU metres; None: where the robot is.
+
+    Returns
+    -------
+    ndarray or None
+        Points of a polyline that begins at the robot, ENU metres, shape ``(k, 2)``, ``k >= 2``.
+    """
+    scene, walkable = run.scene, run.scene.world.walkable
+    blocked = scene.narrow(robot)
+    here = run.position(robot)[:2] if start is None else start[:2]
+    if run.closed_ground:
+        if is_on_closed_ground(run, np.asarray(goal, np.float64)[None, :2]):
+            return None
+        if not is_on_closed_ground(run, here[None]):
+            blocked = blocked | walkable.cells_within(run.closed_ground)
+    if len(closed):
+        blocked = blocked.copy()
+        for x, y, radius in closed:
+            (i0, j0), (i1, j1) = walkable.cell_of([[x - radius, y - radius], [x + radius, y + radius]])
+            yy, xx = np.mgrid[j0 : j1 + 1, i0 : i1 + 1]
+            centres = walkable.centre_of(np.stack([xx, yy], axis=-1))
+            blocked[j0 : j1 + 1, i0 : i1 + 1] |= np.hypot(centres[..., 0] - x, centres[..., 1] - y) < radius
+    path = scene.router.path(here, np.asarray(goal, np.float64)[:2], blocked=blocked)
+    if path is None:
+        return None
+    # The search may begin in a cell beside the robot's own.
+    return path if len(path) > 1 and np.allclose(path[0], here) else np.vstack([here, path])
+
+
+def is_on_closed_ground(run: RobotRun, points: NDArray[np.float64]) -> bool:
+    """Return whether events close the ground at any of some points, ENU metres, shape ``(k, 2)``."""
+    x, y, radius = np.array(run.closed_ground).reshape(-1, 3).T
+    return bool((np.hypot(points[:, :1] - x, points[:, 1:] - y) < radius).any())
+
+
+def errand_path(run: RobotRun, robot: int) -> NDArray[np.float64] | None:
+    """Draw another place for a robot, 40 to 250 m away, and return a way there; None if there is none."""
+    run.arrays.errand[robot] += 1
+    goals = run.scene.goals
+    away = np.hypot(*(goals - run.position(robot)[:2]).T)
+    order = run.errand_stream(robot).permutation(np.flatnonzero((away > 40.0) & (away < 250.0)))
+    ways = (outdoor_path(run, robot, goals[index]) for index in order[:5])
+    return next((way for way in ways if way is not None), None)
+
 
 Array = NDArray[np.float64]
 
@@ -33,12 +99,11 @@ _BEFORE_ENTRANCE, _TRIED = 4.0, 0.25
 _RAMP = 0.2
 #: Metres from its door within which who comes into a room stands.
 _BEHIND_DOOR = 2.5
-_NOBODY = np.zeros((0, 3))
 
 # Whether a robot can get somewhere.
 
 
-def refusal(run: RobotRun, robot: int, space: int, goal: Array) -> str:
+def trip_refusal(run: RobotRun, robot: int, space: int, goal: Array) -> str:
     """Why a robot can't go from where it is to a point of a room, or outdoors; "" if it can."""
     model, rooms = run.scene.models[robot], run.scene.rooms
     here, at = int(run.trips.room[robot]), run.position(robot)
@@ -46,23 +111,23 @@ def refusal(run: RobotRun, robot: int, space: int, goal: Array) -> str:
         return f"it is {2 * model.half_width:.2f} m wide, too wide for doors of {DOORWAY:g} m"
     for _ in range(len(rooms.indoor.rooms) + 2):
         if here == space:
-            return "" if _way(run, robot, here, at, goal, _NEAR_GOAL) is not None else _narrow(run, here)
+            return "" if _path_in_space(run, robot, here, at, goal, _NEAR_GOAL) is not None else _too_narrow(run, here)
         to = rooms.next_room(here, space)
         if to is None:
             return "no way leads there but stairs, and there is no lift"
         reason = _entrance_refusal(run, robot, max(here, to)) if OUTDOORS in (here, to) else ""
         if reason:
             return reason
-        if leg(run, robot, here, at, to) is None:
-            return _narrow(run, here)
-        spot = arrival(run, robot, to, here, _NOBODY)
+        if path_to_door(run, robot, here, at, to) is None:
+            return _too_narrow(run, here)
+        spot = arrival_spot(run, robot, to, here, _NOBODY)
         if spot is None:
-            return _narrow(run, to)
+            return _too_narrow(run, to)
         here, at = to, spot
     return "no way leads there"
 
 
-def _narrow(run: RobotRun, space: int) -> str:
+def _too_narrow(run: RobotRun, space: int) -> str:
     where = "outdoors" if space == OUTDOORS else f"in room {run.scene.rooms.room(space).id}"
     return f"no way {where} is wide enough for this robot"
 
@@ -70,7 +135,7 @@ def _narrow(run: RobotRun, space: int) -> str:
 def _entrance_refusal(run: RobotRun, robot: int, room: int) -> str:
     """Why a robot can't go through the entrance to a room."""
     entrance, model = run.scene.rooms.entrances[room], run.scene.models[robot]
-    spot = outside(run, robot, entrance)
+    spot = spot_before_entrance(run, robot, entrance)
     if spot is None:
         return "there is no room for this robot before the entrance"
     if isinstance(model.controller, SkidSteering | MobileManipulator):
@@ -84,30 +149,30 @@ def _entrance_refusal(run: RobotRun, robot: int, room: int) -> str:
 # Ways.
 
 
-def leg(run: RobotRun, robot: int, here: int, at: Array, to: int) -> Array | None:
+def path_to_door(run: RobotRun, robot: int, here: int, at: Array, to: int) -> Array | None:
     """Return the way from a point of a space to the door to the next one; None if there is none."""
     rooms, model = run.scene.rooms, run.scene.models[robot]
     if here == OUTDOORS:
-        spot = outside(run, robot, rooms.entrances[to])
-        return None if spot is None else _way(run, robot, here, at, spot, _NEAR_GOAL)
-    return _way(run, robot, here, at, rooms.door(here, to), _NEAR_DOOR + model.half_length)
+        spot = spot_before_entrance(run, robot, rooms.entrances[to])
+        return None if spot is None else _path_in_space(run, robot, here, at, spot, _NEAR_GOAL)
+    return _path_in_space(run, robot, here, at, rooms.door(here, to), _NEAR_DOOR + model.half_length)
 
 
-def _way(run: RobotRun, robot: int, here: int, at: Array, goal: Array, within: float) -> Array | None:
+def _path_in_space(run: RobotRun, robot: int, here: int, at: Array, goal: Array, within: float) -> Array | None:
     if here != OUTDOORS:
         radius = turning_radius(run.scene.models[robot])
         return run.scene.rooms.path(here, at, goal, radius, within=within)
-    path = way_to(run, robot, goal, start=at[:2])
+    path = outdoor_path(run, robot, goal, start=at[:2])
     if path is None or distance(path[-1], goal[:2]) > max(within, 1.0):
         return None
     return path
 
 
-def way_on(run: RobotRun, robot: int, goal: Array, closed: Array) -> Array | None:
+def path_around(run: RobotRun, robot: int, goal: Array, closed: Array) -> Array | None:
     """Return another way to a point of the space that a robot is in, clear of discs; None if there is none."""
     trips, model = run.trips, run.scene.models[robot]
     if trips.room[robot] == OUTDOORS:
-        return way_to(run, robot, goal, closed)
+        return outdoor_path(run, robot, goal, closed)
     within = _NEAR_GOAL if trips.leg[robot] == NONE else _NEAR_DOOR + model.half_length
     room, radius = int(trips.room[robot]), turning_radius(model)
     return run.scene.rooms.path(room, run.position(robot), goal, radius, within=within, closed=closed)
@@ -118,10 +183,14 @@ def begin_leg(run: RobotRun, robot: int, space: int, goal: Array) -> bool:
     trips, here, at = run.trips, int(run.trips.room[robot]), run.position(robot)
     to = NONE
     if here == space:
-        path = way_to(run, robot, goal) if here == OUTDOORS else _way(run, robot, here, at, goal, _NEAR_GOAL)
+        path = (
+            outdoor_path(run, robot, goal)
+            if here == OUTDOORS
+            else _path_in_space(run, robot, here, at, goal, _NEAR_GOAL)
+        )
     else:
         found = run.scene.rooms.next_room(here, space) if fits_doors(run.scene.models[robot]) else None
-        path = None if found is None else leg(run, robot, here, at, found)
+        path = None if found is None else path_to_door(run, robot, here, at, found)
         if path is not None and OUTDOORS in (here, found) and _entrance_refusal(run, robot, max(here, found or 0)):
             path = None
         to = NONE if found is None else found
@@ -136,7 +205,7 @@ def begin_leg(run: RobotRun, robot: int, space: int, goal: Array) -> bool:
 # Doors.
 
 
-def outside(run: RobotRun, robot: int, entrance: Entrance, closed: Array = _NOBODY) -> Array | None:
+def spot_before_entrance(run: RobotRun, robot: int, entrance: Entrance, closed: Array = _NOBODY) -> Array | None:
     """Return where a robot stands before an entrance, clear of discs (x, y, radius), shape ``(2,)``; None for none."""
     walkable, model = run.scene.world.walkable, run.scene.models[robot]
     steps = np.arange(-_BEFORE_ENTRANCE, _BEFORE_ENTRANCE + _TRIED / 2, _TRIED)
@@ -153,7 +222,7 @@ def outside(run: RobotRun, robot: int, entrance: Entrance, closed: Array = _NOBO
     return np.asarray(grid[int(away.argmin())])
 
 
-def arrival(run: RobotRun, robot: int, space: int, origin: int, taken: Array) -> Array | None:
+def arrival_spot(run: RobotRun, robot: int, space: int, origin: int, taken: Array) -> Array | None:
     """Return where a robot stands that comes through a door, ENU metres, shape ``(2,)``; None if there is no room.
 
     Parameters
@@ -165,7 +234,7 @@ def arrival(run: RobotRun, robot: int, space: int, origin: int, taken: Array) ->
     """
     rooms, radius = run.scene.rooms, turning_radius(run.scene.models[robot])
     if space == OUTDOORS:
-        return outside(run, robot, rooms.entrances[origin], taken)
+        return spot_before_entrance(run, robot, rooms.entrances[origin], taken)
     near = rooms.indoor.arrival(space, origin)
     return rooms.spot(space, near, radius, taken, _BEHIND_DOOR)
 
@@ -190,10 +259,10 @@ def pass_door(run: RobotRun, robot: int, space: int, spot: Array) -> None:
     run.forget(robot)
 
 
-def surround(run: RobotRun, dt: float) -> None:
+def set_room_obstacles(run: RobotRun, dt: float) -> None:
     """Tell physics in rooms who and what is around each robot there, and arrives in `dt` seconds."""
     engine = run.engine
-    if isinstance(engine, HousedEngine):
+    if isinstance(engine, CompositeEngine):
         for robot in engine.inside:
             solids = run.scene.rooms.solids(int(run.trips.room[robot]))
             engine.surround(robot, Bodies.joined([solids, others_in_room(run, robot)]), dt)
@@ -211,7 +280,7 @@ def others_in_room(run: RobotRun, robot: int) -> Bodies:
     return Bodies.joined(parts)
 
 
-def whereabouts(run: RobotRun, entity: int, outdoors: Bodies) -> tuple[int, Array] | None:
+def space_of_body(run: RobotRun, entity: int, outdoors: Bodies) -> tuple[int, Array] | None:
     """Return the space a body is in and where in it, ENU metres; None for one that is in none, or unknown."""
     mine = np.flatnonzero(run.entities == entity)
     if len(mine):

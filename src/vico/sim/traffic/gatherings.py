@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from vico.geometry import distance
 from vico.sim.environment.event_crowds import Gathering
-from vico.sim.traffic.guides import guided_walks
-from vico.sim.traffic.records import CROWD, NONE, WINDOW
+from vico.sim.traffic.placement import guided_walks
 from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.state import WalkwayNetwork
+from vico.sim.traffic.state import CROWD, NONE, WINDOW, WalkwayNetwork
 from vico.world.walkways import SIDEWALK, Walkways
 
 _MOST = 0.4  # share of all pedestrians that go to one event

@@ -1,6 +1,6 @@
-"""The path ahead of a vehicle and its outline along it.
+"""The path ahead of a vehicle, its outline along that path, and its motion on it.
 
-A vehicle's path is laid once a step as a small polyline; following it and sweeping the outline along it then needs
+A vehicle's path is laid once a step as a small polyline. Following it and sweeping the outline along it then needs
 nothing else.
 """
 
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vico.io.compiled import compiled, inlined
-from vico.sim.traffic.records import NONE, PREVIOUS_LANES
+from vico.sim.traffic.state import BACKING_IN, NONE, PREVIOUS_LANES
 
 #: A point of a path: x, y (ENU metres) and `s`, metres from the start of the lane the vehicle is on.
 PATH_POINT = np.dtype([("x", np.float64), ("y", np.float64), ("s", np.float64)])
@@ -220,3 +220,18 @@ def project_on_polyline(points, along, begin, end, x, y):  # type: ignore[no-unt
             offset = along[p] + t * size
             side = (dx * (y - ay) - dy * (x - ax)) / size
     return offset, side
+
+
+@inlined
+def move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
+    """Move a vehicle along its path, metres, in `dt` seconds, and put its body there."""
+    x, y, c, s = footprint(view.path, view.outline, vehicle.offset + move)
+    vehicle.offset += move
+    if vehicle.lateral_offset != 0.0 and (move > 0.0 or vehicle.stopping == BACKING_IN):
+        # The front's own metres: `outline` keeps what a point of the path had done when the change began.
+        vehicle.lane_change_distance += move
+    v = vehicle.index
+    shapes.vx[v], shapes.vy[v] = (x - shapes.x[v]) / dt, (y - shapes.y[v]) / dt
+    shapes.x[v], shapes.y[v], shapes.yaw[v] = x, y, np.arctan2(s, c)
+    if vehicle.lane_change_length > 0.0 and vehicle.lane_change_distance > end_of_lane_change(vehicle):
+        vehicle.lateral_offset = 0.0

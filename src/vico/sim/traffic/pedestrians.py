@@ -1,7 +1,10 @@
-"""How pedestrians walk: both ways on sidewalks, round each other, over crossings when they are clear.
+"""How pedestrians walk and stand: on sidewalks, round each other, over crossings when those are clear.
 
 Each follows a point that runs a little ahead of it along its walkway, on the right-hand side. Of a few headings around
 that point it takes the one that leads furthest, and makes no step that would touch another body.
+
+A pedestrian who walks alone stops before a shop window or at a bus stop it passes; two who walk together stop to talk.
+At a bus stop one waits until the bus is there, or gives up. A pedestrian who stands leaves the walkway, and comes back.
 """
 
 from __future__ import annotations
@@ -10,20 +13,143 @@ import numpy as np
 
 from vico.io.compiled import compiled, inlined
 from vico.rules import STAIRS_SPEED
+from vico.seeds import rng
 from vico.sim.neighbours import search
-from vico.sim.traffic.companions import (
+from vico.sim.traffic.pedestrian_routes import (
+    PEDESTRIAN_RADIUS,
+    FollowPoint,
+    advance_follow_point,
+    follow_point,
     goes_wrong_way,
     keep_up,
+    leave_crossing,
     note_distance,
+    turn_round,
     wait_for_companions,
 )
-from vico.sim.traffic.follow_point import FollowPoint, follow_point
-from vico.sim.traffic.leaving import RADIUS, leave_crossing
-from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.records import CROWD, GAIT_TIME, NONE
-from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
-from vico.sim.traffic.standing import note_standing, stop_at_spot, turn_towards
-from vico.sim.traffic.walkway_choice import advance_follow_point, turn_round
+from vico.sim.traffic.shapes import Shapes, disc_touches, distance_to, is_disc, share_level
+from vico.sim.traffic.state import CROWD, GAIT_TIME, LED, NONE, STOP, TALK, Records, WalkwayNetwork, next_random
+
+#: Share of those who pass a free spot that take it, and how long they stand, s; by kind of spot.
+_CHANCE = np.array([0.0, 0.1, 0.2, 0.25])
+_SHORTEST = np.array([0.0, 10.0, 40.0, 420.0])
+_LONGEST = np.array([0.0, 45.0, 180.0, 900.0])
+#: Share of the spots at stops where somebody waits at the start, and of the pedestrians that do at the most.
+_WAITING_AT_START, _MOST_AT_START = 0.5, 0.08
+_ROOM = 0.3  # m: a body's radius and a little air
+_STANDING_TURN_RATE = 2.5  # rad/s
+_MAKES_WAY = 3.0  # s that somebody goes on standing at most whom a vehicle waits for to go
+_TOGETHER = 2.0  # m within which two stop together
+
+
+@compiled
+def _is_free(paths, pedestrians, k, shapes, i, first):  # type: ignore[no-untyped-def]
+    """Return whether nobody stands at spot k or is on the way there, but pedestrian i."""
+    for other in range(len(pedestrians)):
+        if pedestrians[other].spot == k:
+            return False
+    spot = paths.spots[k]
+    for j in range(len(shapes.x)):
+        if j != first + i and abs(shapes.x[j] - spot.x) < 8.0 and disc_touches(spot.x, spot.y, _ROOM, shapes, j):
+            return False
+    return True
+
+
+@compiled
+def _take_spot(paths, walker, k, seconds):  # type: ignore[no-untyped-def]
+    """Have somebody go to spot k, to stand there."""
+    spot = paths.spots[k]
+    walker.spot, walker.stand_kind, walker.stand_time = k, spot.kind, seconds
+    walker.stand_xy[0], walker.stand_xy[1], walker.stand_yaw = spot.x, spot.y, spot.yaw
+
+
+@compiled
+def leave_spot(walker):  # type: ignore[no-untyped-def]
+    """Have somebody walk on."""
+    walker.spot, walker.stand_kind, walker.stand_time = NONE, 0, 0.0
+    walker.jammed_time = walker.stuck_time = 0.0
+
+
+@compiled
+def _wants(paths, walker, k):  # type: ignore[no-untyped-def]
+    """Return whether somebody who passes spot k stops there, if it is free: a matter of chance."""
+    kind = paths.spots[k].kind
+    if walker.group_size != (2 if kind == TALK else 1):
+        return False
+    return next_random(walker) < _CHANCE[kind]
+
+
+@compiled
+def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[no-untyped-def]
+    """Have pedestrian i stop at one of the spots it has come past since its walkway's metre `offset`."""
+    walker = pedestrians[i]
+    way = walker.walkway
+    if walker.leader != NONE or walker.goal != NONE or walker.leaving_crossing != NONE or paths.walkways[way].shut:
+        return
+    low, high = min(offset, walker.offset), max(offset, walker.offset)
+    for k in range(paths.spot_first[way], paths.spot_first[way + 1]):
+        passes = low < paths.spots[k].offset <= high
+        if not passes or not _wants(paths, walker, k) or not _is_free(paths, pedestrians, k, shapes, i, first):
+            continue
+        kind = paths.spots[k].kind
+        seconds = _SHORTEST[kind] + next_random(walker) * (_LONGEST[kind] - _SHORTEST[kind])
+        if kind == TALK:
+            other = pedestrians[i + 1]
+            together = other.walkway == way and walker.apart < _TOGETHER and other.leaving_crossing == NONE
+            partner = paths.spots[k].partner
+            if not together or not _is_free(paths, pedestrians, partner, shapes, i + 1, first):
+                continue
+            _take_spot(paths, other, partner, seconds)
+        _take_spot(paths, walker, k, seconds)
+        return
+
+
+@compiled
+def note_standing(paths, pedestrians, walker, is_there, is_asked, dt):  # type: ignore[no-untyped-def]
+    """Count the time somebody stands; who has stood long enough walks on, or can't get there, or may not be there.
+
+    So does, before long, who is asked to go: a bus that leaves its stop swings out over the kerb.
+    """
+    if walker.stand_kind >= LED:
+        return
+    walker.stand_time -= dt
+    if is_asked:
+        walker.stand_time = min(walker.stand_time, _MAKES_WAY)
+    deserted = walker.stand_kind == TALK and walker.leader != NONE and pedestrians[walker.leader].stand_kind != TALK
+    is_over = walker.stand_time <= 0.0 or paths.walkways[walker.walkway].shut
+    if is_over or deserted or (not is_there and walker.jammed_time > 6.0):
+        leave_spot(walker)
+
+
+@compiled
+def turn_towards(shapes, b, yaw, dt):  # type: ignore[no-untyped-def]
+    """Turn body b on the spot."""
+    turn = (yaw - shapes.yaw[b] + np.pi) % (2 * np.pi) - np.pi
+    shapes.yaw[b] += min(max(turn, -_STANDING_TURN_RATE * dt), _STANDING_TURN_RATE * dt)
+
+
+def stand_at_start(paths: WalkwayNetwork, walkers: Records, shapes: Shapes, first: int, seed: int) -> None:
+    """Have some of those who walk alone wait at bus stops when a run begins; their bodies begin at `first`."""
+    random = rng(seed, "traffic", "standing")
+    alone = np.flatnonzero((walkers["group_size"] == 1) & (walkers["goal"] == NONE))
+    spots = np.flatnonzero(paths.spots["kind"] == STOP)
+    spots = spots[random.random(len(spots)) < _WAITING_AT_START]
+    count = min(len(spots), int(_MOST_AT_START * len(walkers)), len(alone))
+    chosen = random.permutation(spots)[:count]
+    for i, k in zip(random.permutation(alone)[:count].tolist(), chosen.tolist(), strict=True):
+        spot, walker, b = paths.spots[k], walkers[i], first + i
+        x, y = float(spot["x"]), float(spot["y"])
+        if any(disc_touches(x, y, _ROOM, shapes, j) for j in range(len(shapes.x)) if j != b):
+            continue
+        shapes.x[b], shapes.y[b], shapes.yaw[b] = x, y, spot["yaw"]
+        walker["walkway"], walker["offset"] = spot["walkway"], spot["offset"]
+        walker["spot"], walker["stand_kind"], walker["stand_time"] = (
+            k,
+            STOP,
+            random.uniform(_SHORTEST[STOP], _LONGEST[STOP]),
+        )
+        walker["stand_xy"], walker["stand_yaw"], walker["progress_xy"] = (x, y), spot["yaw"], (x, y)
+
 
 _SIGHT = 2.2  # how far ahead others are avoided, m
 _TOUCH, _LEAST_GAP = 0.03, 0.005  # no step leaves less, m; the second towards whom one walks away from
@@ -70,7 +196,7 @@ def _nearby(shapes, grid, b, buffer):  # type: ignore[no-untyped-def]
 def _leads_off(x, y, c, s, shapes, j):  # type: ignore[no-untyped-def]
     """Return whether a first step along a heading comes no nearer to somebody than one may be, or away from them."""
     tx, ty = x + c * _FIRST_STEP, y + s * _FIRST_STEP
-    if not disc_touches(tx, ty, RADIUS + _TOUCH, shapes, j):
+    if not disc_touches(tx, ty, PEDESTRIAN_RADIUS + _TOUCH, shapes, j):
         return True
     return distance_to(tx, ty, shapes, j) > distance_to(x, y, shapes, j)
 
@@ -82,7 +208,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
     for j in near:
         dx, dy = shapes.x[j] - x, shapes.y[j] - y
         if is_disc(shapes, j):
-            reach = RADIUS + shapes.half_length[j] + gap
+            reach = PEDESTRIAN_RADIUS + shapes.half_length[j] + gap
             ahead = dx * c + dy * s
             if ahead <= 0.0:
                 continue
@@ -95,7 +221,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
                 return 0.0
             d = 0.25
             while d < free:
-                if disc_touches(x + c * d, y + s * d, RADIUS + gap, shapes, j):
+                if disc_touches(x + c * d, y + s * d, PEDESTRIAN_RADIUS + gap, shapes, j):
                     free = min(free, d - 0.25)
                 d += 0.25
     return free
@@ -137,9 +263,9 @@ def best_heading(x, y, point, shapes, near, is_jammed, facing):  # type: ignore[
 def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
     """Return whether a walker at (x, y) may stand at (tx, ty); who is too near already may go away from the other."""
     for j in near:
-        if disc_touches(tx, ty, RADIUS + _TOUCH, shapes, j):
+        if disc_touches(tx, ty, PEDESTRIAN_RADIUS + _TOUCH, shapes, j):
             is_leaving = distance_to(tx, ty, shapes, j) > distance_to(x, y, shapes, j)
-            if not is_leaving or disc_touches(tx, ty, RADIUS + _LEAST_GAP, shapes, j):
+            if not is_leaving or disc_touches(tx, ty, PEDESTRIAN_RADIUS + _LEAST_GAP, shapes, j):
                 return False
     return True
 
@@ -336,7 +462,7 @@ def place_pedestrian(paths, pedestrians, i, walkway, offset, direction, shapes, 
     walker.walkway, walker.offset, walker.direction = walkway, offset, direction
     point = follow_point(paths, walker)
     for j in range(len(shapes.x)):
-        if j != b and share_level(shapes, b, j) and disc_touches(point.x, point.y, RADIUS + 0.5, shapes, j):
+        if j != b and share_level(shapes, b, j) and disc_touches(point.x, point.y, PEDESTRIAN_RADIUS + 0.5, shapes, j):
             return False
     shapes.x[b], shapes.y[b] = point.x, point.y
     along = np.arctan2(point.left_y, point.left_x)

@@ -11,29 +11,38 @@ from numpy.typing import NDArray
 from vico.sim.bodies import BUS, CAR, CYCLIST, PEDESTRIAN, STEP_HEIGHT, Bodies
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
-from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
-from vico.sim.traffic.crossings import mark_busy_crossings
-from vico.sim.traffic.cyclists import HALF_WIDTH, HEIGHT, equip_cyclists, kerb_points
-from vico.sim.traffic.drawing import TrafficDrawing
+from vico.sim.traffic.car_following import (
+    COMFORTABLE_BRAKING,
+    CYCLIST_HALF_WIDTH,
+    CYCLIST_HEIGHT,
+    TIME_GAP,
+    choose_models,
+    equip_cyclists,
+    kerb_points,
+)
+from vico.sim.traffic.drawing import TrafficDrawing, TrafficView
 from vico.sim.traffic.gatherings import Gatherings
-from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
-from vico.sim.traffic.leaving import RADIUS
-from vico.sim.traffic.levels import TrafficLevels, shapes_of
+from vico.sim.traffic.junctions import crossed_tracks
 from vico.sim.traffic.network import TrafficNetwork
-from vico.sim.traffic.pedestrians import advance_pedestrians
-from vico.sim.traffic.records import AWAY, COMING, PEDESTRIAN_RECORD, TOP_SPEED, VEHICLE_STATE
+from vico.sim.traffic.pedestrian_routes import PEDESTRIAN_RADIUS, mark_busy_crossings
+from vico.sim.traffic.pedestrians import advance_pedestrians, stand_at_start
+from vico.sim.traffic.placement import HandPlaced, Starting, TrafficSetup
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
-from vico.sim.traffic.seen import SeenTraffic
-from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.signal_heads import SignalHeads
-from vico.sim.traffic.signals import Circles, SignalClock, SignalsShown
-from vico.sim.traffic.standing import stand_at_start
-from vico.sim.traffic.starting import Starting
-from vico.sim.traffic.state import BusRoutes, new_fleet, new_junctions, new_pedestrians
+from vico.sim.traffic.shapes import Shapes, TrafficLevels, shapes_of
+from vico.sim.traffic.signals import Circles, SignalClock, SignalHeads, SignalsShown
+from vico.sim.traffic.state import (
+    AWAY,
+    COMING,
+    PEDESTRIAN_RECORD,
+    TOP_SPEED,
+    VEHICLE_STATE,
+    BusRoutes,
+    new_fleet,
+    new_junctions,
+    new_pedestrians,
+)
 from vico.sim.traffic.stopping_places import without_deliveries
-from vico.sim.traffic.track_crossings import crossed_tracks
-from vico.sim.traffic.vehicle_models import choose_models
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
 from vico.world.heights import HeightField
 
@@ -46,7 +55,7 @@ _CELL = 25.0  # of the grid of neighbours, m
 _DRIFT = 2.0 * TOP_SPEED  # nobody moves faster, m/s
 
 
-class Traffic(SeenTraffic):
+class Traffic(TrafficView):
     """Vehicles and pedestrians, as arrays.
 
     Parameters
@@ -121,7 +130,7 @@ class Traffic(SeenTraffic):
             self._vehicles[: ridden.start].view(np.recarray), buses.buses, models, seed
         )
         self.prototype = np.concatenate([motor, equip_cyclists(self._vehicles[ridden].view(np.recarray), seed)])
-        self._vehicle_height = np.concatenate([height_of_motor, np.full(cyclists, HEIGHT)])
+        self._vehicle_height = np.concatenate([height_of_motor, np.full(cyclists, CYCLIST_HEIGHT)])
         #: Metres that each cyclist has ridden.
         self.ridden = np.zeros(cyclists)
         self._riding_speed = self.fleet.target_speed[ridden].copy()
@@ -170,9 +179,9 @@ class Traffic(SeenTraffic):
             x=np.full(n, _FAR) + np.arange(n) * 100.0,
             y=np.full(n, _FAR),
             yaw=np.zeros(n),
-            half_length=np.concatenate([self.fleet.length / 2, np.full(self.pedestrians, RADIUS)]),
-            half_width=np.concatenate([self.fleet.half_width, np.full(self.pedestrians, RADIUS)]),
-            rounding=np.where(walks, RADIUS, np.where(is_person, HALF_WIDTH, 0.0)),
+            half_length=np.concatenate([self.fleet.length / 2, np.full(self.pedestrians, PEDESTRIAN_RADIUS)]),
+            half_width=np.concatenate([self.fleet.half_width, np.full(self.pedestrians, PEDESTRIAN_RADIUS)]),
+            rounding=np.where(walks, PEDESTRIAN_RADIUS, np.where(is_person, CYCLIST_HALF_WIDTH, 0.0)),
             bottom=np.where(is_person, STEP_HEIGHT, 0.0),
             top=self._heights.copy(),
             vx=np.zeros(n),
@@ -306,7 +315,7 @@ class Traffic(SeenTraffic):
         Parameters
         ----------
         crossings
-            Lane by lane, dtype `vico.sim.traffic.records.TRACK_CROSSING`.
+            Lane by lane, dtype `vico.sim.traffic.state.TRACK_CROSSING`.
 
         Returns
         -------

@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 from vico.io.compiled import compiled, inlined
-from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.records import HELD_JUNCTIONS, LEAVING, NONE, PLANNED_LANES, PRESENT, PREVIOUS_LANES, STANDING
+from vico.sim.traffic.state import (
+    HELD_JUNCTIONS,
+    LEAVING,
+    NONE,
+    PLANNED_LANES,
+    PRESENT,
+    PREVIOUS_LANES,
+    STANDING,
+    next_random,
+)
 
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m

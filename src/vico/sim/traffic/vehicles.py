@@ -11,41 +11,60 @@ import numpy as np
 from vico.io.compiled import compiled, inlined
 from vico.sim.footprints import Rectangle
 from vico.sim.neighbours import search
-from vico.sim.traffic.backing_up import leaves_room_for, vehicles_backing_up
 from vico.sim.traffic.car_following import (
     CLOSING_UP,
-    braking_distance,
-    idm_acceleration,
-    leader_speed,
-    look_ahead,
-    mind_only_before,
-    next_speed,
-)
-from vico.sim.traffic.car_parks import stay_in_car_park
-from vico.sim.traffic.claims import holds_junction, note_claims, release_all_junctions, release_junctions
-from vico.sim.traffic.junctions import hesitates, next_junction_request, request_junctions
-from vico.sim.traffic.lane_change import (
-    change_as_route_does,
-    change_to_emptier_lane,
-    change_to_lane_beside,
-    keep_to_kerb,
-    overtake_cyclist,
-    wants_lane_change,
-    wants_to_overtake_cyclist,
-)
-from vico.sim.traffic.leader import (
     NEARBY_BODY,
     TOUCH,
     Surroundings,
     VehicleView,
+    braking_distance,
+    clip_leader_before_stop,
     find_leader,
+    idm_acceleration,
+    leader_speed,
+    look_ahead,
     nearby_bodies,
+    next_speed,
     touched_at,
     touches,
 )
-from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in, room_to_change
+from vico.sim.traffic.jams import leaves_room_for, vehicles_backing_up
+from vico.sim.traffic.junctions import (
+    asks_with_track,
+    distance_to_track,
+    holds_junction,
+    is_hesitating,
+    look_over,
+    next_junction_request,
+    note_claims,
+    release_all_junctions,
+    release_junctions,
+    request_junctions,
+    track_ahead,
+    waits_for_tram,
+)
+from vico.sim.traffic.lane_change import (
+    change_as_route_does,
+    change_to_emptier_lane,
+    change_to_lane_beside,
+    distance_to_let_in,
+    keep_to_kerb,
+    overtake_cyclist,
+    places_to_let_in,
+    room_to_change,
+    wants_lane_change,
+    wants_to_overtake_cyclist,
+)
 from vico.sim.traffic.lights import shown_lights
-from vico.sim.traffic.moving import move_vehicle
+from vico.sim.traffic.parking import (
+    choose_place,
+    come_to_place,
+    distance_to_place,
+    is_behind_delivery,
+    speed_into_place,
+    stay_at_place,
+    stay_in_car_park,
+)
 from vico.sim.traffic.path import (
     PATH_POINT,
     PATH_POINTS,
@@ -53,11 +72,10 @@ from vico.sim.traffic.path import (
     footprint,
     lane_polyline,
     line_points,
+    move_vehicle,
     path_polyline,
     vehicle_outline,
 )
-from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.records import APPROACHING, AWAY, DRIVING, NONE, PRESENT
 from vico.sim.traffic.route import (
     NEVER,
     advance_lane,
@@ -67,15 +85,7 @@ from vico.sim.traffic.route import (
     step_back_lane,
 )
 from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
-from vico.sim.traffic.stopping import (
-    choose_place,
-    come_to_place,
-    distance_to_place,
-    is_behind_delivery,
-    speed_into_place,
-    stay_at_place,
-)
-from vico.sim.traffic.track_crossings import asks_with_track, distance_to_track, look_over, track_ahead, waits_for_tram
+from vico.sim.traffic.state import APPROACHING, AWAY, DRIVING, NONE, PRESENT, next_random
 
 STANDING = 0.1  # slower is standing, m/s ...
 _STARTED = 0.95  # ... where a vehicle gains so much in a step: slower than this share of what it can gain
@@ -125,7 +135,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
         track = track_ahead(net, vehicle, look)
         look = max(look, look_over(track))
-        if hesitates(net, vehicle) or loses_its_green(net, vehicle):
+        if is_hesitating(net, vehicle) or loses_its_green(net, vehicle):
             vehicle.granted_count = 0
             release_junctions(net, junctions, vehicle)
 
@@ -153,7 +163,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
 
         wanted = desired_speed(net, vehicle)
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
-        gap, leader = mind_only_before(stop, gap, leader)
+        gap, leader = clip_leader_before_stop(stop, gap, leader)
         leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
         to_track = distance_to_track(track, vehicle, stop_distance, gap, leading)
         stop, limit = min(stop, to_track), min(limit, np.sqrt(2 * vehicle.braking * to_track))

@@ -1,24 +1,27 @@
-"""People nobody plays who ride in buses and trams: they wait at stops, get in by a door, sit, and get off later.
+"""Passengers of buses and trams without an agent, and the doors of those vehicles.
 
-Where a bus is asked for, numbers from the number of buses on are trams, as with `vico.sim.transit.TransitSystem`.
+Passengers wait at stops, get in by a door, sit, and get off later. Where a bus is asked for, numbers from the number of
+buses on are trams, as with `vico.sim.transit.TransitSystem`. Doors are told by how far they are open.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.exact import product
 from vico.geometry import distances
 from vico.seeds import rng
 from vico.sim.avatars import free_ground
 from vico.sim.bodies import Bodies
+from vico.sim.traffic.drawing import Seating
 from vico.sim.traffic.population import Traffic
-from vico.sim.traffic.records import BOARD, NONE, STOP
-from vico.sim.traffic.seen import Seating
+from vico.sim.traffic.state import BOARD, NONE, STOP
 from vico.world.transit_model import Stop, TramStop, Transit
 from vico.world.walkable import WalkableMap
 from vico.world.walkways import SIDEWALK
@@ -220,3 +223,44 @@ def _sidewalks_at(transit: HasBuses) -> dict[str, tuple[int, float]]:
             best = int(near[np.argmin(shapely.distance([lines[k] for k in near.tolist()], point))])
             found[stop.id] = int(ways[best]), float(shapely.line_locate_point(lines[best], point))
     return found
+
+
+#: Seconds that doors take to open or close.
+DOOR_TIME = 1.6
+_PLUG = 0.05  # metres that open leaves stand out from the side
+
+
+def step_doors(share: float, wanted: bool, dt: float) -> float:
+    """Return how far doors are open, 0..1, that have opened (or closed, if that is wanted) for `dt` seconds more."""
+    return min(max(share + (dt if wanted else -dt) / DOOR_TIME, 0.0), 1.0)
+
+
+def leaf_transforms(
+    bases: NDArray[np.float64], leaves: Sequence[tuple[float, float, float]], share: NDArray[np.float64], width: float
+) -> NDArray[np.float64]:
+    """Return where door leaves are, an open one before the wall beside its door.
+
+    Parameters
+    ----------
+    bases
+        Model to world of each vehicle, shape ``(n, 4, 4)``.
+    leaves
+        Of each leaf when closed the middle's x and y in the vehicle, metres, and which way along x it slides.
+    share
+        How far the doors of each vehicle are open, 0..1, shape ``(n,)``.
+    width
+        Metres that a leaf slides.
+
+    Returns
+    -------
+    ndarray
+        Shape ``(leaves * n, 4, 4)``, leaf by leaf.
+    """
+    n = len(bases)
+    found = []
+    for x, y, way in leaves:
+        local = np.tile(np.eye(4), (n, 1, 1))
+        local[:, 0, 3] = x + share * width * way
+        local[:, 1, 3] = y + math.copysign(_PLUG, y) * np.minimum(share * 8.0, 1.0)
+        found.append(product(bases, local))
+    return np.concatenate(found) if found else np.zeros((0, 4, 4))

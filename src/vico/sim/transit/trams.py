@@ -2,8 +2,8 @@
 
 A tram is where its front is along its track; its sections stand on the track behind it. It never moves into anybody:
 what is in its way ahead, or is about to be, it brakes for, and stands before it. Where tracks cross or meet one tram at
-a time is let in (`vico.sim.transit.tram_zones`); where signals are obeyed, trams obey those of the lanes beside them
-(`vico.sim.transit.tram_signals`).
+a time is let in (`vico.sim.transit.tram_network`); where signals are obeyed, trams obey those of the lanes beside them
+(`vico.sim.transit.tram_network`).
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from vico.clock import DAY
 from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
-from vico.sim.traffic.leaving import RADIUS
-from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
-from vico.sim.transit.passengers import FIRST_PASSENGER
-from vico.sim.transit.tram_crossings import TramCrossings
-from vico.sim.transit.tram_network import TramNetwork
-from vico.sim.transit.tram_outlines import (
-    first_taken,
+from vico.sim.traffic.pedestrian_routes import PEDESTRIAN_RADIUS
+from vico.sim.transit.passengers import DOOR_TIME, FIRST_PASSENGER, leaf_transforms, step_doors
+from vico.sim.transit.tram_network import (
+    TramCrossings,
+    TramNetwork,
+    TramSignal,
+    absent_footprints,
+    first_obstructed,
+    footprint_rows,
     holds_somebody,
-    in_way,
     inside_city,
-    nobody,
-    outlines,
-    packed,
-    stand,
+    metres_to_signal,
+    people_in_way,
+    place_sections,
+    section_outlines,
 )
-from vico.sim.transit.tram_signals import TramSignal, metres_to_signal
 from vico.world.mesh import Surface
 from vico.world.rails import (
     ACROSS_REACH,
@@ -138,7 +138,7 @@ class Trams:
         # Where they stand, which sections reach into the city, and their footprints, which begin those of everybody.
         self._poses = np.zeros((n, TRAM_SECTIONS, 3))
         self._inside = np.zeros((n, TRAM_SECTIONS), np.bool_)
-        self._everybody = nobody(n * TRAM_SECTIONS)
+        self._everybody = absent_footprints(n * TRAM_SECTIONS)
         self._bodies: Bodies | None = None
         self._entities = first_entity + np.arange(n * TRAM_SECTIONS, dtype=np.int32)
         self._set_out(second)
@@ -197,12 +197,14 @@ class Trams:
             ahead = int(max(self.front[tram], 0.0) / STEP) + 1
             points = self.tracks[int(self.line_of[tram])].across[ahead : ahead + int(_ASKS / STEP)]
             poses = self._sections_at(tram, self.front[tram] + STEP)
-            sides = outlines(poses, inside_city(poses, self._half))
+            sides = section_outlines(poses, inside_city(poses, self._half))
             away = np.hypot(*(self._poses[tram, :, :2, None] - [shapes.x, shapes.y]).swapaxes(0, 1)).min(axis=0)
             near = np.flatnonzero(away < _NEAR)
             near = near[near >= first]
             people = np.column_stack([shapes.x[near], shapes.y[near]])
-            found = in_way(points, people, ACROSS_REACH + RADIUS) | in_way(sides, people, RADIUS + _BESIDE)
+            found = people_in_way(points, people, ACROSS_REACH + PEDESTRIAN_RADIUS) | people_in_way(
+                sides, people, PEDESTRIAN_RADIUS + _BESIDE
+            )
             walkers.before_tram[near[found] - first] = True
 
     def _come_in(self, now: float) -> None:
@@ -230,7 +232,7 @@ class Trams:
         played = (self.riders[tram] >= 0) & (self.riders[tram] < FIRST_PASSENGER)
         least = _WAITS if self.ends(tram) and played.any() else 0.0
         self.dwell[tram] = max(self.dwell[tram] - dt, least, time - now)
-        self.open[tram] = moved_doors(float(self.open[tram]), self.dwell[tram] > DOOR_TIME, dt)
+        self.open[tram] = step_doors(float(self.open[tram]), self.dwell[tram] > DOOR_TIME, dt)
         if self.dwell[tram] == 0.0:
             self.open[tram] = 0.0
             self.stop[tram] += 1
@@ -281,7 +283,7 @@ class Trams:
             self._inside[tram] = inside_city(here, self._half)
         else:
             self._inside[tram] = False
-        stand(here, self._inside[tram], *_HALF_SIZE, self.speed[tram], self._everybody[rows])
+        place_sections(here, self._inside[tram], *_HALF_SIZE, self.speed[tram], self._everybody[rows])
         self._bodies = None
 
     def _sections_at(self, tram: int, front: float) -> NDArray[np.float64]:
@@ -293,14 +295,14 @@ class Trams:
         track = self.tracks[int(self.line_of[tram])]
         first = int(max(front, 0.0) / STEP) + 1
         points = track.across[first : first + int(look / STEP) + 2]
-        taken = int(first_taken(points, *self._but(tram), ACROSS_REACH, _SOON))
+        taken = int(first_obstructed(points, *self._but(tram), ACROSS_REACH, _SOON))
         return look if taken == len(points) else max((first + taken) * STEP - front - _BEFORE, 0.0)
 
     def _fits(self, tram: int, front: float) -> bool:
         """Return whether no section touches anybody with the front there: in bends they swing to the sides."""
         poses = self._sections_at(tram, front)
-        outline = outlines(poses, inside_city(poses, self._half))
-        return bool(first_taken(outline, *self._but(tram), _TOUCH, 0.0) == len(outline))
+        outline = section_outlines(poses, inside_city(poses, self._half))
+        return bool(first_obstructed(outline, *self._but(tram), _TOUCH, 0.0) == len(outline))
 
     def _but(self, tram: int) -> tuple[NDArray[np.float64], int, int]:
         """Return the footprints of everybody, and which of them are the tram's own."""
@@ -309,7 +311,7 @@ class Trams:
     def _look_about(self, others: Bodies) -> None:
         """Note where all others are, behind the trams."""
         own = self._everybody[: len(self) * TRAM_SECTIONS]
-        self._everybody = np.concatenate([own, packed(others)])
+        self._everybody = np.concatenate([own, footprint_rows(others)])
 
     def _zone_ahead(self, tram: int, number: int, front: float) -> float:
         """Metres to the next zone that another tram is in; those that are free are taken in passing."""

@@ -10,9 +10,8 @@ import numpy as np
 from vico.sim.base import SimulationBase
 from vico.sim.environment.event_kinds import event_kinds
 from vico.sim.traffic import JunctionRule, TrafficNetwork
-from vico.sim.traffic.records import AMBER, GREEN, RED
-from vico.sim.traffic.signal_heads import SignalHeads
-from vico.sim.traffic.signals import SignalClock, SignalDay
+from vico.sim.traffic.signals import SignalClock, SignalDay, SignalHeads
+from vico.sim.traffic.state import AMBER, GREEN, RED
 from vico.world.heights import HeightField
 from vico.world.world import World
 
