@@ -103,7 +103,7 @@ def measure(workload: Workload, world_folder: Path, community_folder: Path, coun
     from vico.agents.schedule import followers_of
     from vico.community import read_community
     from vico.sim.config import SimConfig
-    from vico.sim.simulation import Simulation
+    from vico.sim.loop.simulation import Simulation
     from vico.world.folder import read_world
     from vico.world.public import PublicMap
 

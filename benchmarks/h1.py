@@ -20,7 +20,7 @@ from reporting import machine, publish
 
 from robot_field import HALF, field
 from vico.assets.shapes import box
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots import RobotPopulation
 from vico.world.folder import read_world
 from vico.world.heights import HeightField, Steps

@@ -26,7 +26,7 @@ from vico.assets.people import SkinnedBody, body_of
 from vico.rules import STAIRS_SPEED
 from vico.seeds import rng
 from vico.sim.animation import clip_index, ground_under_feet, pose, stride_length, style_of
-from vico.sim.animation.stride import pace_of_step
+from vico.sim.animation.motions import pace_of_step
 from vico.world.model import FLIGHT_STEPS, LANDING
 from vico.world.stairs import DEEPEST
 from vico.world.world import World

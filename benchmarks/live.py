@@ -30,8 +30,8 @@ from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.live import LiveViewer
 from vico.world.folder import read_world
 from vico.world.public import PublicMap

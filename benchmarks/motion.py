@@ -27,9 +27,9 @@ from vico.assets.people import Appearance, J, SkinnedBody, body_of
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
 from vico.sim.animation import Transition, clip_index, ground_under_feet, pose, stride_length, style_of
+from vico.sim.bodies.footprints import BODY
 from vico.sim.config import SimConfig
-from vico.sim.footprints import BODY
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 RATE = 50.0
 BEARS = 0.004

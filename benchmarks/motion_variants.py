@@ -21,8 +21,8 @@ from reporting import machine, publish
 from vico.assets.people import Appearance, body_of
 from vico.seeds import rng
 from vico.sim.animation import CLIPS, clip_index, ground_under_feet, pose, style_of
-from vico.sim.animation.blending import is_gait
-from vico.sim.animation.names import RUN
+from vico.sim.animation.clips import is_gait
+from vico.sim.animation.motions import RUN
 
 MOMENTS, APART = 8, 2.0  # degrees
 BODY_JOINTS = 22

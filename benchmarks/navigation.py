@@ -39,8 +39,8 @@ from vico.rules import STAIRS_SPEED
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
 from vico.seeds import rng
-from vico.sim.simulation import Simulation
-from vico.sim.state import RADIUS
+from vico.sim.bodies.state_arrays import RADIUS
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.model import Container, Place
 from vico.world.public import PublicMap

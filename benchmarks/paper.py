@@ -47,7 +47,7 @@ PAPER_MEMORY = {
 def simulation(world_folder: Path, agents: int, outputs: tuple[str, ...]) -> Any:
     """Return a simulation with so many avatars and a Go2, everybody near the middle of the world."""
     from vico.sim.config import SimConfig
-    from vico.sim.simulation import Simulation
+    from vico.sim.loop.simulation import Simulation
     from vico.world.folder import read_world
 
     world = read_world(world_folder)

@@ -25,7 +25,7 @@ from robot_tasks import Tasks, tables
 from scipy.ndimage import distance_transform_edt
 
 from vico.assets.robots import robot_names
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.physics import engine_names
 from vico.sim.physics.records import COARSE, FINE
 from vico.sim.robots import RobotPopulation, RobotScene

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.shapes import box
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation
-from vico.sim.simulation import Simulation
 from vico.world.world import World
 
 KINDS = ("husky", "manipulator", "go2", "drone", "h1")

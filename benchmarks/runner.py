@@ -20,7 +20,7 @@ from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.world import World
 

@@ -22,7 +22,7 @@ from vico.community import read_community
 from vico.community.model import Community
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.world import World

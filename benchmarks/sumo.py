@@ -25,7 +25,7 @@ from defusedxml.ElementTree import parse
 from reporting import machine, publish
 
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.junctions import JunctionRule
 from vico.sim.traffic.state import TOP_SPEED

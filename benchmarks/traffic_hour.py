@@ -17,9 +17,9 @@ import numpy as np
 from reporting import machine, publish
 
 from vico.clock import seconds_of_day
-from vico.sim.base import SimulationBase
-from vico.sim.bodies import Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.loop.checks import overlapping
+from vico.sim.state.base import SimulationBase
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.state import RED
 from vico.world.folder import read_world

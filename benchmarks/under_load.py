@@ -29,7 +29,7 @@ from vico.cli.machine_speed import compiled_speed, python_speed
 from vico.community import read_community
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 

@@ -25,8 +25,8 @@ from vico.agents.schedule import followers_of
 from vico.clock import seconds_of_day
 from vico.community import read_community
 from vico.sim.config import SimConfig
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.scene import SceneRenderer
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING

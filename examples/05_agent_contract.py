@@ -17,7 +17,7 @@ from vico.runner.loading import AgentSeat
 from vico.runner.loop import Runner
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 
 

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 
 

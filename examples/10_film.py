@@ -34,10 +34,10 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.holding import carries_umbrella, habit_of
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.placement import carries_umbrella, habit_of
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, film_frames
 from vico.world.folder import read_world

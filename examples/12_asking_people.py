@@ -19,7 +19,7 @@ from vico.clock import seconds_of_day
 from vico.community import read_community
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 

@@ -17,9 +17,9 @@ from vico.render import Cameras
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import FINE
 from vico.sim.config import SimConfig
-from vico.sim.moves import place_in_room
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.placement import place_in_room
+from vico.sim.pictures.scene import SceneRenderer
 from vico.world.folder import read_world
 
 HOURS = (10, 22)

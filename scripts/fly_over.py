@@ -22,9 +22,9 @@ from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, film_frames
 from vico.world.folder import read_world

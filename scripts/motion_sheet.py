@@ -24,8 +24,8 @@ from vico.render import Cameras, Lighting, Scene, render
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
 from vico.sim.animation import CLIPS, Hands, Hold, Transition, clip_index, free_hands, ground_under_feet, pose, style_of
-from vico.sim.animation.blending import is_seated
-from vico.sim.hands_scene import Holders, draw_phones, draw_umbrellas
+from vico.sim.animation.clips import is_seated
+from vico.sim.pictures.hands import Holders, draw_phones, draw_umbrellas
 from vico.world.mesh import Material, Surface
 
 MOMENTS = 8

@@ -14,8 +14,8 @@ from vico.community import read_community
 from vico.render import Cameras
 from vico.render.film import read_film
 from vico.sim.config import SimConfig
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.scene import SceneRenderer
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.worldgen.previews.viewpoints import viewpoints

@@ -16,9 +16,9 @@ from scipy.ndimage import distance_transform_edt
 from vico.assets.shapes import box
 from vico.render import Cameras
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.scene import SceneRenderer
 from vico.sim.robots import RobotPopulation
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK
 from vico.world.world import World

@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw
 from vico.render import Cameras
 from vico.sim.config import SimConfig
 from vico.sim.environment import weather_kinds
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.scene import SceneRenderer
 from vico.world.folder import read_world
 from vico.worldgen.previews.viewpoints import viewpoints
 

@@ -186,8 +186,8 @@ class Spy(Honest):
     """Looks for the simulation in all that lives in its process, and says how many it found."""
 
     def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
-        from vico.sim.simulation import Simulation
-        from vico.sim.simulation_state import SimulationState
+        from vico.sim.loop.simulation import Simulation
+        from vico.sim.state.simulation_state import SimulationState
 
         found = [thing for thing in gc.get_objects() if isinstance(thing, (Simulation, SimulationState))]
         frame: Any = sys._getframe()

@@ -24,7 +24,7 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.environment import weather_kinds
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.world import World

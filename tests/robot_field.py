@@ -6,7 +6,7 @@ import pytest
 from vico.assets.packages import installed
 from vico.assets.robots.packs import GO2_PACKAGE
 from vico.assets.shapes import box
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.config import PHYSICS_ENGINES
 from vico.sim.physics import DEFAULT_ENGINE, engine_names
 from vico.world.heights import HeightField

@@ -5,7 +5,7 @@ from __future__ import annotations
 import toy_city
 import vico
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 from vico.world.world import World
 

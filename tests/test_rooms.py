@@ -95,6 +95,36 @@ def test_a_room_imports_only_lower_rooms(room: str) -> None:
     assert faults == []
 
 
+# The floors inside `sim`, lowest first: packages and single modules. One of a floor may not import another of the same.
+FLOORS_OF_SIM = (
+    {"animation", "environment"},
+    {"bodies"},
+    {"physics", "traffic", "perception"},
+    {"robots", "transit"},
+    {"state", "config"},
+    {"people", "cameras"},
+    {"actions", "observations", "pictures"},
+    {"loop"},
+    {"recording"},
+)
+
+
+def test_imports_inside_sim_point_down_its_floors() -> None:
+    floor = {part: k for k, parts in enumerate(FLOORS_OF_SIM) for part in parts}
+    faults = []
+    for path in sorted((SOURCE / "sim").rglob("*.py")):
+        part = path.relative_to(SOURCE / "sim").with_suffix("").parts[0]
+        if part == "__init__":
+            continue
+        for name in imported(path):
+            room, _, rest = name.partition(".")
+            other = rest.split(".")[0]
+            if room == "sim" and other != part and not floor[other] < floor[part]:
+                faults.append(f"{path.relative_to(SOURCE)} imports vico.{name}")
+    assert faults == []
+    assert len(floor) == len(list((SOURCE / "sim").glob("[!_]*"))), "every part of sim has its floor"
+
+
 def parts_of_worldgen() -> list[str]:
     """Folders and modules that stages share, and the stages' folders."""
     return sorted(SHARED.keys() | {path.parent.name for path in (SOURCE / "worldgen").glob("*/__init__.py")})

@@ -15,7 +15,7 @@ from vico.agents.schedule import followers_of
 from vico.assets.models.movable import movable_kinds, movable_surfaces
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 Make = Callable[[], Mapping[str, Agent]]

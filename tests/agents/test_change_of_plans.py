@@ -12,7 +12,7 @@ from vico.agents.stays import stays_of
 from vico.agents.travel import Traveller
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 from vico.world.world import World
 

@@ -23,7 +23,7 @@ from vico.errors import InputError
 from vico.io.plain_data import decode, encode, read_plain, write_plain
 from vico.llm import Budget, LanguageModel
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 BEGAN = 9 * 3600.0

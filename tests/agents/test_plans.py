@@ -12,7 +12,7 @@ from vico.agents.assistant import make_planner
 from vico.agents.base import Goal, Plan, plan_record
 from vico.agents.schedule import followers_of
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 

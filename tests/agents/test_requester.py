@@ -16,7 +16,7 @@ from vico.agents.talk.address import is_called
 from vico.challenges.assistant import thresholds
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 CLEO, HELPER = "resident_2", "assistant_0"

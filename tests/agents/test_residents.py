@@ -15,7 +15,7 @@ from vico.community.author import procedural_author
 from vico.community.model import Community
 from vico.io.plain_data import encode
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 from vico.world.world import World
 

@@ -16,8 +16,8 @@ from vico.community.place_index import PlaceIndex
 from vico.io.plain_data import decode, encode
 from vico.rules import walk_speed
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
-from vico.sim.timetable import EARLIEST
+from vico.sim.loop.punctuality import EARLIEST
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 from vico.world.world import World
 

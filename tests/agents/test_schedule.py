@@ -10,10 +10,10 @@ import pytest
 import toy_city
 from vico.agents.schedule import followers_of, stays_of
 from vico.runner.gather import Gatherer
+from vico.sim.bodies.state_arrays import Posture
 from vico.sim.config import SimConfig
-from vico.sim.events import Event
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture
+from vico.sim.loop.simulation import Simulation
+from vico.sim.state.steps import Event
 from vico.world.objects import Objects
 from vico.world.public import PublicMap
 from vico.world.world import World

@@ -13,7 +13,7 @@ from vico.agents.travel import Traveller
 from vico.rules import BUS_FARE
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 from vico.world.world import World
 

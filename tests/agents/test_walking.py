@@ -10,7 +10,7 @@ from vico.agents.base import Action, Info
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.wayfinding import Walker
 from vico.seeds import rng
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.perception import InView
 from vico.world.heights import HeightField
 from vico.world.public import PublicMap

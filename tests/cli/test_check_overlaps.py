@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from command_line import vico
-from vico.sim import overlaps
-from vico.sim.overlaps import Overlap
+from vico.sim.loop import checks
+from vico.sim.loop.checks import Overlap
 
 
 def _run(world: Path, people: Path, out: Path) -> tuple[int, dict[str, object], str]:
@@ -39,7 +39,7 @@ def test_overlaps_make_the_exit_code_1_and_a_sentence(
     helsinki_path: Path, helsinki_people: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     planted = [Overlap(1_000_000, 1_000_001, 0.25, (1.0, 2.0, 3.0), -1)]
-    monkeypatch.setattr(overlaps, "overlaps_of", lambda state: planted)
+    monkeypatch.setattr(checks, "overlaps_of", lambda state: planted)
     code, metrics, warned = _run(helsinki_path, helsinki_people, tmp_path / "run")
     assert code == 1
     assert metrics["overlaps"]["count"] == 30  # type: ignore[index]

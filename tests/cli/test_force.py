@@ -14,7 +14,7 @@ from vico.community.folder import COMMUNITY_FOLDER
 from vico.datasets.folder import DATASET_FOLDER
 from vico.errors import OutputExistsError
 from vico.io.folders import FolderKind
-from vico.sim import interventions
+from vico.sim.recording import interventions
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.world.exports import EXPORT_FOLDER
 from vico.world.stored import WORLD_FOLDER
@@ -154,6 +154,6 @@ def test_a_run_that_was_shown_and_reached_into_is_still_a_run(
     run = shutil.copytree(helsinki_run[0], tmp_path / "run")
     with ViewerServer(ViewerState(Source.recorded(run), lambda *_: ({}, "")), keep=run):
         pass
-    (run / interventions.FILE).write_text("")
+    (run / interventions.INTERVENTIONS_FILE).write_text("")
     assert (run / ADDRESS).is_file()
     RUN_FOLDER.require(run)

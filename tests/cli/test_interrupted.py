@@ -22,7 +22,7 @@ from vico.errors import InputError
 from vico.io.files import read_json
 from vico.render.film import FilmWriter, partial_film, read_film, write_film
 from vico.sim.recording import read_run
-from vico.sim.recording.checkpoints import checkpoint_steps
+from vico.sim.recording.schema import checkpoint_steps
 
 STEPS = 9
 

@@ -14,7 +14,7 @@ import pytest
 from command_line import kill_once, vico
 from vico.io.files import read_json
 from vico.sim.recording import Run, read_run
-from vico.sim.recording.checkpoints import checkpoint_steps
+from vico.sim.recording.schema import checkpoint_steps
 
 STEPS = 45
 

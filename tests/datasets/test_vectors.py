@@ -21,7 +21,7 @@ from vico.datasets.vectors import GOAL, PERSON_STATE, goal_vector, in_own_frame,
 from vico.errors import InputError
 from vico.runner.loop import Hook, Step
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
-from vico.sim.actions.check import parse
+from vico.sim.actions.table import parse
 from vico.sim.recording import read_run
 from vico.world.world import World
 

@@ -24,24 +24,26 @@ from vico.runner.loop import Runner
 from vico.runner.pace import Pace
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig
-from vico.sim.interventions import Line, intervention_of, read_interventions, write_interventions
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.interventions import InterventionLine, intervention_of, read_interventions, write_interventions
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.repeat import RepeatedRun
 from vico.world.public import PublicMap
 
 #: What is done to a run in these tests.
 DONE = [
-    Line(after=2, command="weather", arguments={"kind": "rain", "over": 0.0}),
-    Line(after=3, command="drop", arguments={"kind": "red helmet", "position": [0.0, -5.0, 0.0]}),
-    Line(after=3, command="say", arguments={"agent": "resident_0", "text": "Where is the shop?"}),
-    Line(after=5, command="event", arguments={"kind": "market", "position": [0.0, -20.0], "minutes": 1}),
-    Line(after=6, command="perform", arguments={"agent": "resident_2", "action": {"type": "turn_left", "degrees": 90}}),
+    InterventionLine(after=2, command="weather", arguments={"kind": "rain", "over": 0.0}),
+    InterventionLine(after=3, command="drop", arguments={"kind": "red helmet", "position": [0.0, -5.0, 0.0]}),
+    InterventionLine(after=3, command="say", arguments={"agent": "resident_0", "text": "Where is the shop?"}),
+    InterventionLine(after=5, command="event", arguments={"kind": "market", "position": [0.0, -20.0], "minutes": 1}),
+    InterventionLine(
+        after=6, command="perform", arguments={"agent": "resident_2", "action": {"type": "turn_left", "degrees": 90}}
+    ),
 ]
 
 
-def played(out: Path, script: list[Line], *, steps: int = 12) -> list[str]:
+def played(out: Path, script: list[InterventionLine], *, steps: int = 12) -> list[str]:
     """Run the toy city with interventions, and return the hashes of its states."""
     world, people = toy_city.world(), toy_city.community()
     sim = Simulation(world, people, SimConfig(observe=(), start=28_790))
@@ -247,10 +249,10 @@ def test_the_command_line_does_it_again_in_a_fresh_process(
     helsinki_path: Path, helsinki_people: Path, tmp_path: Path
 ) -> None:
     lines = [
-        Line(after=2, command="weather", arguments={"kind": "snow", "over": 5}),
-        Line(after=4, command="drop", arguments={"kind": "blue parcel", "position": [5.0, 5.0, 0.0]}),
-        Line(after=4, command="goal", arguments={"agent": "robot_0", "position": [0.0, 10.0, 0.0]}),
-        Line(after=5, command="close_road", arguments={"position": [0.0, 0.0], "radius": 40.0}),
+        InterventionLine(after=2, command="weather", arguments={"kind": "snow", "over": 5}),
+        InterventionLine(after=4, command="drop", arguments={"kind": "blue parcel", "position": [5.0, 5.0, 0.0]}),
+        InterventionLine(after=4, command="goal", arguments={"agent": "robot_0", "position": [0.0, 10.0, 0.0]}),
+        InterventionLine(after=5, command="close_road", arguments={"position": [0.0, 0.0], "radius": 40.0}),
     ]
     write_interventions(tmp_path, lines)
     common = [helsinki_path, helsinki_people, "--steps", 12, "--robots", "husky", "--cars", 4, "--observe", "none"]

@@ -10,7 +10,7 @@ import toy_city
 from vico.rules import ActionStatus
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 
 class Crasher:

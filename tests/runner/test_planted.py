@@ -20,7 +20,7 @@ from vico.runner.isolated import IsolatedAgent
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 STEPS = 6

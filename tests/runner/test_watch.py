@@ -16,7 +16,7 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Runner
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 
 def check(name: str, folder: Path) -> AgentCheck:
@@ -29,7 +29,7 @@ def check(name: str, folder: Path) -> AgentCheck:
     ("name", "promise", "says"),
     [
         ("Searcher", "fair", "searches the process's objects"),
-        ("Spy", "fair", "imports vico.sim.simulation"),
+        ("Spy", "fair", "imports vico.sim.loop.simulation"),
         ("FrameWalker", "fair", "looks at the frames"),
         ("Inspector", "fair", "looks at the frames"),
         ("Thief", "fair", "reads the world's folder"),

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 import toy_city
 from vico.assets.shapes import box
 from vico.sim.actions import ACTIONS, Command, Refusal, actions_markdown, check
+from vico.sim.bodies.state_arrays import Posture
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture
+from vico.sim.loop.simulation import Simulation
 
 RESIDENTS = ("resident_0", "resident_1")
 

@@ -23,8 +23,8 @@ from vico.sim.animation import (
     stride_length,
     style_of,
 )
-from vico.sim.animation.standing import TURN_CYCLE
-from vico.sim.animation.stride import pace_of_step
+from vico.sim.animation.motions import pace_of_step
+from vico.sim.animation.postures import TURN_CYCLE
 
 LOOKS = [random_appearance(rng(5, "walker", k)) for k in range(6)]
 N = len(LOOKS)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.sim.avatars import CLIPS, clearances
+from vico.sim.animation.motions import CLIPS
+from vico.sim.bodies.avatars import clearances
+from vico.sim.bodies.state_arrays import RADIUS, Vehicle
 from vico.sim.config import SimConfig
-from vico.sim.overlaps import overlaps_of
-from vico.sim.simulation import Simulation
-from vico.sim.state import RADIUS, Vehicle
+from vico.sim.loop.checks import overlaps_of
+from vico.sim.loop.simulation import Simulation
 
 
 @pytest.fixture

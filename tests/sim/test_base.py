@@ -12,9 +12,9 @@ import pytest
 
 import toy_city
 from vico.errors import InputError
-from vico.sim.base import SimulationBase
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.state.base import SimulationBase
 from vico.world.world import World
 
 

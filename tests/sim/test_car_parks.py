@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 
 from road_city import HALF, road_city
-from vico.sim.bodies import PEDESTRIAN, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import PEDESTRIAN, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.state import APPROACHING, BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, STANDING
 from vico.sim.traffic.stopping_places import places_in_car_parks, with_places

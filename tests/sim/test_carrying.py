@@ -6,7 +6,7 @@ import pytest
 from robot_field import field
 from vico.assets.shapes import box
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.heights import HeightField
 
 SIZE = (0.28, 0.28, 0.2)

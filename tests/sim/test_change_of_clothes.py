@@ -9,10 +9,10 @@ import toy_city
 from vico.assets.people.weather_clothes import dressed
 from vico.render.between import moment_of, show_between
 from vico.sim.config import SimConfig
-from vico.sim.drawn_people import DrawnPeople
 from vico.sim.environment.weather import Weather
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.people import DrawnPeople
+from vico.sim.pictures.scene import SceneRenderer
 
 _SNOW = Weather(temperature=-6.0, snow=1.0, clouds=1.0)
 

@@ -15,14 +15,14 @@ from vico.community.author import build_community
 from vico.community.model import Community
 from vico.errors import InputError, MissingFileError
 from vico.render import Cameras
-from vico.sim import city_scene
-from vico.sim.city_scene import CityRenderer, Neighbourhood
 from vico.sim.config import SimConfig
-from vico.sim.drawn_people import DrawnPeople
+from vico.sim.loop.simulation import Simulation
 from vico.sim.physics import mujoco_scene
 from vico.sim.physics.surroundings import CityChunks, surroundings_of
-from vico.sim.rooms_in_sight import RoomsInSight
-from vico.sim.simulation import Simulation
+from vico.sim.pictures import city as city_pictures
+from vico.sim.pictures.buildings import RoomsInSight
+from vico.sim.pictures.city import CityRenderer, Neighbourhood
+from vico.sim.pictures.people import DrawnPeople
 from vico.world.city_silhouettes import CitySilhouettes
 from vico.world.city_world import CityWorld
 from vico.world.folder import read_world
@@ -45,7 +45,7 @@ def test_who_is_in_the_middle_of_a_tile_and_who_at_its_edge_see_as_far() -> None
         for size in (160.0, 400.0, 800.0):
             found = Neighbourhood.around(x, 0.0, 1.6, size)
             west, east = ((found.column + side * found.rings + 0.5) * size for side in (-1, 1))
-            assert min(x - west, east - x) >= city_scene.NEAR
+            assert min(x - west, east - x) >= city_pictures.NEAR
 
 
 def test_who_is_high_up_sees_more_tiles_in_full() -> None:
@@ -80,7 +80,7 @@ def people(city: CityWorld) -> Community:
 
 @pytest.fixture
 def _two_tiles_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(city_scene, "NEAR", NEAR)
+    monkeypatch.setattr(city_pictures, "NEAR", NEAR)
 
 
 def _run(city: CityWorld, people: Community, steps: int = 12, **options: Any) -> tuple[list[Any], str]:
@@ -109,7 +109,7 @@ def test_what_is_seen_and_what_happens_depend_neither_on_the_budget_nor_on_who_l
     city: CityWorld, people: Community, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen, state = _run(city, people)
-    monkeypatch.setattr("vico.sim.simulation._PAGES_EVERY", 1)
+    monkeypatch.setattr("vico.sim.loop.simulation._PAGES_EVERY", 1)
     assert any(np.abs(one["flow"]).max() > 0.0 for one in seen[-1].values())
     again, same = _run(city, people, memory=1e-6)
     assert _are_equal(seen, again)

@@ -9,10 +9,10 @@ import numpy as np
 import toy_city
 from vico.assets.shapes import box
 from vico.sim.animation import CLIPS
+from vico.sim.bodies.state_arrays import Posture
 from vico.sim.config import SimConfig
-from vico.sim.passers_by import pedestrian_motion
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.people import pedestrian_motion
 from vico.sim.traffic.drawing import PedestrianGaits
 from vico.sim.traffic.state import STOP
 from vico.world.world import World

@@ -3,8 +3,8 @@
 import numpy as np
 
 from helsinki_traffic import traffic_by
-from vico.sim.bodies import Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.pedestrian_routes import leave_crossing, note_distance
 from vico.sim.traffic.pedestrians import asked_to_go

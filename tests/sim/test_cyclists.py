@@ -5,9 +5,9 @@ import pytest
 
 from helsinki_traffic import network
 from road_city import HALF
-from vico.sim.bodies import CYCLIST, Bodies
-from vico.sim.environment.effects import conditions
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import CYCLIST, Bodies
+from vico.sim.environment.environment import conditions
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.path import project_on_polyline
 from vico.world.heights import HeightField

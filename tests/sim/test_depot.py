@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from road_city import HALF, road_city
-from vico.sim.actions.vehicles import check_enter_bus
-from vico.sim.bodies import BUS, RESIDENT, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.actions.movement import check_enter_bus
+from vico.sim.bodies.arrays import BUS, RESIDENT, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.transit import TransitSystem, plan_buses
 from vico.world.heights import HeightField

@@ -13,8 +13,7 @@ from vico.render import Cameras, render
 from vico.render.skinning import batch_bodies, skin
 from vico.render.world_scene import scene_of
 from vico.sim.animation import pose, style_of
-from vico.sim.detail import Sights, far_from_all
-from vico.sim.passers_by import looks_of_strangers
+from vico.sim.pictures.people import ViewingCameras, far_from_all, looks_of_strangers
 
 SOURCES = [
     "procedural",
@@ -28,12 +27,12 @@ SOURCES = [
 def test_far_is_who_is_small_in_every_picture() -> None:
     position, height = np.array([[5.0, 0, 0], [30.0, 0, 0], [30.0, 0, 0]]), np.array([1.7, 1.7, 1.7])
     eye = np.zeros((1, 3))
-    assert far_from_all(Sights(eye, np.array([128.0])), position, height).tolist() == [False, True, True]
-    assert not far_from_all(Sights(eye, np.array([1000.0])), position, height).any()
+    assert far_from_all(ViewingCameras(eye, np.array([128.0])), position, height).tolist() == [False, True, True]
+    assert not far_from_all(ViewingCameras(eye, np.array([1000.0])), position, height).any()
     # Another who looks from near by: all see them as they are.
     eyes = np.array([[0.0, 0, 0], [29.0, 0, 0]])
-    assert not far_from_all(Sights(eyes, np.array([128.0, 128.0])), position, height).any()
-    assert not far_from_all(Sights(np.zeros((0, 3)), np.zeros(0)), position, height).any()
+    assert not far_from_all(ViewingCameras(eyes, np.array([128.0, 128.0])), position, height).any()
+    assert not far_from_all(ViewingCameras(np.zeros((0, 3)), np.zeros(0)), position, height).any()
 
 
 @pytest.mark.parametrize("source", SOURCES)

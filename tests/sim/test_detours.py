@@ -4,8 +4,8 @@ import numpy as np
 
 from helsinki_traffic import network
 from road_city import HALF, road_city
-from vico.sim.bodies import Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic
 from vico.sim.transit import TransitSystem, plan_buses
 from vico.sim.transit.buses import round_past_closures

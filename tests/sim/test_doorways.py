@@ -9,13 +9,13 @@ import pytest
 
 import toy_city
 from vico.sim.animation import Hold
-from vico.sim.avatars import CLIP
+from vico.sim.bodies.avatars import CLIP
 from vico.sim.config import SimConfig
-from vico.sim.moves import place_in_room
-from vico.sim.overlaps import overlaps_of
-from vico.sim.recorder import Recorder
+from vico.sim.loop.checks import overlaps_of
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.placement import place_in_room
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 
 _ENTER = {"type": "enter", "place": toy_city.CAFE}
 _DOOR = np.array([-5.0, 5.0])
@@ -132,7 +132,7 @@ def test_one_comes_out_to_a_spot_beside_the_door_close_to_the_wall(
     sim: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spot = np.array([-4.2, 4.72])
-    monkeypatch.setattr("vico.sim.passing.spot_outside", lambda i, state: spot)
+    monkeypatch.setattr("vico.sim.people.doors.spot_outside", lambda i, state: spot)
     place_in_room(0, 0, sim.state)
     for _ in range(5):
         sim.step({"assistant_0": {"type": "exit"}})
@@ -142,7 +142,7 @@ def test_one_comes_out_to_a_spot_beside_the_door_close_to_the_wall(
 
 
 def test_who_waits_long_for_others_in_a_door_is_told_so(sim: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vico.sim.passing._is_free", lambda i, way, state: False)
+    monkeypatch.setattr("vico.sim.people.doors._is_door_free", lambda i, way, state: False)
     reasons = [
         sim.step({"assistant_0": _ENTER}).observations["assistant_0"]["state"]["action_reason"] for _ in range(26)
     ]

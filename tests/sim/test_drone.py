@@ -9,12 +9,12 @@ import pytest
 from robot_field import ENGINES, field, people
 from vico.assets.robots import robot_model
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotMode, RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.path_planning import CEILING, OVER, Airspace
 from vico.sim.robots.quadrotor import FlightPhase, air_at, gusts_of
-from vico.sim.simulation import Simulation
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World
 

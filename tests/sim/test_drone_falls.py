@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robot_field import ENGINES, HALF, field, people
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots import RobotMode, RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.hardware import EXCHANGE
 from vico.sim.robots.path_planning import CEILING

@@ -9,9 +9,8 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 
-from vico.sim.bodies import CAR, OBJECT, RESIDENT, STEP_HEIGHT, Bodies
-from vico.sim.footprints import body_gap, can_touch, records_of
-from vico.sim.neighbours import neighbour_grid, search
+from vico.sim.bodies.arrays import CAR, OBJECT, RESIDENT, STEP_HEIGHT, Bodies
+from vico.sim.bodies.footprints import body_gap, can_touch, neighbour_grid, records_of, search
 from vico.world.heights import HeightField
 
 FLAT = HeightField.flat(50.0)

@@ -7,7 +7,7 @@ import pytest
 
 from robot_field import ENGINES
 from vico.assets.robots import robot_model
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.physics import Capacity, StaticScene, make_scene
 from vico.sim.physics.records import RigidObject
 from vico.world.heights import HeightField

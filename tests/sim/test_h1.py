@@ -11,7 +11,7 @@ import pytest
 from robot_field import ENGINES, HALF, field, people
 from vico.assets.robots import robot_model
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.biped import STEPPING, sole_slope
 from vico.world.heights import HeightField, Steps

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.sim.bodies import BUS, CAR, Bodies
+from vico.sim.bodies.arrays import BUS, CAR, Bodies
 from vico.sim.config import SimConfig
-from vico.sim.hearing import hearers_of, noise_at
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.hearing import listeners_of_person, noise_at
 
 
 def two_in_the_street(apart: float, *, weather: str = "clear") -> Simulation:
@@ -40,7 +40,7 @@ class PassingTraffic:
 
 
 def heard(sim: Simulation, reach: float = 10.0) -> bool:
-    return hearers_of(sim.state, 0, reach).hearers == ["assistant_1"]
+    return listeners_of_person(sim.state, 0, reach).hearers == ["assistant_1"]
 
 
 @pytest.mark.parametrize("apart", [1.0, 5.0, 9.9])
@@ -53,7 +53,7 @@ def test_a_passing_car_covers_a_voice_from_afar_and_not_from_near() -> None:
     for apart, understood in ((9.0, False), (2.0, True)):
         sim = two_in_the_street(apart)
         sim.state.traffic = PassingTraffic(CAR, -20.0, -20.0 - apart - 20.0, 13.0)  # type: ignore[assignment]
-        found = hearers_of(sim.state, 0, 10.0)
+        found = listeners_of_person(sim.state, 0, 10.0)
         assert (found.hearers == ["assistant_1"]) == understood
         assert found.missed == ({} if understood else {"assistant_1": "noise"})
 
@@ -82,7 +82,7 @@ def test_a_corner_of_a_building_keeps_a_voice_off() -> None:
     sim = two_in_the_street(3.0)
     # On either side of the house's south-west corner.
     sim.state.people.position[:, :2] = [[-12.0, 9.0], [-5.0, 3.5]]
-    found = hearers_of(sim.state, 0, 10.0)
+    found = listeners_of_person(sim.state, 0, 10.0)
     assert found.missed == {"assistant_1": "walls"}
 
 

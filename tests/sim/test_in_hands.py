@@ -12,11 +12,11 @@ from vico.assets.models.movable import movable_kinds, movable_surfaces
 from vico.assets.people import J
 from vico.render import Cameras, render
 from vico.sim.animation import Hold
+from vico.sim.bodies.state_arrays import FIRST_UMBRELLA
 from vico.sim.config import SimConfig
-from vico.sim.hands_scene import Holders, carried_at
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
-from vico.sim.state import FIRST_UMBRELLA
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.hands import Holders, carried_at
+from vico.sim.pictures.scene import SceneRenderer
 
 
 def _sim(weather: str = "clear", assistants: int = 2) -> Simulation:

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 import toy_city
 from vico.agents.schedule import ScheduleFollower
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.model import Category, Room
 from vico.world.public import PublicMap
 from vico.world.world import World

@@ -5,9 +5,9 @@ import pytest
 
 from helsinki_traffic import network, traffic_by
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.overlaps import overlapping
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import JunctionRule
 
 

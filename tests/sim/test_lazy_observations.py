@@ -6,7 +6,7 @@ import pytest
 import toy_city
 from vico.render.sensors.batch import PictureSet
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 
 def test_what_was_observed_stays_when_time_goes_on() -> None:

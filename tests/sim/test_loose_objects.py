@@ -8,8 +8,8 @@ import pytest
 from robot_field import field
 from vico.assets.shapes import box
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.physics.surroundings import ENTER, LEAVE
-from vico.sim.simulation import Simulation
 from vico.world.world import World
 
 CRATE = (0.4, 0.4, 0.3)

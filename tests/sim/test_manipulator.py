@@ -6,11 +6,11 @@ import pytest
 from robot_field import ENGINES, field, people
 from vico.assets.shapes import box
 from vico.kinematics.arm import hand_pose, reach_pose
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.manipulator import TaskStage
-from vico.sim.simulation import Simulation
 
 SIZE = (0.12, 0.18, 0.2)
 TABLE = 0.55

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from vico.errors import InputError
-from vico.sim.names import name_called
+from vico.sim.config import find_by_name
 
 NAMES = {
     "resident_0": "Ann Lee",
@@ -38,7 +38,7 @@ NAMES = {
     ],
 )
 def test_a_name_is_known_as_people_write_it(text: str, key: str) -> None:
-    assert name_called(text, NAMES, option="film: --follow") == key
+    assert find_by_name(text, NAMES, option="film: --follow") == key
 
 
 @pytest.mark.parametrize(
@@ -59,4 +59,4 @@ def test_a_name_is_known_as_people_write_it(text: str, key: str) -> None:
 )
 def test_another_name_is_refused_with_the_one_that_was_meant(text: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        name_called(text, NAMES, option="film: --follow")
+        find_by_name(text, NAMES, option="film: --follow")

@@ -11,10 +11,10 @@ import pytest
 import toy_city
 from vico.envs import CommunityEnv, EnvSpec
 from vico.errors import InputError
+from vico.sim.cameras import CLASSES
 from vico.sim.config import SimConfig, SimSettings
-from vico.sim.eyes import CLASSES
+from vico.sim.loop.simulation import Simulation
 from vico.sim.observations import distinct_entities
-from vico.sim.simulation import Simulation
 
 Seen = tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import toy_city
 from vico.sim.config import NO_DAY, SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.world import World
 
 HOURS = "Mo-Fr 09:00-17:00; Sa,Su off"

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.sim.collisions import WALL
+from vico.sim.bodies.collisions import WALL
+from vico.sim.bodies.state_arrays import Vehicle
 from vico.sim.config import SimConfig
-from vico.sim.overlaps import FURNITURE, OverlapCheck, overlaps_of
-from vico.sim.simulation import Simulation
-from vico.sim.state import Vehicle
+from vico.sim.loop.checks import FURNITURE, OverlapCheck, overlaps_of
+from vico.sim.loop.simulation import Simulation
 
 
 @pytest.fixture

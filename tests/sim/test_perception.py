@@ -12,10 +12,10 @@ import pytest
 import toy_city
 from vico.agents.schedule import followers_of
 from vico.runner.gather import Gatherer
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.perception import OUTDOORS, SIGHT, Eyes, InView, OpaqueGrid, in_view, opaque_grid
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.perception import OUTDOORS, SIGHT, InView, OpaqueGrid, Viewpoints, in_view, opaque_grid
 from vico.world.public import PublicMap
 
 
@@ -37,7 +37,7 @@ def person(x: float, y: float, z: float = 0.0) -> Bodies:
 
 def seen(bodies: Bodies, *, yaw: float = 0.0, space: int = OUTDOORS, theirs: int = OUTDOORS) -> InView:
     """What somebody at the origin sees."""
-    eyes = Eyes(np.array([[0.0, 0.0, 1.6]]), np.array([yaw]), np.array([1], np.int32), np.array([space]))
+    eyes = Viewpoints(np.array([[0.0, 0.0, 1.6]]), np.array([yaw]), np.array([1], np.int32), np.array([space]))
     return in_view(
         eyes, bodies, np.full(len(bodies), theirs), wall(), {7: {"kind": "pedestrian", "name": "Ann", "agent": "ann"}}
     ).of(0)

@@ -10,7 +10,7 @@ from robot_field import field
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.physics import StaticScene, engine, make_engine, make_scene
 from vico.sim.physics.collision_shapes import SolidCells, find_near
 from vico.sim.physics.mujoco_engine import MujocoEngine

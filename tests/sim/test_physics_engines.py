@@ -9,7 +9,7 @@ import pytest
 from robot_field import ENGINES
 from vico.assets.robots import ActionSpace, NoController, RobotModel, Sensors, robot_model
 from vico.errors import InputError, SchemaError
-from vico.sim.bodies import CAR, OBJECT, RESIDENT, Bodies
+from vico.sim.bodies.arrays import CAR, OBJECT, RESIDENT, Bodies
 from vico.sim.physics import Capacity, PhysicsEngine, PhysicsScene, StaticScene, make_scene
 from vico.sim.physics.records import COARSE, FINE, Party, RigidObject
 from vico.world.heights import HeightField

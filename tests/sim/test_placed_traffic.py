@@ -10,7 +10,7 @@ import pytest
 from helsinki_traffic import network
 from road_city import HALF
 from vico.errors import InputError, SchemaError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.traffic import Traffic, TrafficSetup
 from vico.sim.traffic.placement import placed_traffic
 from vico.world.heights import HeightField

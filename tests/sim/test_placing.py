@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import toy_city
+from vico.sim.bodies.state_arrays import RADIUS
 from vico.sim.config import SimConfig
-from vico.sim.overlaps import overlaps_of
-from vico.sim.simulation import Simulation
-from vico.sim.state import RADIUS
+from vico.sim.loop.checks import overlaps_of
+from vico.sim.loop.simulation import Simulation
 
 CRATE = (0.4, 0.4, 0.4)
 

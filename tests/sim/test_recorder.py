@@ -14,9 +14,9 @@ from vico.agents.schedule import followers_of
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.world.public import PublicMap
 
 STEPS = 130

@@ -20,11 +20,11 @@ from vico.agents.schedule import followers_of
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.sim.animation import Transition, pose
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import PosedPeople, read_run
-from vico.sim.recording.action_text import LONGEST_ACTION, action_text
+from vico.sim.recording.recorder import Recorder
+from vico.sim.recording.samples import LONGEST_ACTION, action_text
 from vico.sim.recording.schema import SEGMENT_STEPS
-from vico.sim.simulation import Simulation
 from vico.world.lane_reader import read_lanes
 from vico.world.public import PublicMap
 from vico.world.transit_model import BikeStation, Transit

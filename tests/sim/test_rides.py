@@ -9,14 +9,14 @@ import pytest
 from scipy import ndimage
 
 from vico.rules import BIKE_ASTRAY, BIKE_RATE, BUS_FARE
-from vico.sim import rides
-from vico.sim.actions.check import check
 from vico.sim.actions.model import Refusal
-from vico.sim.avatars import clearances, cyclist_fits
+from vico.sim.actions.table import check
+from vico.sim.bodies.avatars import clearances, cyclist_fits
+from vico.sim.bodies.state_arrays import RADIUS, Posture, Vehicle
 from vico.sim.config import SimConfig
-from vico.sim.overlaps import overlapping
-from vico.sim.simulation import Simulation
-from vico.sim.state import RADIUS, Posture, Vehicle
+from vico.sim.loop.checks import overlapping
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people import rides
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World
 
@@ -123,7 +123,7 @@ def test_sixty_riders_have_sixty_places(helsinki_city: World) -> None:
         sim.scenario.place_agent(f"assistant_{i}", transit.exit_spots(bus)[0])
         refused = check({"type": "enter_bus"}, i, state)
         if i < 60:
-            rides.board(i, state)
+            rides.board_bus(i, state)
     assert isinstance(refused, Refusal)
     assert "full" in refused.reason
     where = state.people.position[:60, :2]
@@ -142,12 +142,12 @@ def test_a_place_that_somebody_left_is_taken_by_the_next(helsinki_city: World) -
     bus = next(b for b in range(transit.traffic.buses) if transit.stopped_at(b) is not None)
     for i in (0, 1):
         sim.scenario.place_agent(f"assistant_{i}", transit.exit_spots(bus)[0])
-        rides.board(i, sim.state)
+        rides.board_bus(i, sim.state)
     first = sim.state.people.position[0].copy()
-    rides.alight(0, sim.state)
+    rides.alight_bus(0, sim.state)
     assert sim.state.people.posture[0] == Posture.STANDING
     sim.scenario.place_agent("assistant_2", transit.exit_spots(bus)[1])
-    rides.board(2, sim.state)
+    rides.board_bus(2, sim.state)
     assert np.allclose(sim.state.people.position[2], first)
 
 
@@ -158,7 +158,7 @@ def test_riders_are_seen_through_the_windows(helsinki_city: World) -> None:
     sim.state.people.cash[:] = 10.0
     bus = next(b for b in range(transit.traffic.buses) if transit.stopped_at(b) is not None)
     sim.scenario.place_agent("assistant_0", transit.exit_spots(bus)[0])
-    rides.board(0, sim.state)
+    rides.board_bus(0, sim.state)
     rider = sim.state.people.position[0]
     beside = np.array([-np.sin(transit.bus_pose(bus)[2]), np.cos(transit.bus_pose(bus)[2])])
     views = sim.renderer.render(
@@ -250,7 +250,7 @@ def test_a_bicycle_that_is_left_in_the_street_is_wheeled_off_it(sim: Simulation)
         transit.bicycles.carry(bike, float(spot[0]), float(spot[1]), 0.3)
         if transit.bicycles.is_at_station(bike):
             continue
-        rides.dismount(0, sim.state)
+        rides.dismount_bicycle(0, sim.state)
         tried += 1
         body = transit.bicycles.standing_bodies(np.array([bike]))
         others = sim.state.obstacles_to(0)

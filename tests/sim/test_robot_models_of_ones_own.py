@@ -11,10 +11,10 @@ from robot_field import field
 from vico.assets.robots import ActionSpace, SkidSteering, register_robot, robot_model
 from vico.assets.shapes import box
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, RobotStatus
-from vico.sim.simulation import Simulation
 
 PLACES = [[0, 0, 0], [5, 0, 0.5]]
 

@@ -5,7 +5,7 @@ import pytest
 from robot_field import field
 from vico.rules import ActionStatus
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 GOOD = {"type": "control", "vector": [0.0, 0.0, 0.0, 0.0]}
 BAD = {"type": "control", "vector": [0.0]}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robot_field import HALF, field, people
-from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.bodies.arrays import OBJECT, Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.path_following import NEIGHBOUR, SIGHT, NearbyBodies, free_ahead
 from vico.world.heights import HeightField

@@ -10,10 +10,10 @@ import robot_kinds
 from robot_field import field
 from vico.assets.robots import catalogue
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, RobotScene
-from vico.sim.simulation import Simulation
 
 PLACES = [[0, 0, 0], [0, 6, 0]]
 

@@ -5,11 +5,11 @@ import pytest
 
 from robot_field import field
 from vico.assets.robots import robot_names
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, commands
 from vico.sim.robots.hardware import EXCHANGE, watch_batteries
-from vico.sim.simulation import Simulation
 from vico.world.walkable import CROSSING, ROADWAY, SIDEWALK
 
 KINDS = tuple(robot_names())

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from robot_field import HALF, field
-from vico.sim.bodies import CAR, Bodies
+from vico.sim.bodies.arrays import CAR, Bodies
 from vico.sim.config import SimConfig
 from vico.sim.environment.agenda import EventEffects
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.trips import outdoor_path
-from vico.sim.simulation import Simulation
 from vico.world.heights import HeightField
 from vico.world.walkable import ROADWAY
 from vico.world.world import World

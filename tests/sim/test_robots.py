@@ -12,11 +12,11 @@ import pytest
 
 from robot_field import HALF, PACKS, field, people
 from vico.errors import InputError
-from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.bodies.arrays import OBJECT, Bodies
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.quadruped import LegGeometry, leg_angles
-from vico.sim.simulation import Simulation
 from vico.world.heights import HeightField
 
 #: Of Go2: lengths of thigh and shin 0.213 m, 0.0955 m from the hip to the leg (Unitree's description).

@@ -10,11 +10,11 @@ import toy_city
 from robot_field import ENGINES
 from vico.assets.robots import robot_model
 from vico.sim.config import SimConfig
-from vico.sim.moves import place_in_room
-from vico.sim.overlaps import overlaps_of
+from vico.sim.loop.checks import overlaps_of
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.placement import place_in_room
 from vico.sim.robots import commands
 from vico.sim.robots.path_planning import fits_doors
-from vico.sim.simulation import Simulation
 from vico.world.model import LIFT, Doorway, Room
 from vico.world.world import World
 

@@ -7,11 +7,11 @@ import pytest
 
 from robot_field import ENGINES, field, people
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import PHYSICS_ENGINES, SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.physics import engine
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
-from vico.sim.simulation import Simulation
 
 KINDS = ("husky", "go2", "drone", "manipulator")
 PLACES = [[0, 0, 0], [0, 6, 0], [0, 12, 0], [0, -6, 0]]

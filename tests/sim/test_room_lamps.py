@@ -14,12 +14,11 @@ from vico.assets.shapes import box
 from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.records import UPPER_WINDOWS
+from vico.sim.bodies.state_arrays import Posture
 from vico.sim.config import SimConfig
-from vico.sim.room_lamps import RoomLamps
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture
-from vico.sim.window_lights import WindowLights
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.buildings import RoomLamps, WindowLights
+from vico.sim.pictures.scene import SceneRenderer
 from vico.world.mesh import Material
 from vico.world.model import Category
 

@@ -10,7 +10,7 @@ from helsinki_traffic import network, traffic_by
 from road_city import road_city
 from vico.agents.wayfinding import shows_red
 from vico.errors import SchemaError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.signals import SignalClock
 from vico.sim.traffic.state import AMBER, DARK, GREEN, RED

@@ -17,9 +17,9 @@ from vico.agents.schedule import followers_of
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.physics.records import PhysicsError
-from vico.sim.simulation import Simulation
-from vico.sim.snapshot import state_hash
+from vico.sim.state.snapshot import state_hash
 from vico.world.public import PublicMap
 
 MORNING = SimConfig(start=8 * 3600 - 20, assistants=1, observe=())

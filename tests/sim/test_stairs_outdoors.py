@@ -11,9 +11,9 @@ import toy_city
 from helsinki_traffic import network
 from road_city import HALF
 from vico.rules import STAIRS_SPEED
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.sim.traffic import Traffic
 from vico.world.heights import HeightField
 from vico.world.stairs import Stairs

@@ -9,8 +9,8 @@ import numpy as np
 
 from helsinki_traffic import network
 from road_city import HALF, road_city
-from vico.sim.bodies import Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.state import STOP, TALK
 from vico.sim.traffic.stopping_places import with_spots

@@ -10,7 +10,7 @@ import pytest
 import toy_city
 from vico.errors import InputError
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 SPOT = (2.0, -3.0, 0.5)
 

@@ -10,8 +10,8 @@ import pytest
 import shapely
 
 from road_city import HALF, road_city
-from vico.sim.bodies import Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.lights import LEFT, RIGHT
 from vico.sim.traffic.state import APPROACHING, BACKING_IN, DRIVING, LEAVING, NONE, STANDING, STOPPING_PLACE

@@ -10,10 +10,10 @@ import pytest
 import toy_city
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.serving import Clerk
+from vico.sim.bodies.seats import PRICE, SERVICE, SPACING
 from vico.sim.config import SimConfig
-from vico.sim.moves import place_in_room
-from vico.sim.simulation import Simulation
-from vico.sim.tills import PRICE, SERVICE, SPACING
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.placement import place_in_room
 from vico.world.world import World
 
 

@@ -11,8 +11,8 @@ import pytest
 import toy_city
 from vico.errors import InputError
 from vico.sim.config import SimConfig
-from vico.sim.periods import ControlPeriods, ticks_of
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.state.steps import ControlPeriods, ticks_of
 from vico.world.world import World
 
 MORNING = SimConfig(start=8 * 3600 - 20, assistants=1, observe=())

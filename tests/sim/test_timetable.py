@@ -5,7 +5,7 @@ from __future__ import annotations
 import toy_city
 from vico.clock import DAY
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 
 def evening() -> Simulation:

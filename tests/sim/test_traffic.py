@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from road_city import HALF, road_city
 from vico.errors import InputError
-from vico.sim.bodies import OBJECT, RESIDENT, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import OBJECT, RESIDENT, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.jams import vehicles_backing_up
 from vico.sim.traffic.pedestrians import place_pedestrian

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from road_city import HALF, road_city
-from vico.sim.bodies import RESIDENT, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import RESIDENT, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.lane_change import distance_to_let_in, places_to_let_in, room_to_change
 from vico.sim.traffic.network import BEFORE_JUNCTION, stop_lines

@@ -4,7 +4,7 @@ import numpy as np
 
 from helsinki_traffic import network
 from road_city import HALF
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.placement import placed_traffic
 from vico.sim.traffic.route import STANDING_ROOM

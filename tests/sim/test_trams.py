@@ -16,10 +16,10 @@ from vico.community.model import Mode
 from vico.geo.frame import LocalFrame
 from vico.rules import BUS_DWELL
 from vico.seeds import rng
+from vico.sim.bodies.state_arrays import Posture, Vehicle
 from vico.sim.config import SimConfig
-from vico.sim.overlaps import overlaps_of
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture, Vehicle
+from vico.sim.loop.checks import overlaps_of
+from vico.sim.loop.simulation import Simulation
 from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.system import TransitSystem
 from vico.sim.transit.tram_network import TramNetwork, zones_of

@@ -10,8 +10,8 @@ from road_city import HALF, road_city
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_DWELL, BUS_FARE, ride_price
-from vico.sim.bodies import BICYCLE, RESIDENT, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import BICYCLE, RESIDENT, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.population import PATIENCE
 from vico.sim.transit import TransitSystem, plan_buses

@@ -10,10 +10,9 @@ import toy_city
 from vico.assets.models.in_hand import in_hand_models
 from vico.sim.animation import Hold
 from vico.sim.config import SimConfig
-from vico.sim.hands_scene import draw_umbrellas
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation import Simulation
-from vico.sim.umbrellas import lean_apart
+from vico.sim.loop.simulation import Simulation
+from vico.sim.pictures.hands import draw_umbrellas, lean_apart
+from vico.sim.pictures.scene import SceneRenderer
 
 
 def _both(distance: float) -> NDArray[np.float64]:

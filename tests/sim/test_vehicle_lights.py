@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from helsinki_traffic import traffic_by
-from vico.sim.bodies import RESIDENT, ROBOT, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import RESIDENT, ROBOT, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.lights import BRAKE, LEFT, RIGHT
 

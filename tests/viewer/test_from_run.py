@@ -7,9 +7,9 @@ import pytest
 
 import toy_city
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.from_run import recording_of
 from vico.viewer.recording import Recording
 

@@ -13,9 +13,9 @@ from vico.community import read_community
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run, read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, still
 from vico.world.public import PublicMap

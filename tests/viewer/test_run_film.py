@@ -23,10 +23,10 @@ from vico.render.film import read_film
 from vico.render.limbs import LIMBS
 from vico.render.quality import PLAIN
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run, read_run
-from vico.sim.recording.cast import CastMember
-from vico.sim.simulation import Simulation
+from vico.sim.recording.manifest import CastMember
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.follow import FollowCamera
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, Span, still, write_film_of_shots, write_run_film

@@ -18,8 +18,8 @@ from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig
-from vico.sim.recorder import Recorder
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
 from vico.sim.traffic import JunctionRule
 from vico.viewer.sources.frames import FRAME_COLUMNS, NEWEST, decoded
 from vico.viewer.sources.signals import heads_on, signals_of

@@ -11,7 +11,7 @@ import robot_field
 from vico.agents.human import Held, HumanAgent, Mailbox
 from vico.assets.robots import robot_model
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.viewer.hand_led import HAND_SPEED, HandLed
 from vico.viewer.hints import hints_of
 from vico.viewer.teleoperation import steering_of

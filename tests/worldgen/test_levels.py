@@ -10,8 +10,8 @@ import shapely
 from road_city import lanes_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmWay
-from vico.sim.bodies import PEDESTRIAN, Bodies
-from vico.sim.overlaps import overlapping
+from vico.sim.bodies.arrays import PEDESTRIAN, Bodies
+from vico.sim.loop.checks import overlapping
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.network import TrafficNetwork
 from vico.world.heights import HeightField

@@ -17,7 +17,7 @@ from vico.clock import seconds_of_day
 from vico.errors import InputError, MissingFileError, OutputExistsError, some_of
 from vico.render.film import partial_film
 from vico.render.quality import RenderQuality
-from vico.sim.names import name_called
+from vico.sim.config import find_by_name
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, Span, write_film_of_shots, write_still
@@ -218,14 +218,14 @@ def followed(run: Run, text: str, first: int, last: int, *, option: str) -> str:
     Parameters
     ----------
     text
-        A name as `vico.sim.names.name_called` takes it.
+        A name as `vico.sim.config.find_by_name` takes it.
 
     Raises
     ------
     InputError
         If nobody is called so, or is not there all the time.
     """
-    name = name_called(text, run.names, option=option)
+    name = find_by_name(text, run.names, option=option)
     stays = [stay for one in run.cast.values() if name in (one.agent, one.name) for stay in one.intervals]
     if not any(begin <= first and (until is None or last < until) for begin, until in stays):
         there = [f"{_clock(run.times[a])} to {_clock(run.times[run.last if b is None else b - 1])}" for a, b in stays]

@@ -59,8 +59,7 @@ def motion_of_run(
         force: Replace files that are there.
         json: Print what was written as JSON.
     """
-    from vico.sim.recording.joint_poses import motion_of
-    from vico.sim.recording.run import read_run
+    from vico.sim.recording.run import motion_of, read_run
 
     return _write(motion_of(read_run(run), agent), run, out=out, sheet=sheet, force=force, json=json)
 

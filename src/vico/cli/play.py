@@ -9,7 +9,7 @@ from typing import Literal
 from vico.cli.evaluation_options import AssistantOptions, EvaluationOptions
 from vico.cli.viewer_options import PlayOptions
 from vico.errors import InputError
-from vico.sim.names import name_called
+from vico.sim.config import find_by_name
 from vico.viewer.server import require_server
 
 # There are as many assistants as it takes for the one who is played.
@@ -42,7 +42,7 @@ def _freely(options: PlayOptions, community: Path) -> int:
     robots = [name.strip() for name in options.robots.split(",") if name.strip() not in ("", "none")]
     played = options.played or ("robot_0" if robots else "assistant_0")
     if not _ASSISTANT.fullmatch(played):
-        played = name_called(played, names_of(community, robots, assistants=1), option="play: --as")
+        played = find_by_name(played, names_of(community, robots, assistants=1), option="play: --as")
     human = HumanAgent(Mailbox(), steer=_steering(robots, played))
     given = options.run_options(played, round(options.seconds / PERIOD))
     assert given.out is not None

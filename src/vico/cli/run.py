@@ -35,15 +35,13 @@ from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun, go_on_from
-from vico.sim.config import SimConfig
-from vico.sim.environment.sky import first_date
-from vico.sim.interventions import Line, read_interventions
-from vico.sim.names import name_called
-from vico.sim.recorder import Recorder
-from vico.sim.recording.checkpoints import checkpoint_steps
+from vico.sim.config import SimConfig, find_by_name
+from vico.sim.environment.environment import first_date
+from vico.sim.loop.simulation import Simulation
+from vico.sim.recording.interventions import InterventionLine, read_interventions
 from vico.sim.recording.manifest import read_manifest
-from vico.sim.recording.schema import RUN_FOLDER
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
+from vico.sim.recording.schema import RUN_FOLDER, checkpoint_steps
 from vico.sim.traffic.placement import NoRoomError
 from vico.threads import use_workers, workers
 from vico.world.folder import read_world
@@ -208,7 +206,7 @@ class Job:
         # A name that is not right is said before a large world is read.
         names = names_of(community, _names(options.robots), options.assistants)
         asked = () if options.observe == "all" else _names(options.observe)
-        observe = tuple(name_called(name, names, option="run: --observe") for name in asked)
+        observe = tuple(find_by_name(name, names, option="run: --observe") for name in asked)
         worn = _worn(options.wear, names)
         found = None if options.force else _cut_short(out)
         kind = RUN_FOLDER if options.force else None
@@ -293,7 +291,7 @@ class Job:
             stack.callback(self.played.human.close, "the run has ended")
         return stack.enter_context(live_viewer(self.options, self.world, control, self.played))
 
-    def _control(self, script: list[Line], *, manageable: bool) -> Control | None:
+    def _control(self, script: list[InterventionLine], *, manageable: bool) -> Control | None:
         """Return what lets hands reach into the run; None where none are to."""
         options = self.options
         if not options.live and not script:
@@ -573,7 +571,7 @@ def _worn(text: str, names: Mapping[str, str]) -> dict[str, str]:
         name, is_pair, path = entry.partition("=")
         if not is_pair or not Path(path).is_file():
             raise InputError(f"run: --wear {entry!r}: give NAME=FILE.glb, a file that is there")
-        found[name_called(name, names, option="run: --wear")] = str(Path(path).resolve())
+        found[find_by_name(name, names, option="run: --wear")] = str(Path(path).resolve())
     return found
 
 

@@ -30,9 +30,8 @@ from vico.datasets.vectors import in_own_frame, in_world_frame
 from vico.errors import InputError
 from vico.rules import LONGEST_TEXT
 from vico.sim.actions import PEOPLE_ACTIONS, ROBOT_ACTIONS, Command
-from vico.sim.actions.check import parse
-from vico.sim.actions.fields import Field
-from vico.sim.actions.table import form_of
+from vico.sim.actions.model import Field
+from vico.sim.actions.table import form_of, parse
 
 #: What stands for an action that is none, and for no action.
 IDLE = "wait"

@@ -23,8 +23,8 @@ from vico.datasets.vectors import (
     robot_state_names,
 )
 from vico.errors import EmptyInputError, InputError
-from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.recording import Run
+from vico.sim.state.steps import TICKS_PER_SECOND
 
 #: What stands for an instruction where nobody gave one.
 NO_INSTRUCTION = "No instruction."

@@ -19,7 +19,7 @@ from vico.datasets.demonstrations import Demonstration
 from vico.datasets.formats.pictures import PictureFiles
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
-from vico.sim.recording.segments import written_folder
+from vico.sim.recording.schema import written_folder
 
 #: Counts up whenever a part would hold something else than before.
 VERSION = 2

@@ -31,7 +31,7 @@ from vico.io.stores import FolderStore
 from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
-from vico.sim.names import name_called
+from vico.sim.config import find_by_name
 from vico.sim.recording import Run, read_run
 from vico.world.folder import is_world, read_world
 from vico.world.world import World
@@ -192,7 +192,7 @@ def chosen_agents(run: Run, contents: Contents) -> list[str]:
         found: list[str] = []
         for asked in contents.agents:
             of_kind = [name for name, kind in known.items() if kind == _KINDS.get(asked)]
-            found += of_kind or [name_called(asked, names, option=f"{run.path}: agents")]
+            found += of_kind or [find_by_name(asked, names, option=f"{run.path}: agents")]
         return list(dict.fromkeys(found))
     seen = [name for name in known if name in run.views] if contents.outputs else list(known)
     assistants = [name for name, kind in known.items() if kind == "assistant"]

@@ -7,7 +7,7 @@ from vico.envs.single import SingleAgentEnv
 from vico.envs.spec import EnvSpec
 from vico.envs.vector import ParallelVectorEnv, VectorAgentEnv, make_parallel_vec
 from vico.envs.workers import WorkerError
-from vico.sim.simulation import Simulation, StepResult
+from vico.sim.loop.simulation import Simulation, StepResult
 
 register_ids()
 

@@ -13,9 +13,9 @@ from vico.envs.arrays.form import ArrayForm
 from vico.envs.form_options import FormOptions
 from vico.envs.rich import rich_observation
 from vico.envs.spaces import action_space, observation_space, robot_space, short_form
-from vico.sim.eyes import lenses_of
-from vico.sim.simulation import Simulation
-from vico.sim.simulation_state import SimulationState
+from vico.sim.cameras import lenses_of
+from vico.sim.loop.simulation import Simulation
+from vico.sim.state.simulation_state import SimulationState
 from vico.world.public import PublicMap
 
 

@@ -20,8 +20,8 @@ from vico.envs.spec import EnvOptions, EnvSpec
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.actions import AgentFault
-from vico.sim.events import Event
-from vico.sim.simulation import Simulation, StepResult
+from vico.sim.loop.simulation import Simulation, StepResult
+from vico.sim.state.steps import Event
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.world import World

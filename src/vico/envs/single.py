@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vico.envs.parallel import CommunityEnv
 from vico.errors import InputError
-from vico.sim.simulation import StepResult
+from vico.sim.loop.simulation import StepResult
 
 
 class Policy(Protocol):

@@ -22,8 +22,8 @@ from gymnasium import spaces
 
 from vico.rules import LONGEST_TEXT
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
-from vico.sim.actions.fields import Field
-from vico.sim.eyes import USUAL_OUTPUTS, Lens, shape_of
+from vico.sim.actions.model import Field
+from vico.sim.cameras import USUAL_OUTPUTS, Lens, shape_of
 from vico.sim.robots import ActionSpace, Reading
 
 #: Characters that texts of observations hold: ASCII, and the letters of Latin, Greek and Cyrillic script with their

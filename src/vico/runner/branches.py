@@ -10,10 +10,8 @@ from pathlib import Path
 from vico.errors import MissingFileError, OutputExistsError
 from vico.io.files import write_errors, write_json
 from vico.runner.bookmarks import FILE as BOOKMARKS
-from vico.sim.interventions import FILE as INTERVENTIONS
-from vico.sim.recording.cast import cut_cast
-from vico.sim.recording.checkpoints import checkpoint_steps
-from vico.sim.recording.manifest import read_manifest
+from vico.sim.recording.interventions import INTERVENTIONS_FILE as INTERVENTIONS
+from vico.sim.recording.manifest import cut_cast, read_manifest
 from vico.sim.recording.schema import (
     AGENTS,
     CAST,
@@ -24,8 +22,9 @@ from vico.sim.recording.schema import (
     SETUP,
     SETUP_SHAPES,
     VIEWS,
+    checkpoint_steps,
+    segments_of,
 )
-from vico.sim.recording.segments import segments_of
 
 _COPIED = (AGENTS, CAST, SETUP, SETUP_SHAPES, INTERVENTIONS, BOOKMARKS)
 

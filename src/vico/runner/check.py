@@ -21,7 +21,7 @@ from vico.runner.isolated import IsolatedAgent
 from vico.runner.loading import AgentSeat
 from vico.runner.watch import UnfairError
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.world import World
 
 NAME = "assistant_0"

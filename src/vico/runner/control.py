@@ -17,9 +17,9 @@ from vico.runner.bookmarks import add_bookmark, bookmarks_of
 from vico.runner.branches import branch_path, free_name
 from vico.runner.loop import Runner
 from vico.runner.pace import Pace
-from vico.sim.interventions import (
+from vico.sim.recording.interventions import (
     COMMANDS,
-    Line,
+    InterventionLine,
     append_intervention,
     intervene,
     intervention_of,
@@ -27,7 +27,7 @@ from vico.sim.interventions import (
     things_to_drop,
     write_interventions,
 )
-from vico.sim.recording.checkpoints import checkpoint_steps
+from vico.sim.recording.schema import checkpoint_steps
 
 T = TypeVar("T")
 
@@ -97,7 +97,7 @@ class Control:
         *,
         speed: float = 0.0,
         paused: bool = False,
-        script: Sequence[Line] = (),
+        script: Sequence[InterventionLine] = (),
         manageable: bool = True,
         allowed: Collection[str] | None = None,
     ) -> None:
@@ -259,10 +259,10 @@ class Control:
         if name not in self._can():
             raise InputError(f"{name!r} is no command here; there are {', '.join(self._can())}")
         if name in COMMANDS:
-            return self._intervened(runner, Line(after=self.step, command=name, arguments=dict(arguments)))
+            return self._intervened(runner, InterventionLine(after=self.step, command=name, arguments=dict(arguments)))
         return _COMMANDS[name](self, runner, Arguments(name, arguments))
 
-    def _intervened(self, runner: Runner, line: Line) -> dict[str, Any]:
+    def _intervened(self, runner: Runner, line: InterventionLine) -> dict[str, Any]:
         told, actions = intervene(runner.sim, intervention_of(line.command, line.arguments))
         self._pending |= actions
         append_intervention(self.out, line)

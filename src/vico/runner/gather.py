@@ -33,7 +33,7 @@ class Gathered:
 
     @property
     def agent_faults(self) -> dict[str, AgentFault]:
-        """What `vico.sim.simulation.Simulation.step` is told of those who failed."""
+        """What `vico.sim.loop.simulation.Simulation.step` is told of those who failed."""
         return {name: failure.outcome for name, failure in self.failures.items()}
 
 

@@ -13,7 +13,7 @@ from vico.errors import InputError
 from vico.runner.faults import Failure, FaultLog, is_malformed
 from vico.runner.garbage import settled
 from vico.runner.gather import Gatherer
-from vico.sim.simulation import Simulation, StepResult
+from vico.sim.loop.simulation import Simulation, StepResult
 
 log = logging.getLogger(__name__)
 

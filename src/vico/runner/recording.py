@@ -12,9 +12,9 @@ from vico.errors import InputError, SchemaError
 from vico.runner.faults import FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Step
-from vico.sim.recorder import Checkpoint, Recorder
+from vico.sim.loop.simulation import Simulation
+from vico.sim.recording.recorder import Checkpoint, Recorder
 from vico.sim.recording.schema import RUN_FOLDER
-from vico.sim.simulation import Simulation
 
 
 def go_on_from(checkpoint: Checkpoint, agents: Gatherer, sim: Simulation) -> FaultLog:

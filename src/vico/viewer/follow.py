@@ -15,7 +15,7 @@ from vico.geometry import distances
 from vico.render.cameras import Cameras
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.scene import Scene
-from vico.sim.state import Vehicle
+from vico.sim.bodies.state_arrays import Vehicle
 from vico.viewer.targets import LEAP, Target
 from vico.world.model import Record
 

@@ -11,8 +11,8 @@ import numpy as np
 from vico.geometry import distances
 from vico.rules import EARSHOT, REACH
 from vico.sim.actions import Command, check
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture, Vehicle
+from vico.sim.bodies.state_arrays import Posture, Vehicle
+from vico.sim.loop.simulation import Simulation
 
 Action = dict[str, Any]
 

@@ -13,7 +13,7 @@ from vico.errors import InputError
 from vico.runner.control import Control, waited
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
-from vico.sim.recorder import Recorder
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.play import PlayedAgent
 from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState

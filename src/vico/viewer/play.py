@@ -11,8 +11,8 @@ from typing import Any
 from vico.agents.human import AXES, KEYS, Held, HumanAgent
 from vico.errors import InputError
 from vico.rules import ActionStatus, code_name
-from vico.sim.simulation import Simulation
-from vico.sim.state import Posture, Vehicle
+from vico.sim.bodies.state_arrays import Posture, Vehicle
+from vico.sim.loop.simulation import Simulation
 from vico.viewer.hints import hints_of
 
 #: Who is silent for so long makes room for another page, seconds.

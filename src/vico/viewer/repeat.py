@@ -12,12 +12,11 @@ from vico.community import Community, read_community
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.rules import ActionStatus
 from vico.sim.config import SimConfig
-from vico.sim.interventions import intervene, read_interventions, repeat_drops
-from vico.sim.periods import TICKS_PER_SECOND
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run
-from vico.sim.recording.setup import repeat_setup
-from vico.sim.simulation import Simulation
-from vico.sim.simulation_state import SimulationState
+from vico.sim.recording.interventions import intervene, read_interventions, repeat_drops, repeat_setup
+from vico.sim.state.simulation_state import SimulationState
+from vico.sim.state.steps import TICKS_PER_SECOND
 from vico.world.folder import is_world, read_world
 from vico.world.world import World
 

@@ -18,9 +18,9 @@ from vico.render.between import SceneMoment, moment_of, show_between
 from vico.render.film import FilmWriter
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import FINE, RenderQuality
-from vico.sim.renderers import renderer_of
-from vico.sim.scene import SceneRenderer
-from vico.sim.simulation_state import SimulationState
+from vico.sim.pictures.city import renderer_of
+from vico.sim.pictures.scene import SceneRenderer
+from vico.sim.state.simulation_state import SimulationState
 from vico.viewer.follow import Angle, FollowCamera
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.targets import Target, target_between, target_of

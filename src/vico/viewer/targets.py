@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, some_of
 from vico.quaternions import matrix_of
-from vico.sim.bodies import Bodies
-from vico.sim.moves import eye_height
-from vico.sim.simulation_state import SimulationState
-from vico.sim.state import MovableObjects, Vehicle
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.bodies.state_arrays import MovableObjects, Vehicle
+from vico.sim.people.placement import eye_height
+from vico.sim.state.simulation_state import SimulationState
 
 #: Who is farther from where they were a moment ago was not seen on the way, metres.
 LEAP = 4.0

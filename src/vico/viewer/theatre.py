@@ -18,7 +18,7 @@ from vico.errors import InputError
 from vico.runner.control import Control
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook
-from vico.sim.recorder import Recorder
+from vico.sim.recording.recorder import Recorder
 from vico.viewer.live import LiveViewer
 from vico.viewer.play import PlayedAgent
 from vico.world.world import World

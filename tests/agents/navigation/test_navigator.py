@@ -14,7 +14,7 @@ from vico.assets.models.furniture import furniture_models
 from vico.io.plain_data import decode, encode
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.heights import HeightField
 from vico.world.model import Category
 from vico.world.public import PublicMap

@@ -18,7 +18,7 @@ from vico.errors import InputError
 from vico.io.plain_data import decode, encode
 from vico.quaternions import matrix_of
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 Triple = tuple[float, float, float]
 

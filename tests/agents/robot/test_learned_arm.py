@@ -28,7 +28,7 @@ from vico.errors import InputError
 from vico.io.plain_data import decode, encode
 from vico.quaternions import matrix_of, upright
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 PERIOD = 0.05
 SIZE = (0.12, 0.2, 0.1)

@@ -16,9 +16,9 @@ from vico.assets.shapes import box
 from vico.challenges.robot.bodies import arm_body
 from vico.errors import SchemaError
 from vico.sim.config import SimConfig
+from vico.sim.loop.simulation import Simulation
 from vico.sim.physics import surroundings
 from vico.sim.physics.mujoco_engine import MujocoEngine
-from vico.sim.simulation import Simulation
 
 PERIOD, ROBOT, SIZE, AT = 0.05, "robot_0", (0.12, 0.2, 0.2), np.array([1.2, 0.3, 0.0])
 BODY = arm_body(robot_model("manipulator"))

@@ -14,7 +14,7 @@ from vico.assets.shapes import box
 from vico.challenges.robot.bodies import arm_body
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 PERIOD = 0.05
 BODY = arm_body(robot_model("manipulator"))

@@ -9,7 +9,7 @@ from vico.agents.schedule import ScheduleFollower, followers_of
 from vico.agents.talk.talker import PATIENCE
 from vico.agents.talk.understanding import claims_in
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 

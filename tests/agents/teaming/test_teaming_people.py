@@ -15,7 +15,7 @@ from vico.agents.teaming.newcomer import GAVE_UP, I_FOLLOW, WAIT_FOR_ME, Newcome
 from vico.agents.teaming.visitor import LETS_GO, THANKS, Visitor
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap
 
 CLEO, ROBOT = "resident_2", "robot_0"

@@ -36,7 +36,7 @@ from vico.io.files import sha256_of, write_json
 from vico.io.plain_data import decode, encode
 from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
+from vico.sim.loop.simulation import Simulation
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
 BODY = arm_body(robot_model("manipulator"))

@@ -15,13 +15,14 @@ from vico.agents.schedule import followers_of
 from vico.agents.wayfinding import Walker
 from vico.errors import VicoError
 from vico.seeds import rng
+from vico.sim.bodies.state_arrays import FIRST_THING
 from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, CityEvent, EventSites, event_kinds
-from vico.sim.event_things import FIRST_THING, THINGS_EACH
-from vico.sim.hearing import noise_at
-from vico.sim.recorder import Recorder
+from vico.sim.loop.simulation import Simulation
+from vico.sim.people.hearing import noise_at
 from vico.sim.recording import read_run
-from vico.sim.simulation import Simulation
+from vico.sim.recording.recorder import Recorder
+from vico.sim.state.event_things import THINGS_EACH
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World

@@ -9,11 +9,11 @@ import pytest
 
 import toy_city
 from road_city import HALF, road_city
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, Conditions, Environment, EventSites, Sky
-from vico.sim.overlaps import overlapping
-from vico.sim.simulation import Simulation
+from vico.sim.loop.checks import overlapping
+from vico.sim.loop.simulation import Simulation
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.transit import TransitSystem, plan_buses
 from vico.world.heights import HeightField

@@ -11,9 +11,9 @@ import toy_city
 from vico.envs import EnvSpec
 from vico.errors import InputError
 from vico.sim.actions import apply_actions
+from vico.sim.bodies.state_arrays import Vehicle
 from vico.sim.config import SimConfig
-from vico.sim.simulation import Simulation
-from vico.sim.state import Vehicle
+from vico.sim.loop.simulation import Simulation
 
 FOG = {"weather": [{"at": "00:00", "kind": "fog", "visibility": 25.0}]}
 

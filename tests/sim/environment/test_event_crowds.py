@@ -5,13 +5,11 @@ import shapely
 
 from helsinki_traffic import traffic_by
 from vico.sim.animation import Hold
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.environment.agenda import Agenda
-from vico.sim.environment.event_crowds import MARCH_SPEED, Gathering, before_stage, gathering_of
-from vico.sim.environment.event_sites import EventSites
-from vico.sim.environment.event_spots import Spot
-from vico.sim.hands_scene import hands_of_pedestrians
-from vico.sim.overlaps import overlapping
+from vico.sim.environment.event_sites import MARCH_SPEED, EventSites, Gathering, Spot, before_stage, gathering_of
+from vico.sim.loop.checks import overlapping
+from vico.sim.pictures.hands import hands_of_pedestrians
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.state import CROWD
 from vico.world.walkways import SIDEWALK

@@ -7,11 +7,11 @@ import pytest
 
 import toy_city
 from robot_field import field
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, Environment, EventSites, Sky
+from vico.sim.loop.simulation import Simulation
 from vico.sim.robots import RobotPopulation, RobotStatus
-from vico.sim.simulation import Simulation
 from vico.world.world import World
 
 

@@ -12,10 +12,18 @@ import toy_city
 from vico.clock import DAY
 from vico.errors import InputError, SchemaError
 from vico.sim.environment import Agenda, Environment, EventSites, Sky, Weather, weather_kinds
-from vico.sim.environment.climate import usual_temperature
-from vico.sim.environment.effects import CLEAR_SIGHT
-from vico.sim.environment.forecast import Changing, WeatherSite, forecast_of
-from vico.sim.environment.ground import Ground, aged, cover, iciness, wetness
+from vico.sim.environment.environment import CLEAR_SIGHT
+from vico.sim.environment.weather import (
+    Changing,
+    Ground,
+    WeatherSite,
+    advance_ground,
+    cover,
+    forecast_of,
+    iciness,
+    usual_temperature,
+    wetness,
+)
 
 HELSINKI = WeatherSite(60.17, 24.94, 172)
 JANUARY = WeatherSite(60.17, 24.94, 15)
@@ -112,20 +120,20 @@ def test_unknown_weather_is_refused_with_what_there_is() -> None:
 
 
 def test_rain_wets_the_ground_and_sun_dries_it() -> None:
-    ground = aged(Ground(), weather_kinds()["rain"].weather(12.0), 600.0)
+    ground = advance_ground(Ground(), weather_kinds()["rain"].weather(12.0), 600.0)
     assert wetness(ground.water) == 1.0
     for _ in range(6 * 8):
-        ground = aged(ground, weather_kinds()["clear"].weather(20.0), 600.0)
+        ground = advance_ground(ground, weather_kinds()["clear"].weather(20.0), 600.0)
     assert ground == Ground()
 
 
 def test_snow_lies_while_it_freezes_and_melts_into_water() -> None:
     ground = Ground()
     for _ in range(12):
-        ground = aged(ground, weather_kinds()["snow"].weather(-5.0), 600.0)
+        ground = advance_ground(ground, weather_kinds()["snow"].weather(-5.0), 600.0)
     assert cover(ground.snow) == 1.0
     assert ground.water == 0.0
-    after = aged(ground, weather_kinds()["clear"].weather(8.0), 3600.0)
+    after = advance_ground(ground, weather_kinds()["clear"].weather(8.0), 3600.0)
     assert after.snow < ground.snow
     assert after.water > 0
 
@@ -133,15 +141,15 @@ def test_snow_lies_while_it_freezes_and_melts_into_water() -> None:
 def test_wet_ground_freezes_in_a_cold_night_and_thaws() -> None:
     ground = Ground(water=0.5)
     for _ in range(12):
-        ground = aged(ground, weather_kinds()["clear"].weather(-4.0), 600.0)
+        ground = advance_ground(ground, weather_kinds()["clear"].weather(-4.0), 600.0)
     assert iciness(ground.ice) == 1.0
     assert ground.water + ground.ice == pytest.approx(0.5)
-    thawed = aged(ground, weather_kinds()["clear"].weather(6.0), 3600.0)
+    thawed = advance_ground(ground, weather_kinds()["clear"].weather(6.0), 3600.0)
     assert thawed.ice == 0.0 < thawed.water
 
 
 def test_rain_below_zero_freezes_where_it_falls() -> None:
-    glazed = aged(Ground(), weather_kinds()["freezing_rain"].weather(-3.0), 1800.0)
+    glazed = advance_ground(Ground(), weather_kinds()["freezing_rain"].weather(-3.0), 1800.0)
     assert glazed.water == 0.0
     assert iciness(glazed.ice) == 1.0
 

@@ -9,7 +9,7 @@ import pytest
 
 from live_toy import LiveToy, live_toy
 from vico.sim.environment import weather_kinds
-from vico.sim.interventions import read_interventions
+from vico.sim.recording.interventions import read_interventions
 from vico.viewer.browser import BrowserPage, open_page
 
 

@@ -12,7 +12,7 @@ from vico.assets.people import body_of
 from vico.seeds import rng
 from vico.sim.animation import LONGEST_BLEND, STYLE, Transition, clip_index, free_hands, joint_places, pose, style_of
 from vico.sim.recording import PosedPeople, read_run
-from vico.sim.recording.joint_poses import looks_and_manners
+from vico.sim.recording.run import looks_and_manners
 from vico.viewer.browser import BrowserPage
 
 # Tables are read between their rows: no joint is farther off than this, metres and radians (all but straight knees turn
@@ -119,7 +119,7 @@ def _angles(quaternions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("second", [0.0, 3.7, 28812.4])
 def test_restlessness_is_the_same(page: BrowserPage, second: float) -> None:
-    from vico.sim.animation.standing import restlessness
+    from vico.sim.animation.postures import restlessness
 
     script = f'import("/page/motion.js").then((m) => m.restlessness({second}, 0.3, 0.62))'
     assert page.evaluate(script) == pytest.approx(restlessness(second, 0.3, 0.62), abs=1e-6)

@@ -20,7 +20,7 @@ def lookouts(room: NDArray[np.float64], here: Point) -> list[Point]:
     Parameters
     ----------
     room
-        Its floor as `vico.sim.perception.in_view.InView.room` has it, shape ``(5,)``; an endless one has no spots.
+        Its floor as `vico.sim.perception.InView.room` has it, shape ``(5,)``; an endless one has no spots.
     """
     x, y, yaw, half_length, half_width = room.tolist()
     if not (math.isfinite(half_length) and math.isfinite(half_width)):

@@ -1,7 +1,7 @@
 """Whether another thing finds room on a surface where things of the task lie already: a chair holds one toolbox.
 
 A thing that is laid down where another one lies comes to lie beside it, on the same surface (see
-`vico.sim.scenario.Scenario.add_object`); where there is no such spot the task could not be played.
+`vico.sim.loop.scenario.Scenario.add_object`); where there is no such spot the task could not be played.
 """
 
 from __future__ import annotations

@@ -25,9 +25,9 @@ from vico.envs.arrays.surroundings import PEOPLE, PLACES, THINGS, Surroundings
 from vico.errors import InputError
 from vico.rules import BIKE_SPEED, RUN_SPEED
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS, Refusal
-from vico.sim.actions.check import check
-from vico.sim.actions.fields import Field
-from vico.sim.simulation_state import SimulationState
+from vico.sim.actions.model import Field
+from vico.sim.actions.table import check
+from vico.sim.state.simulation_state import SimulationState
 
 _DEGREES = (5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
 #: What a level stands for, by action. The last step is that of a bicycle: on foot it is as far as one can run.

@@ -14,9 +14,9 @@ from vico.envs.arrays.observation import observation_arrays, observation_parts
 from vico.envs.arrays.surroundings import Surroundings, surroundings_of
 from vico.envs.form_options import FormOptions
 from vico.errors import InputError
-from vico.sim.eyes import Lens
+from vico.sim.cameras import Lens
 from vico.sim.robots import ActionSpace, Reading
-from vico.sim.simulation_state import SimulationState
+from vico.sim.state.simulation_state import SimulationState
 from vico.world.public import PublicMap
 
 

@@ -15,7 +15,7 @@ from vico.envs.arrays.surroundings import DOORS, HEARD, PEOPLE, PLACES, THINGS, 
 from vico.envs.spaces import picture_space
 from vico.exact import each
 from vico.rules import ActionStatus
-from vico.sim.eyes import Lens
+from vico.sim.cameras import Lens
 from vico.sim.robots import Reading
 from vico.world.public import PublicMap
 

@@ -1,9 +1,17 @@
 """What agents may ask for: one table of actions, judged with codes and sentences, then performed."""
 
-from vico.sim.actions.apply import AgentFault, apply_actions, perform
-from vico.sim.actions.check import check, parse
 from vico.sim.actions.model import ActionType, Command, Refusal
-from vico.sim.actions.table import ACTIONS, PEOPLE_ACTIONS, ROBOT_ACTIONS, actions_markdown
+from vico.sim.actions.table import (
+    ACTIONS,
+    PEOPLE_ACTIONS,
+    ROBOT_ACTIONS,
+    AgentFault,
+    actions_markdown,
+    apply_actions,
+    check,
+    parse,
+    perform,
+)
 
 __all__ = [
     "ACTIONS",

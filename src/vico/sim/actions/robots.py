@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
-from vico.sim.actions.fields import Field, short
-from vico.sim.actions.model import ActionType, Actors, Refusal, Situation, Values
-from vico.sim.robot_doors import place_of_room, shut_words
-from vico.sim.robot_system import RobotSystem
-from vico.sim.simulation_state import SimulationState
+from vico.sim.actions.model import ActionType, Actors, Field, Refusal, Situation, Values, short
+from vico.sim.people.doors import closed_reason, place_of_room
+from vico.sim.state.simulation_state import RobotSystem, SimulationState
 
 
 def check_control(values: Values, robot: int, state: SimulationState) -> Refusal | None:
@@ -29,7 +27,7 @@ def check_control(values: Values, robot: int, state: SimulationState) -> Refusal
     width, given = len(spaces[name]), len(values["vector"])
     if given == width:
         return None
-    sentence = f"control: {given} numbers; this robot takes {width} for {name!r}: {_described(spaces[name])}"
+    sentence = f"control: {given} numbers; this robot takes {width} for {name!r}: {_describe(spaces[name])}"
     return Refusal(ReasonCode.WRONG_SIZE, sentence)
 
 
@@ -50,7 +48,7 @@ def check_go_to(values: Values, robot: int, state: SimulationState) -> Refusal |
     if robots.in_hand(robot) and room != robots.rooms[robot]:
         return Refusal(ReasonCode.HAND_FULL, "go_to: doors are for empty hands; put down what is held, or on a deck")
     place = place_of_room(room, state) if robots.rooms[robot] < 0 else None
-    if place is not None and (shut := shut_words(place, state)):
+    if place is not None and (shut := closed_reason(place, state)):
         return Refusal(ReasonCode.CLOSED, f"go_to: {shut}")
     reason = robots.trip_refusal(robot, room, target)
     return Refusal(ReasonCode.BLOCKED, f"go_to: {reason}") if reason else None
@@ -230,7 +228,7 @@ def _refuse_without_velocities(action: str, robot: int, state: SimulationState) 
     return Refusal(ReasonCode.NOT_ABLE, sentence)
 
 
-def _described(space: ActionSpace) -> str:
+def _describe(space: ActionSpace) -> str:
     units = dict.fromkeys(space.units)
     entries = ", ".join(space.entries[:4]) + (", ..." if len(space) > 4 else "")
     return f"{entries} ({', '.join(units)})"

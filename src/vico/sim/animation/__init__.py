@@ -6,14 +6,18 @@ while the body passes over it, legs follow by two-bone inverse kinematics, the p
 The caller advances the phase by distance / `stride_length`, so feet never slide.
 """
 
-from vico.sim.animation.blending import LONGEST_BLEND
-from vico.sim.animation.clips import Hands
-from vico.sim.animation.footing import ground_under_feet
-from vico.sim.animation.holds import Hold
-from vico.sim.animation.names import CLIPS, clip_index
-from vico.sim.animation.posing import Transition, free_hands, hand_frames, hand_position, joint_places, pose
-from vico.sim.animation.stride import stride_length
-from vico.sim.animation.style import STYLE, style_of
+from vico.sim.animation.clips import LONGEST_BLEND, Hands
+from vico.sim.animation.motions import CLIPS, STYLE, clip_index, stride_length, style_of
+from vico.sim.animation.posing import (
+    Transition,
+    free_hands,
+    ground_under_feet,
+    hand_frames,
+    hand_position,
+    joint_places,
+    pose,
+)
+from vico.sim.animation.postures import Hold
 
 __all__ = [
     "CLIPS",

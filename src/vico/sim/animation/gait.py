@@ -22,15 +22,22 @@ from vico.sim.animation.limbs import (
     PELVIS,
     SIGN,
     TILT,
+    Array,
+    X,
+    Y,
+    Z,
     bend_trunk,
+    compose,
     grip,
     hang_arm,
+    hermite,
     highest_pelvis,
     place_foot,
+    rotation_about,
+    smoothstep,
     sole_depth,
     sole_roll,
 )
-from vico.sim.animation.rotations import Array, X, Y, Z, compose, hermite, rotation_about, smoothstep
 
 _TAU = 2 * np.pi
 _DOWN_EARLIER = 1.4  # how much sooner than the foot the body comes down
@@ -83,13 +90,13 @@ WALK_START, RUN_START = WALK_DUTY * _WALK_AHEAD, RUN_DUTY * _RUN_AHEAD
 
 
 @compiled
-def _planted(body: Any, side: int, flat: float, pitch: float, gait: Any) -> Any:
+def _foot_on_ground(body: Any, side: int, flat: float, pitch: float, gait: Any) -> Any:
     """Return a foot that rolls over the ground where it stands flat with its ankle at x = `flat`."""
-    return _rolled(body, side, flat, pitch, gait.out, body.ground[side, HERE])
+    return _roll_foot(body, side, flat, pitch, gait.out, body.ground[side, HERE])
 
 
 @compiled
-def _rolled(body: Any, side: int, flat: float, pitch: float, out: float, ground: Array) -> Any:
+def _roll_foot(body: Any, side: int, flat: float, pitch: float, out: float, ground: Array) -> Any:
     x, z = sole_roll(body.style, side, pitch), sole_depth(body.style, side, pitch)
     ball = body.joints[FOOT[side], X] - body.joints[ANKLE[side], X]
     borne = max(body.style.toe_length - ground[OVER], 0.0)
@@ -146,7 +153,7 @@ def foot_of_gait(body: Any, side: int, p: float, gait: Any) -> Any:
     elif p > rise_from:
         t = (p - rise_from) / (duty - rise_from)
         pitch = gait.push * t * t
-    return _planted(body, side, flat, pitch, gait)
+    return _foot_on_ground(body, side, flat, pitch, gait)
 
 
 @compiled
@@ -155,8 +162,8 @@ def _swing(body: Any, side: int, t: float, gait: Any) -> Any:
     joints, style, push, ground = body.joints, body.style, gait.push, body.ground[side]
     first, _ = foothold(0.0, gait)
     last, _ = foothold(gait.duty, gait)
-    off = _rolled(body, side, last, push, gait.out, ground[HERE])
-    down = _rolled(body, side, first, -gait.strike, gait.out, ground[NEXT])
+    off = _roll_foot(body, side, last, push, gait.out, ground[HERE])
+    down = _roll_foot(body, side, first, -gait.strike, gait.out, ground[NEXT])
     # The body goes on over a foot that has not left yet or has come down: over the ground both ends are at rest.
     slope = -gait.stride * (1 - gait.duty)
     # Up a kerb the foot rises first and goes ahead then; down it goes ahead first.

@@ -1,4 +1,7 @@
-"""The events of a run: those that were asked for when it began, those that were called for since, and what they do."""
+"""The agenda: the events of a run, those asked for when it began and those called for since, and what they do.
+
+Events that come by themselves are drawn by the seed among the places and streets there are, a day's at a time.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,52 @@ from numpy.typing import NDArray
 
 from vico.clock import DAY
 from vico.errors import InputError
-from vico.sim.environment.city_event import CityEvent, planned_events
-from vico.sim.environment.event_crowds import Gathering, gathering_of
-from vico.sim.environment.event_kinds import kind_of_event
-from vico.sim.environment.event_schedule import events_of_day
-from vico.sim.environment.event_sites import EventSites
-from vico.sim.environment.occurrence import Occurrence
+from vico.seeds import rng
+from vico.sim.environment.city_events import (
+    CityEvent,
+    EventKind,
+    Occurrence,
+    event_kinds,
+    kind_of_event,
+    planned_events,
+)
+from vico.sim.environment.event_sites import TRADE, EventSites, Gathering, gathering_of
+from vico.world.model import Category
+
+_HOUR, _MINUTE = 3600.0, 60.0
+
+
+def events_of_day(sites: EventSites, seed: int, day: int) -> list[CityEvent]:
+    """Return the events of a day, counted from 0, in the order in which they begin.
+
+    Each kind has a stream of random numbers of its own: a kind more changes nothing about the others.
+    """
+    found: list[CityEvent] = []
+    for name, kind in event_kinds().items():
+        generator = rng(seed, "events", name, day)
+        for _ in range(int(generator.poisson(kind.often))):
+            where = _somewhere(kind, sites, generator)
+            begin = day * DAY + float(np.floor(generator.uniform(*kind.hours) * 60) * _MINUTE)
+            lasts = float(np.floor(generator.uniform(*kind.lasts))) * _MINUTE
+            if where is not None:
+                found.append(CityEvent(kind=name, begin=begin, end=begin + max(lasts, _MINUTE), **where))
+    return sorted(found, key=lambda event: event.begin)
+
+
+def _somewhere(kind: EventKind, sites: EventSites, generator: np.random.Generator) -> dict[str, Any] | None:
+    """Return where an event of a kind is, as fields of `CityEvent`; None where the world has no such thing."""
+    if "place" in kind.where:
+        places = [place.id for place in sites.world.places if place.category in TRADE and place.rooms]
+        return {"place": places[int(generator.integers(len(places)))]} if places else None
+    if "street" in kind.where:
+        streets = sites.streets
+        return {"street": streets[int(generator.integers(len(streets)))]} if streets else None
+    squares = [place.position for place in sites.world.places if place.category == Category.OPEN]
+    if not squares:
+        return None
+    x, y, _ = squares[int(generator.integers(len(squares)))]
+    return {"region": (float(x), float(y), kind.radius)}
+
 
 #: The names of no events at all, and of events that come by themselves.
 NO_EVENTS, CHANGING_EVENTS = "none", "changing"

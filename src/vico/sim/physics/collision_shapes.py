@@ -19,7 +19,7 @@ from vico.errors import InputError, SchemaError
 from vico.exact import apply_matrix
 from vico.io.compiled import compiled
 from vico.quaternions import matrix_of
-from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.bodies.arrays import OBJECT, Bodies
 from vico.sim.physics.records import BALL, BOX, CYLINDER, PARTS, Capacity, RigidObject, RigidPart, StaticScene
 
 #: Side of a cell, metres.

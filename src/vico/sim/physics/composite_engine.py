@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.physics.engine import Actuate, PhysicsEngine, PhysicsScene
 from vico.sim.physics.records import COARSE, Base, Contacts, Imu, Motion, ObjectMotion, Party, RigidObject
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.physics.records import (
     COARSE,
     Base,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.errors import InputError, SchemaError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.physics.collision_shapes import KinematicBodies
 from vico.sim.physics.engine import Actuate
 from vico.sim.physics.genesis_model import GenesisIndex

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
 from vico.io.mujoco import mujoco
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.physics.collision_shapes import KinematicBodies, parts_of
 from vico.sim.physics.engine import Actuate
 from vico.sim.physics.mujoco_model import (

@@ -24,9 +24,9 @@ from vico.assets.models.solids import movable_mass, movable_solids
 from vico.errors import SchemaError
 from vico.exact import apply_matrix
 from vico.quaternions import matrix_of
+from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.physics.engine import PhysicsEngine
 from vico.sim.physics.records import Chunk, RigidObject, RigidPart, StaticChunks, StaticScene
-from vico.sim.state import MovableObjects
 from vico.world.city_world import CityWorld
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface

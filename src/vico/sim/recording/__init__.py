@@ -12,14 +12,14 @@
     setup.json setup.glb           what was done before the first step, where anything was
     metrics.json                   counts and seconds; written at the end
 
-`vico.sim.recorder.Recorder` writes it, `read_run` reads it. `docs/formats.md` describes it for other programs.
+`vico.sim.recording.recorder.Recorder` writes it, `read_run` reads it. `docs/formats.md` describes it for other
+programs.
 """
 
-from vico.sim.recording.cast import CastMember
-from vico.sim.recording.checkpoints import Checkpoint
 from vico.sim.recording.films import View
-from vico.sim.recording.joint_poses import JointPoses, PosedPeople
-from vico.sim.recording.run import AgentRecord, Moment, Run, Tracks, read_run
+from vico.sim.recording.manifest import CastMember
+from vico.sim.recording.run import AgentRecord, JointPoses, Moment, PosedPeople, Run, Tracks, read_run
+from vico.sim.recording.schema import Checkpoint
 
 __all__ = [
     "AgentRecord",

@@ -143,19 +143,19 @@ class View:
         ends = [first for first, _ in self._parts[1:]] + [self._last + 1]
         for (first, path), end in zip(self._parts, ends, strict=True):
             if wanted is None or any(first <= step < end for step in wanted):
-                for step, frame in _decoded(path, first):
+                for step, frame in _decode_frames(path, first):
                     if step < end and (wanted is None or step in wanted):
                         yield step, frame.to_ndarray(format="rgb24")
 
     def key_frames(self) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Yield step and picture of the frames that are stored whole, one in 20: what lies between isn't decoded."""
         for first, path in self._parts:
-            for step, frame in _decoded(path, first, whole_only=True):
+            for step, frame in _decode_frames(path, first, whole_only=True):
                 if step <= self._last:
                     yield step, frame.to_ndarray(format="rgb24")
 
 
-def _decoded(path: Path, first: int, *, whole_only: bool = False) -> Iterator[tuple[int, Any]]:
+def _decode_frames(path: Path, first: int, *, whole_only: bool = False) -> Iterator[tuple[int, Any]]:
     """Yield step and decoded frame of a part that begins with step `first`."""
     with av.open(str(path)) as container:
         stream = container.streams.video[0]

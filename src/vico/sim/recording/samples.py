@@ -1,8 +1,12 @@
-"""What a recording takes from a simulation at a step, as rows of the tables."""
+"""What a recording takes from a simulation at a step, as rows of the tables.
+
+Actions are kept as text: whatever an agent handed in, good or not, in a bounded line of JSON.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,19 +14,63 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.bodies.arrays import OBJECT, Bodies
+from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.environment.weather import NAMES as WEATHER
-from vico.sim.events import Event
-from vico.sim.hands_scene import hands_of_pedestrians
-from vico.sim.holding import habit_of
-from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
-from vico.sim.recording.action_text import action_text
-from vico.sim.recording.schema import TABLES, stored, table_of
-from vico.sim.state import MovableObjects
+from vico.sim.people.placement import habit_of
+from vico.sim.pictures.hands import hands_of_pedestrians
+from vico.sim.pictures.people import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
+from vico.sim.recording.schema import TABLES, table_of, to_stored
+from vico.sim.state.steps import Event
 
 if TYPE_CHECKING:
-    from vico.sim.simulation import Simulation, StepResult
-    from vico.sim.simulation_state import TrafficSystem
+    from vico.sim.loop.simulation import Simulation, StepResult
+    from vico.sim.state.simulation_state import TrafficSystem
+#: An action whose JSON is longer is cut to its type, and says how long it was.
+LONGEST_ACTION = 8192
+_DEEPEST = 6
+_STRICT = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
+_LONGEST_TEXT, _LONGEST_LIST = 2048, 512
+
+
+def action_text(action: object) -> str:
+    """Return an action as JSON: what JSON does not know is told in words, what is too large is cut."""
+    try:
+        # Most actions are small mappings of plain values: one call writes them.
+        text = _STRICT.encode(action)
+    except (TypeError, ValueError, RecursionError):
+        text = json.dumps(_plain(action, 0), ensure_ascii=False)
+    if len(text) <= LONGEST_ACTION:
+        # Halves of surrogate pairs, which no file can hold, become question marks.
+        return text.encode("utf-8", "replace").decode()
+    kind = action.get("type") if isinstance(action, dict) else None
+    return json.dumps({"type": kind if isinstance(kind, str) and len(kind) < 80 else None, "characters": len(text)})
+
+
+def _plain(value: object, depth: int) -> Any:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, np.ndarray) and value.size <= _LONGEST_LIST:
+        value = value.tolist()
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int):
+        return value if abs(value) < 2**63 else "a whole number beyond 64 bits"
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if isinstance(value, str):
+        return value[:_LONGEST_TEXT]
+    if isinstance(value, dict) and depth < _DEEPEST and len(value) <= _LONGEST_LIST:
+        return {_plain_key(key): _plain(item, depth + 1) for key, item in value.items()}
+    if isinstance(value, list | tuple) and depth < _DEEPEST and len(value) <= _LONGEST_LIST:
+        return [_plain(item, depth + 1) for item in value]
+    # Not its repr: that is the agent's own code.
+    return f"<{type(value).__name__}>"
+
+
+def _plain_key(key: object) -> str:
+    return key[:80] if isinstance(key, str) else f"<{type(key).__name__}>"
+
 
 Rows = Mapping[str, Any]
 _SORTED = json.JSONEncoder(sort_keys=True)
@@ -96,7 +144,7 @@ class StepSamples:
 
     def tables(self) -> dict[str, pa.Table]:
         """Return all rows as tables, and wait for others."""
-        tables = {name: _joined(name, rows) for name, rows in self._rows.items()}
+        tables = {name: _concatenate(name, rows) for name, rows in self._rows.items()}
         self._begin()
         return tables
 
@@ -258,12 +306,12 @@ def _events(step: int, events: Sequence[Event]) -> Rows:
     }
 
 
-def _joined(name: str, parts: Sequence[Rows]) -> pa.Table:
+def _concatenate(name: str, parts: Sequence[Rows]) -> pa.Table:
     columns: dict[str, Any] = {}
     for key, column in TABLES[name].items():
         pieces: Iterable[Any] = [part[key] for part in parts]
         if column.kind == pa.string():
             columns[key] = [value for piece in pieces for value in piece]
         else:
-            columns[key] = stored(np.concatenate([np.zeros(0), *pieces]), column)
+            columns[key] = to_stored(np.concatenate([np.zeros(0), *pieces]), column)
     return table_of(name, columns)

@@ -1,16 +1,71 @@
-"""The run folder, version 2: its tables, their columns, and how exact each is. `docs/formats.md` tells it in prose."""
+"""The run folder, version 2: its tables, their columns, how exact each is, and its parts on disk.
+
+`docs/formats.md` tells it in prose. Segments are folders named by their first and last step, each of which appears
+whole or not at all. A checkpoint is the exact state of the simulation and of the agents at a step, from which a run
+can go on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+import re
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from vico.errors import MissingFileError, SchemaError
+from vico.io.files import read_json, write_bytes, write_json
 from vico.io.folders import FolderKind
+from vico.io.plain_data import read_plain, write_plain
+from vico.sim.state.snapshot import read_snapshot, write_snapshot
 
+__all__ = [
+    "AGENTS",
+    "AGENT_STATES",
+    "CAST",
+    "CHECKPOINTS",
+    "CLOCK",
+    "COMMUNITY",
+    "DEMO_FILM",
+    "INTERVENTIONS",
+    "MANIFEST",
+    "METRICS",
+    "REPLAY",
+    "RUN_FOLDER",
+    "SCHEMA",
+    "SEGMENTS",
+    "SEGMENT_STEPS",
+    "SETUP",
+    "SETUP_SHAPES",
+    "SIMULATION_STATE",
+    "TABLES",
+    "VERSION",
+    "VIEWER_ADDRESS",
+    "VIEWS",
+    "Checkpoint",
+    "Column",
+    "Segment",
+    "checkpoint_steps",
+    "column_values",
+    "drop_checkpoints_after",
+    "drop_segments_after",
+    "empty_table",
+    "read_checkpoint",
+    "read_table",
+    "segments_of",
+    "table_of",
+    "to_stored",
+    "write_checkpoint",
+    "write_segment",
+    "written_folder",
+]
 SCHEMA = "vico.run"
 VERSION = 2
 
@@ -160,7 +215,7 @@ TABLES: dict[str, dict[str, Column]] = {
 _LARGEST = 2**31 - 1
 
 
-def stored(values: Any, column: Column) -> NDArray[Any]:
+def to_stored(values: Any, column: Column) -> NDArray[Any]:
     """Return numbers as a column stores them: scaled, rounded, and held within what it can hold."""
     array = np.asarray(values)
     if column.unit:
@@ -197,3 +252,197 @@ def column_values(table: pa.Table, key: str, column: Column) -> NDArray[Any]:
     if column.unit:
         return np.where(values == -_LARGEST, np.nan, values * column.unit)
     return np.asarray(values)
+
+
+_SEGMENT_NAME = re.compile(r"(\d{8,})-(\d{8,})")
+
+
+class Segment(NamedTuple):
+    """Some steps in a row, recorded.
+
+    Attributes
+    ----------
+    first, last
+        The first and the last of its steps.
+    path
+        Its folder.
+    """
+
+    first: int
+    last: int
+    path: Path
+
+
+def segments_of(run: Path) -> list[Segment]:
+    """Return the segments of a run in the order of their steps, as far as they follow each other without a gap."""
+    folder = run / SEGMENTS
+    matches = ((_SEGMENT_NAME.fullmatch(path.name), path) for path in (folder.iterdir() if folder.is_dir() else ()))
+    found = sorted(Segment(int(match[1]), int(match[2]), path) for match, path in matches if match is not None)
+    whole: list[Segment] = []
+    for segment in found:
+        if segment.first != (whole[-1].last + 1 if whole else 0):
+            break
+        whole.append(segment)
+    return whole
+
+
+def write_segment(run: Path, first: int, last: int, tables: Mapping[str, pa.Table]) -> None:
+    """Write a segment; tables without rows are left out."""
+    folder = run / SEGMENTS / f"{first:08d}-{last:08d}"
+    with written_folder(folder) as work:
+        for name, table in tables.items():
+            if table.num_rows:
+                write_bytes(work / f"{name}.parquet", _parquet(name, table))
+
+
+def read_table(segment: Segment, name: str) -> pa.Table:
+    """Return a table of a segment.
+
+    Raises
+    ------
+    SchemaError
+        If its file is damaged.
+    """
+    path = segment.path / f"{name}.parquet"
+    if not path.exists():
+        return empty_table(name)
+    try:
+        return pq.read_table(path, memory_map=False)
+    except (pa.ArrowException, OSError) as error:
+        raise SchemaError(f"{path}: not readable ({' '.join(str(error).split())}); run it anew") from None
+
+
+def drop_segments_after(run: Path, step: int) -> None:
+    """Delete what was recorded after a step, and what an interrupted writer left unfinished."""
+    kept = {segment.path for segment in segments_of(run) if segment.last <= step}
+    folder = run / SEGMENTS
+    for path in list(folder.iterdir()) if folder.is_dir() else ():
+        if path not in kept:
+            shutil.rmtree(path)
+
+
+class written_folder:
+    """A folder that takes its name when the block ends well: what it holds is then on the disk."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._work = folder.with_name(f".{folder.name}.partial")
+
+    def __enter__(self) -> Path:
+        shutil.rmtree(self._work, ignore_errors=True)
+        self._work.mkdir(parents=True)
+        return self._work
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
+            shutil.rmtree(self._work, ignore_errors=True)
+            return
+        # A checkpoint may be taken twice after one step, when somebody has done something in between.
+        shutil.rmtree(self._folder, ignore_errors=True)
+        os.replace(self._work, self._folder)
+        handle = os.open(self._folder.parent, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _parquet(name: str, table: pa.Table) -> bytes:
+    """Return a table as Parquet: whole numbers by their differences, text and flags by dictionary, zstd over all."""
+    differences = dict.fromkeys(_whole_numbers(name), "DELTA_BINARY_PACKED")
+    others = [key for key in table.column_names if key not in differences]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        compression_level=9,
+        use_dictionary=others,
+        column_encoding=differences,
+        write_statistics=["step"],
+        store_schema=False,
+    )
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def _whole_numbers(name: str) -> Iterable[str]:
+    return [key for key, column in TABLES[name].items() if column.kind == pa.int32()]
+
+
+_CHECKPOINT_NAME = re.compile(r"\d{8,}")
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The state of a run at a step.
+
+    Attributes
+    ----------
+    step
+        The step it was taken after.
+    arrays
+        The whole state of the simulation; `Simulation.restore` goes back to it.
+    agents
+        State of each agent, by name.
+    notes
+        What else whoever ran the simulation kept.
+    clock
+        Wall-clock seconds spent so far: ``wall_seconds`` in all, and ``seconds_by_phase``.
+    """
+
+    step: int
+    arrays: dict[str, NDArray[Any]]
+    agents: dict[str, Any]
+    notes: dict[str, Any]
+    clock: dict[str, Any]
+
+    @property
+    def interventions(self) -> int:
+        """How many lines of the run's interventions had been done by then."""
+        return int(self.notes.get("interventions", 0))
+
+
+def write_checkpoint(run: Path, checkpoint: Checkpoint, *, owner: str) -> None:
+    """Write a checkpoint, whole or not at all; `owner` is the identity of its simulation."""
+    with written_folder(run / CHECKPOINTS / f"{checkpoint.step:08d}") as folder:
+        write_snapshot(folder / SIMULATION_STATE, checkpoint.arrays, owner=owner)
+        write_plain(folder / AGENT_STATES, {"agents": checkpoint.agents, "notes": checkpoint.notes})
+        write_json(folder / CLOCK, checkpoint.clock)
+
+
+def checkpoint_steps(run: Path) -> list[int]:
+    """Return the steps of which a run has checkpoints, in their order."""
+    folder = run / CHECKPOINTS
+    return sorted(
+        int(path.name)
+        for path in (folder.iterdir() if folder.is_dir() else ())
+        if _CHECKPOINT_NAME.fullmatch(path.name)
+    )
+
+
+def read_checkpoint(run: Path, step: int, *, owner: str) -> Checkpoint:
+    """Read a checkpoint.
+
+    Raises
+    ------
+    MissingFileError
+        If there is none of that step.
+    SchemaError
+        If it is damaged, or of another simulation than `owner`.
+    """
+    folder = run / CHECKPOINTS / f"{step:08d}"
+    if not folder.is_dir():
+        steps = ", ".join(map(str, checkpoint_steps(run))) or "none"
+        raise MissingFileError(f"{run}: no checkpoint of step {step}; there are: {steps}")
+    arrays = read_snapshot(folder / SIMULATION_STATE, owner=owner)
+    kept = read_plain(folder / AGENT_STATES)
+    return Checkpoint(step, arrays, kept["agents"], kept["notes"], read_json(folder / CLOCK))
+
+
+def drop_checkpoints_after(run: Path, step: int) -> None:
+    """Delete checkpoints of later steps, and what an interrupted writer left unfinished."""
+    folder = run / CHECKPOINTS
+    kept = {f"{k:08d}" for k in checkpoint_steps(run) if k <= step}
+    for path in list(folder.iterdir()) if folder.is_dir() else ():
+        if path.name not in kept:
+            shutil.rmtree(path)

@@ -18,15 +18,15 @@ from vico.geometry import distances
 from vico.kinematics.arm import hand_pose, reach_pose
 from vico.kinematics.ways import CARRY, downward, way_down, way_to_carry
 from vico.quaternions import matrix_of
-from vico.sim.bodies import Bodies
-from vico.sim.carrying import DeckPose
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.bodies.collisions import DeckPose
+from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.physics.records import Base
 from vico.sim.robots.drawing import deck_of
 from vico.sim.robots.manipulator import ARM_GOAL, ARM_NOW, ArmTasks, TaskKind, TaskStage
 from vico.sim.robots.path_following import RobotStatus, footprint_discs
 from vico.sim.robots.state import RobotMode, RobotRun
 from vico.sim.robots.trips import outdoor_path
-from vico.sim.state import MovableObjects
 
 # Metres from the edges of a deck that things are put at; free room between two robots where the arm's way ends.
 _FROM_EDGE, _BESIDE = 0.16, 0.3

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.physics.records import Base
 from vico.sim.robots import arm_tasks, flying
 from vico.sim.robots.arm_tasks import decide_task, handled_object, object_in_hand

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.exact import apply_matrix
-from vico.sim.bodies import Drawn
-from vico.sim.carrying import DeckPose
+from vico.sim.bodies.arrays import Drawn
+from vico.sim.bodies.collisions import DeckPose
 from vico.sim.robots.flying import flight_of
 from vico.sim.robots.state import RobotRun
 from vico.world.mesh import Surface

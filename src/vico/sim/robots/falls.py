@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from vico.geometry import distances
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots import flying
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.path_following import RobotStatus

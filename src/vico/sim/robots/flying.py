@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.exact import dot
 from vico.geometry import distance, distances
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots.path_following import RobotStatus
 from vico.sim.robots.path_planning import BESIDE, CEILING, HOVER
 from vico.sim.robots.quadrotor import HEADING, POSITION, TURNING, VELOCITY, Flight, FlightPhase

@@ -24,11 +24,11 @@ from vico.exact import apply_matrix, product
 from vico.io.compiled import compiled
 from vico.kinematics.arm import Chain, hand_pose
 from vico.quaternions import matrix_of, quaternion_of
+from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.physics.engine import PhysicsEngine
 from vico.sim.physics.records import Motion
 from vico.sim.robots.controller import Array, MotorController, planar_motion
 from vico.sim.robots.path_following import WaypointFollowers
-from vico.sim.state import MovableObjects
 
 #: Entries of its memory: where the arm's servos are told to be and where they go, both less the model's rest; the
 #: speeds of the base as far as they were let through; how far it has rolled and turned since it stands; for how long

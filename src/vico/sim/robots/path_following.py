@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
-from vico.sim.bodies import IS_ROUND, OBJECT, Bodies
-from vico.sim.footprints import Rectangle, point_gap
+from vico.sim.bodies.arrays import IS_ROUND, OBJECT, Bodies
+from vico.sim.bodies.footprints import Rectangle, point_gap
 from vico.sim.physics.records import Base
 
 Array = NDArray[Any]

@@ -21,8 +21,8 @@ from scipy.sparse.csgraph import dijkstra
 from vico.assets.robots import RobotModel
 from vico.geometry import distance, distances
 from vico.io.compiled import compiled
-from vico.sim.bodies import FIXTURE, Bodies
-from vico.sim.indoor import Indoor
+from vico.sim.bodies.arrays import FIXTURE, Bodies
+from vico.sim.bodies.rooms import Indoor
 from vico.world.model import Entrance, Room
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap

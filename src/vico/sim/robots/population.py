@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.robots import TICK, ActionSpace
 from vico.errors import InputError
-from vico.sim.bodies import Bodies, Drawn
-from vico.sim.carrying import DeckPose
+from vico.sim.bodies.arrays import Bodies, Drawn
+from vico.sim.bodies.collisions import DeckPose
+from vico.sim.bodies.state_arrays import MovableObjects, People
 from vico.sim.physics import PhysicsEngine
 from vico.sim.physics.records import FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.surroundings import LooseObjects
@@ -25,7 +26,6 @@ from vico.sim.robots.path_planning import turning_radius
 from vico.sim.robots.scene import RobotScene, spawn_poses
 from vico.sim.robots.state import NONE, NOTES, Circles, RobotArrays, RobotEvent, RobotMode, RobotRun
 from vico.sim.robots.trips import outdoor_path
-from vico.sim.state import MovableObjects, People
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
 from vico.world.world import World

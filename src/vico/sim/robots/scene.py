@@ -17,8 +17,8 @@ from vico.assets.robots import TICK, RobotModel, robot_model
 from vico.assets.robots.ground import narrow_ground
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.bodies import ROBOT, Bodies
-from vico.sim.indoor import Indoor
+from vico.sim.bodies.arrays import ROBOT, Bodies
+from vico.sim.bodies.rooms import Indoor
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
 from vico.sim.physics.records import Capacity, StaticScene
 from vico.sim.physics.surroundings import surroundings_of

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from vico.assets.robots import MobileManipulator
 from vico.errors import SchemaError
 from vico.seeds import rng
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.bodies.state_arrays import REASON_LENGTH, MovableObjects, People
 from vico.sim.physics import PhysicsEngine
 from vico.sim.physics.composite_engine import CompositeEngine
 from vico.sim.robots.manipulator import ArmTasks, OracleGrasp
@@ -21,7 +22,6 @@ from vico.sim.robots.path_following import PathFollower, RobotStatus
 from vico.sim.robots.path_planning import OUTDOORS
 from vico.sim.robots.quadrotor import Flight, gusts_of
 from vico.sim.robots.scene import RobotScene, bodies_of
-from vico.sim.state import REASON_LENGTH, MovableObjects, People
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 A path outdoors is wide enough for the robot and clear of others. A trip to another room is gone leg by leg: to the next
 door, through it, on from behind it. Whether a door can be gone through is for the simulation to say
-(`vico.sim.robot_doors`), which knows who stands behind it.
+(`vico.sim.people.doors`), which knows who stands behind it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import MobileManipulator, SkidSteering
 from vico.geometry import distance
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.bodies.state_arrays import People
 from vico.sim.physics.composite_engine import CompositeEngine
 from vico.sim.robots.path_planning import DOORWAY, OUTDOORS, fits_doors, turning_radius
 from vico.sim.robots.state import NONE, RobotRun
-from vico.sim.state import People
 from vico.world.model import Entrance
 
 _NOBODY = np.zeros((0, 3))

@@ -18,8 +18,7 @@ from vico.assets.vehicles import BICYCLE_PAINTS, CAR_KINDS, vehicle_size
 from vico.errors import InputError
 from vico.io.compiled import compiled, inlined
 from vico.seeds import rng
-from vico.sim.footprints import Rectangle, point_gap, separation
-from vico.sim.neighbours import NeighbourGrid, search
+from vico.sim.bodies.footprints import NeighbourGrid, Rectangle, point_gap, search, separation
 from vico.sim.traffic.path import Outline, axles_at, footprint, footprint_between, point_on_path
 from vico.sim.traffic.route import NEVER
 from vico.sim.traffic.shapes import Shapes, is_within_reach, share_level
@@ -99,7 +98,7 @@ def bodies_around(v, x, y, reach, surroundings):  # type: ignore[no-untyped-def]
 def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[no-untyped-def]
     """Write those of the candidates within `reach` metres of a point, on body v's level, into `buffer`; return them.
 
-    `candidates` are indices of bodies, in ascending order, as from `vico.sim.neighbours.search`; v is left out.
+    `candidates` are indices of bodies, in ascending order, as from `vico.sim.bodies.footprints.search`; v is left out.
     """
     sx, sy, half = shapes.x, shapes.y, shapes.half_length
     n = 0

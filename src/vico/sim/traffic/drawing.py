@@ -15,8 +15,8 @@ from vico.assets.vehicle_lights import lit_lamps, night_lamps
 from vico.assets.vehicle_parts import mirrored
 from vico.assets.vehicles import CRANK_AXLE, ridden_prototypes, vehicle_prototypes
 from vico.exact import product
-from vico.sim.animation.stride import TURN_OF_CRANKS
-from vico.sim.bodies import Bodies, Drawn, joined_drawn
+from vico.sim.animation.motions import TURN_OF_CRANKS
+from vico.sim.bodies.arrays import Bodies, Drawn, concatenate_drawn
 from vico.sim.traffic.car_following import VEHICLE_MODELS
 from vico.sim.traffic.jams import JamLog
 from vico.sim.traffic.lights import LampDrawing
@@ -80,7 +80,7 @@ class TrafficDrawing:
             parts.append(Drawn(["cranks"], np.zeros(len(pedals), np.int32), turned, self._entities[ridden]))
         if self._heads is not None:
             parts.append(self._heads.draw(*shown))
-        return joined_drawn(parts)
+        return concatenate_drawn(parts)
 
     def prototypes(self, *, lefthand: bool) -> dict[str, list[Surface]]:
         """Models of the vehicles and signals, by the names `draw` uses; doors of buses open to the kerb."""

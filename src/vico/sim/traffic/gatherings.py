@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geometry import distance
-from vico.sim.environment.event_crowds import Gathering
+from vico.sim.environment.event_sites import Gathering
 from vico.sim.traffic.placement import guided_walks
 from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.state import CROWD, NONE, WINDOW, WalkwayNetwork

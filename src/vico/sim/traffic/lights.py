@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vico.assets.vehicle_lights import lit_lamps
 from vico.io.compiled import compiled
-from vico.sim.bodies import Drawn
+from vico.sim.bodies.arrays import Drawn
 from vico.sim.traffic.state import APPROACHING, NONE
 
 #: Bits of what a vehicle shows.

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled, inlined
-from vico.sim.neighbours import search
+from vico.sim.bodies.footprints import search
 from vico.sim.traffic.car_following import (
     TOUCH,
     VehicleView,

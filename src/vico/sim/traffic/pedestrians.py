@@ -14,7 +14,7 @@ import numpy as np
 from vico.io.compiled import compiled, inlined
 from vico.rules import STAIRS_SPEED
 from vico.seeds import rng
-from vico.sim.neighbours import search
+from vico.sim.bodies.footprints import search
 from vico.sim.traffic.pedestrian_routes import (
     PEDESTRIAN_RADIUS,
     FollowPoint,

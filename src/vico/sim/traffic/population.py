@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.bodies import BUS, CAR, CYCLIST, PEDESTRIAN, STEP_HEIGHT, Bodies
+from vico.sim.bodies.arrays import BUS, CAR, CYCLIST, PEDESTRIAN, STEP_HEIGHT, Bodies
+from vico.sim.bodies.footprints import neighbour_grid
 from vico.sim.environment import Conditions
-from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.car_following import (
     COMFORTABLE_BRAKING,
     CYCLIST_HALF_WIDTH,

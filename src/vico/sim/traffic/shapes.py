@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.sim.bodies import Bodies
-from vico.sim.footprints import Rectangle, point_gap, rectangle_gap, separation
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.bodies.footprints import Rectangle, point_gap, rectangle_gap, separation
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import Walkways
@@ -36,7 +36,7 @@ class Shapes(NamedTuple):
     half_length, half_width
         Half the footprint's extents, metres.
     rounding
-        Radius of a footprint's round ends, metres; 0 for rectangles: see `vico.sim.bodies.Bodies`.
+        Radius of a footprint's round ends, metres; 0 for rectangles: see `vico.sim.bodies.arrays.Bodies`.
     bottom, top
         Extent in height above the ground beneath it, metres.
     vx, vy

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vico.assets.signal_lights import signal_prototypes
 from vico.io.compiled import compiled
 from vico.seeds import rng
-from vico.sim.bodies import Drawn
+from vico.sim.bodies.arrays import Drawn
 from vico.sim.traffic.state import AMBER, DARK, GREEN, RED, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled, inlined
-from vico.sim.footprints import Rectangle
-from vico.sim.neighbours import search
+from vico.sim.bodies.footprints import Rectangle, search
 from vico.sim.traffic.car_following import (
     CLOSING_UP,
     NEARBY_BODY,

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from vico.assets.vehicles import BICYCLE_SIZE
 from vico.errors import InputError
 from vico.rules import BIKE_REACH, STATION_REACH, ride_price
-from vico.sim.bodies import BICYCLE, Bodies, Drawn
-from vico.sim.state import RADIUS, RIDER_REACH
+from vico.sim.bodies.arrays import BICYCLE, Bodies, Drawn
+from vico.sim.bodies.state_arrays import RADIUS, RIDER_REACH
 from vico.sim.traffic import Traffic
 from vico.world.transit_model import BikeStation
 

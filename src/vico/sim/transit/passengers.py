@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from vico.exact import product
 from vico.geometry import distances
 from vico.seeds import rng
-from vico.sim.avatars import free_ground
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
+from vico.sim.bodies.avatars import free_ground
 from vico.sim.traffic.drawing import Seating
 from vico.sim.traffic.population import Traffic
 from vico.sim.traffic.state import BOARD, NONE, STOP

@@ -19,8 +19,8 @@ from vico.assets.tram import TRAM_FLOOR, tram_places
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_CAPACITY, BUS_DOOR_REACH, BUS_DWELL, BUS_FARE, TRAM_SECTIONS
-from vico.sim.bodies import Bodies, Drawn
-from vico.sim.state import FIRST_TRAM
+from vico.sim.bodies.arrays import Bodies, Drawn
+from vico.sim.bodies.state_arrays import FIRST_TRAM
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.state import PRESENT
 from vico.sim.transit.bicycles import Bicycles

@@ -21,7 +21,7 @@ from vico.exact import dot, each
 from vico.geometry import distances
 from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTION, TRAM_WIDTH
-from vico.sim.bodies import Bodies
+from vico.sim.bodies.arrays import Bodies
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.state import DARK, GREEN, TRACK_CROSSING
 from vico.world.lanes import LaneGraph

@@ -19,7 +19,7 @@ from vico.assets.train import SHAPES_OF, train_prototypes
 from vico.assets.tram import TRAM_BELLOWS, TRAM_CAPACITY, TRAM_HEIGHT, tram_door_leaves, tram_places, tram_prototypes
 from vico.clock import DAY
 from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
-from vico.sim.bodies import TRAM, Bodies, Drawn
+from vico.sim.bodies.arrays import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.pedestrian_routes import PEDESTRIAN_RADIUS
 from vico.sim.transit.passengers import DOOR_TIME, FIRST_PASSENGER, leaf_transforms, step_doors

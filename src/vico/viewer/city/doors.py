@@ -16,7 +16,7 @@ from vico.assets.house_doors import (
     leaf_names,
     leaf_surfaces,
 )
-from vico.sim.drawn_doors import hall_size
+from vico.sim.pictures.buildings import hall_size
 from vico.world.mesh import Surface
 from vico.world.world import World
 

@@ -2,7 +2,7 @@
 
 A gait's table has a row for each phase at each of some paces; other motions have one for each phase. Who stands and
 waits has no cycle to speak of: their joints are a resting pose and what shifting the weight, turning the head and
-nodding add to it (`vico.sim.animation.standing.restlessness`).
+nodding add to it (`vico.sim.animation.postures.restlessness`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.animation import CLIPS, clip_index, pose
-from vico.sim.animation.standing import restlessness
+from vico.sim.animation.postures import restlessness
 
 # Metres a second at which gaits are tabulated.
 _WALKS, _RUNS = (0.3, 0.6, 1.0, 1.5, 2.2), (1.5, 2.5, 4.0)

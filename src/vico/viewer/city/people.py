@@ -75,7 +75,7 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
     the offsets that the head tells: for each mesh position and normal (float32), colour (uint8, four), joints (uint8,
     four), weights (uint8, four), triangles (uint16); then rest joints, T-pose joints, the frames from rest to T-pose,
     and the tables of `vico.viewer.city.motions`. The head also tells of the left and the right sole how far it is below
-    the ankle (``depth``) and how far it rolls on (``roll``) at the pitches `vico.sim.animation.style.SOLE_PITCHES`.
+    the ankle (``depth``) and how far it rolls on (``roll``) at the pitches `vico.sim.animation.motions.SOLE_PITCHES`.
     """
     body = body_of(look)
     columns: list[NDArray[Any]] = []

@@ -1,5 +1,5 @@
 // From one motion into the next: joints turn over, feet step from where they stand to where they are needed.
-// The rules are those of vico.sim.animation.blending, on level ground.
+// The rules are those of vico.sim.animation.clips, on level ground.
 
 import { clamp, compose, cross, dot, fraction, inverse, minus, ofAxes, partWay, rotate, smoothstep, turnBack, unit } from "./rotations.js";
 

@@ -1,5 +1,5 @@
 // Arms that hold something beside what the rest of the body does: umbrella, placard, box before the chest.
-// The rules are those of vico.sim.animation.holds; tests hold this module against vico.sim.recording.PosedPeople.
+// The rules are those of vico.sim.animation.postures; tests hold this module against vico.sim.recording.PosedPeople.
 
 import { twoBones } from "./blending.js";
 import { compose, inverse, minus, ofAxes, cross, partWay, smoothstep } from "./rotations.js";

@@ -1,4 +1,4 @@
-// Umbrellas and placards in people's hands, as vico.sim.hands_scene has them.
+// Umbrellas and placards in people's hands, as vico.sim.pictures.hands has them.
 
 import { THREE } from "./three.js";
 import { HOLD } from "./holds.js";

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from vico.errors import MissingFileError
-from vico.sim.recording.joint_poses import looks_and_manners
+from vico.sim.recording.run import looks_and_manners
 from vico.viewer.sources.source import Source
 
 View = Callable[[str, int, str], tuple[bytes | dict[str, Any], str]]

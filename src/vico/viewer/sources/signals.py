@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vico.sim.base import SimulationBase
-from vico.sim.environment.event_kinds import event_kinds
+from vico.sim.environment.city_events import event_kinds
+from vico.sim.state.base import SimulationBase
 from vico.sim.traffic import JunctionRule, TrafficNetwork
 from vico.sim.traffic.signals import SignalClock, SignalDay, SignalHeads
 from vico.sim.traffic.state import AMBER, GREEN, RED

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.environment.sky import Sky
+from vico.sim.environment.environment import Sky
 
 SKY_FIELDS = 16
 _AIR = (

@@ -16,16 +16,15 @@ from vico.errors import InputError, MissingFileError
 from vico.io.files import read_json
 from vico.rules import ActionStatus, code_name
 from vico.runner.bookmarks import bookmarks_of
-from vico.sim.animation.names import CLIPS
-from vico.sim.bodies import KINDS
+from vico.sim.animation.motions import CLIPS
+from vico.sim.bodies.arrays import KINDS
+from vico.sim.bodies.state_arrays import Posture
 from vico.sim.environment import weather_kinds
-from vico.sim.environment.event_kinds import event_kinds
-from vico.sim.environment.sky import Sky
-from vico.sim.interventions import read_interventions
-from vico.sim.recording.cast import CastMember
-from vico.sim.recording.manifest import read_manifest
+from vico.sim.environment.city_events import event_kinds
+from vico.sim.environment.environment import Sky
+from vico.sim.recording.interventions import read_interventions
+from vico.sim.recording.manifest import CastMember, read_manifest
 from vico.sim.recording.schema import AGENTS, TABLES
-from vico.sim.state import Posture
 from vico.viewer.sources.frames import Frame, frames_between
 from vico.viewer.sources.relations import relations_of
 from vico.viewer.sources.skylight import Skylight

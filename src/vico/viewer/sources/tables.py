@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from vico.errors import EmptyInputError, InputError
 from vico.sim.recording import Run, read_run
-from vico.sim.recording.cast import CastMember, take_line
-from vico.sim.recording.schema import SEGMENT_STEPS, TABLES, Column, stored
+from vico.sim.recording.manifest import CastMember, take_line
+from vico.sim.recording.schema import SEGMENT_STEPS, TABLES, Column, to_stored
 
 Columns = dict[str, NDArray[Any]]
 
@@ -185,7 +185,7 @@ def _columns(table: pa.Table, name: str) -> Columns:
 
 def _column(table: pa.Table, key: str, column: Column) -> NDArray[Any]:
     if column.absent is not None and key not in table.column_names:
-        return stored(np.full(len(table), column.absent), column)
+        return to_stored(np.full(len(table), column.absent), column)
     return np.asarray(table[key].to_numpy())
 
 
@@ -196,7 +196,7 @@ def _kept_columns(name: str, rows: Sequence[tuple[int, Mapping[str, Mapping[str,
         if column.kind == pa.string():
             found[key] = np.array([value for part in parts for value in part[key]], object)
         else:
-            found[key] = stored(np.concatenate([np.zeros(0), *(part[key] for part in parts)]), column)
+            found[key] = to_stored(np.concatenate([np.zeros(0), *(part[key] for part in parts)]), column)
     return _in_order(name, found)
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError, MissingFileError, VicoError
+from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run
-from vico.sim.simulation import Simulation
 from vico.viewer.repeat import RepeatedRun
 
 #: Pictures there are; ``names`` tells what the colours of the segmentation are.

@@ -1,0 +1,1 @@
+"""What people do: stand, sit, hold and put things, pass doors, ride, hear and learn of events."""
