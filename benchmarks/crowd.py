@@ -82,10 +82,10 @@ _WORKLOADS = {
 def asked_together(followers: dict[str, Any]) -> tuple[list[Any], list[str]]:
     """Return groups with their members' names, and who is asked alone: everybody where these sources have no groups."""
     try:
-        from vico.agents.base import by_group
+        from vico.agents.base import split_groups
     except ImportError:
         return [], list(followers)
-    return by_group(followers)
+    return split_groups(followers)
 
 
 def ask(followers: dict[str, Any], together: tuple[list[Any], list[str]], told: tuple[Any, Any]) -> dict[str, Any]:
@@ -117,10 +117,10 @@ def measure(workload: Workload, world_folder: Path, community_folder: Path, coun
     together = asked_together(followers)
     cpu, wall = [], []
     # As the runner of these sources does.
-    settled: Any = nullcontext
+    freeze_heap: Any = nullcontext
     with suppress(ImportError):
-        from vico.runner.garbage import settled
-    with settled():
+        from vico.runner.loop import freeze_heap
+    with freeze_heap():
         for step in range(count + _WARM):
             if step == _WARM:
                 sim.metrics.seconds.clear()

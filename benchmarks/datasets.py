@@ -17,18 +17,15 @@ from pathlib import Path
 
 from reporting import machine
 
-from vico.challenges.assistant.episode import play_task, world_and_people
-from vico.challenges.assistant.generate import generate_task, shortened
-from vico.datasets.build import BuildRequest, layout_of
-from vico.datasets.demonstrations import demonstrations_of
-from vico.datasets.episode_records import origin_of_run
-from vico.datasets.formats.pictures import PictureFiles
+from vico.challenges.assistant.challenge import play_task, world_and_people
+from vico.challenges.assistant.generate import first_subtasks, generate_task
+from vico.datasets.build import BuildRequest, SplitRule, layout_of
+from vico.datasets.demonstrations import EpisodeFacts, demonstrations_of
+from vico.datasets.episodes import origin_of_run
 from vico.datasets.formats.registry import FORMATS
-from vico.datasets.parts import Contents, read_part, write_part
-from vico.datasets.pictures import PictureKeeper
-from vico.datasets.splits import SplitRule
-from vico.datasets.tasks import EpisodeFacts
-from vico.datasets.worker import encoded
+from vico.datasets.layout import Contents, read_part, write_part
+from vico.datasets.pictures import PictureFiles, PictureKeeper
+from vico.datasets.worker import encode_demonstration
 from vico.io.files import write_bytes
 from vico.sim.recording import read_run
 
@@ -45,7 +42,7 @@ def cpu(work: Callable[[], object]) -> float:
 def one_round(world: Path, seed: int, steps: int, size: int) -> dict[str, float]:
     """Return processor seconds a frame of an episode, and of writing it down in each format."""
     place, people = world_and_people(world, "search")
-    task = shortened(generate_task(place, people, "search", seed=seed, steps=steps), subtasks=1)
+    task = first_subtasks(generate_task(place, people, "search", seed=seed, steps=steps), subtasks=1)
     found: dict[str, float] = {}
     frames = 0
 
@@ -66,7 +63,9 @@ def one_round(world: Path, seed: int, steps: int, size: int) -> dict[str, float]
 
             def write(to: str = to, contents: Contents = contents, staged: Path = staged) -> None:
                 made = demonstrations_of(run, EpisodeFacts(instructions=task.instructions()), ["assistant_0"])[0]
-                about = encoded(made, pictures, PictureFiles(staged, "0"), contents, origin_of_run(made, run, place))
+                about = encode_demonstration(
+                    made, pictures, PictureFiles(staged, "0"), contents, origin_of_run(made, run, place)
+                )
                 write_part(work / f"{to}.part", "key", [(about, made)], staged)
                 part = read_part(work / f"{to}.part", "key")
                 assert part is not None

@@ -23,7 +23,7 @@ from reporting import machine, publish
 
 import vico
 from vico.challenges.learning.make import make_task_vec
-from vico.envs.shared import SharedArrays, Sharing
+from vico.envs.vector import SharedArrays, Sharing
 from vico.envs.workers import Call, Workers
 
 SIDE = 128

@@ -10,14 +10,14 @@ import numpy as np
 from grasp_trials import LIMIT, PERIOD, step
 from numpy.typing import NDArray
 
+from vico.agents.robot.arm_skills import ArmWorker
 from vico.agents.robot.body import Stance
-from vico.agents.robot.held import is_slender
-from vico.agents.robot.team import deck_spot
-from vico.agents.robot.worker import ArmWorker
+from vico.agents.robot.carrier import deck_spot
+from vico.agents.robot.grasps import is_slender
 from vico.assets.models.movable import movable_colours, movable_prototype, movable_surfaces
 from vico.assets.robots import robot_model
-from vico.challenges.pick_place.task import fitting_kinds
-from vico.challenges.robot.bodies import team_of
+from vico.challenges.pick_place.tasks import fitting_kinds
+from vico.challenges.robot_tasks import team_of
 from vico.envs import Simulation, make
 from vico.seeds import rng
 from vico.world.world import World

@@ -10,15 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.agents.robot.arm_skills import ArmWorker
 from vico.agents.robot.body import Stance
-from vico.agents.robot.team import deck_spot
-from vico.agents.robot.worker import ArmWorker
+from vico.agents.robot.carrier import deck_spot
 from vico.assets.models.movable import movable_colours, movable_prototype, movable_surfaces
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
-from vico.challenges.pick_place.field import TABLE, level_field
-from vico.challenges.pick_place.task import fitting_kinds
-from vico.challenges.robot.bodies import team_of
+from vico.challenges.pick_place.tasks import TABLE, fitting_kinds, level_field
+from vico.challenges.robot_tasks import team_of
 from vico.envs import Simulation, make
 from vico.quaternions import matrix_of
 from vico.seeds import rng

@@ -16,11 +16,10 @@ from typing import Any
 
 from reporting import write_page
 
-from vico.agents.influence.visits import FAILURES
+from vico.agents.influence.situation import FAILURES
 from vico.challenges.influence import INFLUENCE
 from vico.challenges.influence.evaluate import CAUSES
-from vico.challenges.tables.files import read_results
-from vico.challenges.tables.markdown import setting_words, table
+from vico.challenges.tables.results import read_results, setting_words, table
 from vico.errors import InputError
 
 BLOCKS = {

@@ -19,10 +19,10 @@ from hashlib import sha256
 from pathlib import Path
 
 from vico.challenges.influence import INFLUENCE
-from vico.challenges.influence.constants import opinion_digest
-from vico.challenges.influence.model import settings_of
+from vico.challenges.influence.opinion import opinion_digest
+from vico.challenges.influence.tasks import settings_of
 from vico.challenges.records import Job, Setting
-from vico.challenges.tables.means import estimate
+from vico.challenges.tables.summary import estimate
 from vico.io.files import read_json, write_json
 from vico.version import __version__
 

@@ -25,8 +25,7 @@ from reporting import machine, publish, row
 from vico.agents.schedule import followers_of
 from vico.community import read_community
 from vico.runner.control import Control
-from vico.runner.faults import FaultLog
-from vico.runner.gather import Gatherer
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from reporting import machine, publish
 
 from vico.agents.assistant.skills import GRASP, AssistantSkills, ObservationView
-from vico.agents.perception import _search
+from vico.agents.perception import _search_grid
 from vico.agents.schedule import followers_of
 from vico.community import build_community
 from vico.envs import make
@@ -317,7 +317,7 @@ class Tour:
         points = np.stack(np.meshgrid(corner[0] + axis, corner[1] + axis), axis=-1).reshape(-1, 2)
         blocked = (indoor.gaps(room, points) <= RADIUS).reshape(n, n)
         start, aim = (here - corner) / _CELL, (goal[:2] - corner) / _CELL
-        cells = _search(blocked, int(start[0]), int(start[1]), float(aim[0]), float(aim[1]), near / _CELL)
+        cells = _search_grid(blocked, int(start[0]), int(start[1]), float(aim[0]), float(aim[1]), near / _CELL)
         if not len(cells):
             return 0.0 if math.dist(here, goal[:2]) <= near else math.inf
         steps = np.diff(np.vstack([[np.floor(start)], cells]), axis=0)

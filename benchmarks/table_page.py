@@ -14,7 +14,7 @@ from pathlib import Path
 
 from reporting import write_page
 
-from vico.challenges.tables.files import read_results
+from vico.challenges.tables.results import read_results
 from vico.errors import InputError
 
 

@@ -30,11 +30,9 @@ from worlds import locate, row_of
 
 from vico.challenges.episodes import Outcome, label_of
 from vico.challenges.evaluation import evaluate, jobs_for
-from vico.challenges.records import Challenge, Setting
-from vico.challenges.registry import load_challenge
-from vico.challenges.robot.policy_files import LEARNED, policy_settings
-from vico.challenges.tables.files import write_results
-from vico.challenges.tables.published import published_rows
+from vico.challenges.records import Challenge, Setting, load_challenge
+from vico.challenges.robot.arm_policies import LEARNED, policy_settings
+from vico.challenges.tables.results import published_rows, write_results
 from vico.challenges.windows import window_list
 from vico.errors import InputError, VicoError
 from vico.io.files import write_bytes

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from vico.challenges.assistant.challenge import ASSISTANT
-from vico.challenges.assistant.model import Task
+from vico.challenges.assistant.tasks import Task
 from vico.challenges.records import Job
 
 

@@ -20,16 +20,15 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFont
 
+from vico.agents.activities import Clerk
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.schedule import Stay, followers_of, stays_of
-from vico.agents.serving import Clerk
 from vico.agents.travel import Traveller
 from vico.assets.shapes import box
 from vico.clock import DAY, clock_of
 from vico.community import Community, build_community
 from vico.render.film import FilmWriter, read_film, write_film
-from vico.runner.faults import FaultLog
-from vico.runner.gather import Gatherer
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.seeds import rng

@@ -55,9 +55,9 @@ class Looker:
 def main() -> None:
     # An agent's module may not import these: they hold the truth. Only who judges it does.
     from vico.challenges.evaluation import evaluate, jobs_for
-    from vico.challenges.registry import load_challenge
-    from vico.challenges.tables.files import write_results
+    from vico.challenges.records import load_challenge
     from vico.challenges.tables.leaderboard import Leaderboard, add_entries, entries_of, write_leaderboard
+    from vico.challenges.tables.results import write_results
     from vico.runner.check import check_agent
     from vico.runner.foreign import Terms
     from vico.world.folder import read_world

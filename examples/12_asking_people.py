@@ -1,7 +1,7 @@
 """An assistant asks the way and for a person, understands the answers, and finds them.
 
 Somebody is looked for by name. The assistant goes where people are, asks whoever is near, reads the answers back
-(`vico.agents.talk.understanding`), goes where they point to, and asks again there.
+(`vico.agents.talk.sentences`), goes where they point to, and asks again there.
 
 python examples/12_asking_people.py --world out/demo/world --community out/demo/community --seed 1 --steps 900
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.schedule import followers_of
-from vico.agents.talk.understanding import claims_in, place_named, whereabouts
+from vico.agents.talk.sentences import claims_in, place_named, whereabouts
 from vico.agents.wayfinding import Walker
 from vico.clock import seconds_of_day
 from vico.community import read_community

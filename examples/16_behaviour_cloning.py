@@ -17,9 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vico.agents.state import generator_state, restore_generator
-from vico.datasets.actions import ActionForm
-from vico.datasets.vectors import PERSON_STATE, goal_vector, in_own_frame, person_state
+from vico.agents.base import generator_state, restore_generator
+from vico.datasets.vectors import PERSON_STATE, ActionForm, goal_vector, in_own_frame, person_state
 from vico.seeds import rng
 
 WEIGHTS = "VICO_CLONED_WEIGHTS"  # environment variable: the file that `train` wrote
@@ -310,8 +309,8 @@ class Cloned:
 def main() -> None:
     # An agent's module may not import these: they hold the truth. Only who trains and judges it does.
     from vico.challenges.evaluation import evaluate, jobs_for
-    from vico.challenges.registry import load_challenge
-    from vico.challenges.tables.files import write_results
+    from vico.challenges.records import load_challenge
+    from vico.challenges.tables.results import write_results
     from vico.datasets.folder import Dataset
     from vico.runner.foreign import Terms
     from vico.world.folder import read_world

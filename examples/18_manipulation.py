@@ -16,9 +16,8 @@ import numpy as np
 
 import vico.envs  # noqa: F401  (registers the ids)
 from vico.challenges.learning.manipulation import MANIPULATION, make_manipulation, make_manipulation_vec, read_policy
-from vico.challenges.learning.manipulation.decomposed import DecomposedPolicy
-from vico.challenges.learning.manipulation.expert import ScriptedExpert
-from vico.challenges.learning.manipulation.scoring import Policy, score
+from vico.challenges.learning.manipulation.environment import Policy, score
+from vico.challenges.learning.manipulation.policies import DecomposedPolicy, ScriptedExpert
 
 IDS = {"reach": "vico/Reach-v0", "lift": "vico/Lift-v0", "place": "vico/Place-v0", "pick_place": "vico/PickPlace-v0"}
 

@@ -15,10 +15,9 @@ from vico.agents.robot.chunk_policy import ChunkActor, ChunkPolicy
 from vico.agents.robot.increments import arm_state, control_of
 from vico.agents.robot.lerobot_policy import LeRobotActor
 from vico.challenges.pick_place.episode import play
-from vico.challenges.pick_place.task import draw_task
-from vico.datasets.build import BuildRequest, Contents, build_dataset
+from vico.challenges.pick_place.tasks import draw_task
+from vico.datasets.build import BuildRequest, Contents, SplitRule, build_dataset
 from vico.datasets.folder import Dataset
-from vico.datasets.splits import SplitRule
 
 
 class Again:

@@ -17,17 +17,16 @@ import numpy as np
 
 import vico.envs  # noqa: F401  (registers the ids)
 from vico.challenges.learning.manipulation import ArrayPolicy
-from vico.challenges.learning.manipulation.observation import usual
-from vico.challenges.learning.manipulation.policy import write_policy
-from vico.challenges.records import Job
-from vico.challenges.registry import load_challenge
-from vico.challenges.robot.policy_files import policy_setting
+from vico.challenges.learning.manipulation.observation import input_scaling
+from vico.challenges.learning.manipulation.policies import write_policy
+from vico.challenges.records import Job, load_challenge
+from vico.challenges.robot.arm_policies import policy_setting
 from vico.seeds import rng
 
 
 def untrained(path: Path, *, seed: int) -> Path:
     """Write a network of random weights, of the shape that training gives it."""
-    mean, deviation = usual("full")
+    mean, deviation = input_scaling("full")
     draw, sizes = rng(seed, "untrained"), (len(mean), 64, 8)
     weights = tuple((draw.normal(size=(b, a)) / np.sqrt(a)).astype(np.float32) for a, b in pairwise(sizes))
     write_policy(path, ArrayPolicy(weights, tuple(np.zeros(b, np.float32) for b in sizes[1:]), mean, deviation))

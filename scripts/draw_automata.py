@@ -11,7 +11,7 @@ import re
 import sys
 from pathlib import Path
 
-from vico.agents.assistant.automata import AUTOMATA, Automaton
+from vico.agents.assistant.baselines import AUTOMATA, Automaton
 
 PAGE = Path(__file__).parents[1] / "docs" / "challenges.md"
 

@@ -17,8 +17,7 @@ from typing import Any
 from vico.agents.schedule import followers_of
 from vico.community.folder import read_community
 from vico.render.film import write_film
-from vico.runner.faults import FaultLog
-from vico.runner.gather import Gatherer
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig

@@ -12,8 +12,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from vico.agents.assistant.habits import OUTDOORS
-from vico.challenges.assistant.episode import world_and_people
+from vico.agents.assistant.estimates import OUTDOORS
+from vico.challenges.assistant.challenge import world_and_people
 from vico.clock import seconds_of_day
 
 _HOUR = 3600.0

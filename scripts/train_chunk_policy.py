@@ -34,11 +34,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from vico.agents.robot.chunk_policy import SCALES, ChunkPolicy, new_network, relative_chunk, shrunk
-from vico.agents.robot.chunk_policy import word_numbers as numbers_of
-from vico.agents.robot.chunk_shape import ChunkShape
+from vico.agents.robot.chunk_policy import SCALES, ChunkPolicy, downscale_picture, new_network, relative_chunk
+from vico.agents.robot.chunk_policy import word_ids as numbers_of
+from vico.agents.robot.increments import ChunkShape
 from vico.datasets.folder import Dataset
-from vico.datasets.increments import SPACE
+from vico.datasets.vectors import SPACE
 from vico.errors import InputError, VicoError
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
 from vico.io.npz import read_npz
@@ -125,7 +125,7 @@ def read_episode(task: tuple[Path, int, int, dict[str, Path], int]) -> None:
     arrays = {name: np.load(path, mmap_mode="r+") for name, path in paths.items()}
     for frame in Dataset(dataset).frames(episode):
         arrays["states"][row], arrays["actions"][row] = frame["observation.state"], frame["action"]
-        arrays["pictures"][row] = shrunk(frame["pictures"]["rgb"], side)
+        arrays["pictures"][row] = downscale_picture(frame["pictures"]["rgb"], side)
         row += 1
 
 

@@ -27,9 +27,8 @@ from stable_baselines3 import A2C, PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
-from vico.agents.commute.learning.env import CommuteVectorEnv
-from vico.agents.commute.learning.worlds import training_city
-from vico.challenges.commute.shards import ShardedCommuters, shard_makers
+from vico.agents.commute.learning import CommuteVectorEnv, training_city
+from vico.challenges.learning.commute import ShardedCommuters, shard_makers
 from vico.envs.workers import Workers
 from vico.jobs.actors import RayActors
 from vico.world.folder import read_world

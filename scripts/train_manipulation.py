@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from vico.challenges.learning.manipulation import ArrayPolicy, ManipulationBatch, make_manipulation_vec
-from vico.challenges.learning.manipulation.observation import usual
-from vico.challenges.learning.manipulation.policy import write_policy
+from vico.challenges.learning.manipulation.observation import input_scaling
+from vico.challenges.learning.manipulation.policies import write_policy
 from vico.errors import InputError, MissingExtraError, VicoError
 from vico.io.files import new_file, read_json, sha256_of, write_bytes, write_json
 from vico.seeds import rng
@@ -86,7 +86,7 @@ class Arms(VecEnv):
         self.num_envs, self.num_actions = batch.num_envs, int(batch.single_action_space.shape[0])
         self.max_episode_length = batch.options.max_steps
         self.device, self.cfg = "cpu", {}
-        self.mean, self.deviation = usual(batch.options.observation)
+        self.mean, self.deviation = input_scaling(batch.options.observation)
         self.seen, _ = batch.reset(seed=seed)
         # Episodes that all end at once would make batches of nothing but beginnings, and of nothing but ends.
         batch.copies.steps[:] = rng(seed, "first episodes").integers(batch.options.max_steps, size=batch.num_envs)

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import toy_city
-from vico.challenges.assistant.causes import Chronicle
-from vico.challenges.assistant.judge import Judge
-from vico.challenges.assistant.model import Category, Person, Region, Start, Subtask, Surface, Task, TaskObject
+from vico.challenges.assistant.evaluate import CauseTracker, Judge
+from vico.challenges.assistant.tasks import Category, Person, Region, Start, Subtask, Surface, Task, TaskObject
 from vico.runner.loop import Step
 from vico.world.model import Point3
 from vico.world.world import World
@@ -140,7 +139,7 @@ class Story:
             if thing.holder is not None:
                 self.truth.holders[thing.name] = thing.holder
         self.judge = Judge(of, world, self.truth, list(self.names))
-        self.chronicle = Chronicle(self.judge)
+        self.chronicle = CauseTracker(self.judge)
         self.number = 0
         self.judge.watch(0)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vico.challenges.commute.model import Appointment, Commuter, CommuteTask
+from vico.challenges.commute.tasks import Appointment, Commuter, CommuteTask
 
 
 def appointment(k: int, start: int, end: int) -> Appointment:

@@ -12,8 +12,7 @@ import toy_city
 from vico.agents.base import Agent
 from vico.agents.schedule import followers_of
 from vico.runner.control import Control
-from vico.runner.faults import FaultLog
-from vico.runner.gather import Gatherer
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loop import Runner
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import toy_city
-from vico.agents.stays import Stay
+from vico.agents.day_plan import Stay
 from vico.agents.talk.acquaintance import Acquaintance, acquaintance_of
-from vico.agents.talk.answers import answer_to
-from vico.agents.talk.facts import Knowledge, Moment, Person
+from vico.agents.talk.answers import Knowledge, Moment, Person, answer_to
 from vico.agents.talk.grammar import Kind, Question
 from vico.agents.talk.memory import ResidentMemory
 from vico.world.public import PublicMap

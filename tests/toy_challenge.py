@@ -18,7 +18,7 @@ from vico.challenges.evaluation import jobs_for
 from vico.challenges.records import EpisodeRecord, Job, Metric, Part, Progress
 from vico.errors import InputError
 from vico.llm import Budget, Connection, LanguageModel, user
-from vico.runner.faults import Fault
+from vico.runner.gather import Fault
 from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.records import manifest_bytes

@@ -8,8 +8,7 @@ import pytest
 
 import toy_city
 from vico.agents.assistant import METHODS, make_planner
-from vico.agents.assistant.choosing import ChoicePlanner
-from vico.agents.assistant.errands import Book, Choice
+from vico.agents.assistant.errands import Book, Choice, ChoicePlanner
 from vico.agents.assistant.ours import OurPlanner
 from vico.agents.assistant.skills import ObservationView
 from vico.errors import InputError

@@ -7,21 +7,20 @@ import re
 
 import pytest
 
-from vico.agents.assistant import options, people, putting
-from vico.agents.assistant.automata import AUTOMATA, CARRY, DELIVERY, SEARCH, Automaton
-from vico.agents.assistant.heuristic import HeuristicPlanner
+from vico.agents.assistant import options, people
+from vico.agents.assistant.baselines import AUTOMATA, CARRY, DELIVERY, SEARCH, Automaton, HeuristicPlanner
 
 # What comes of an option in the planner's words, where those are not the option's own; and which option each state has.
 SEARCHED = {"found", "nothing", "nothing left"}
 REPORTED = {"not all done", "all done"}
 STATES = {
     "delivery": {
-        0: options.GoTo, 1: options.Search, 2: options.WalkUp, 3: options.PickUp, 4: options.GoTo, 5: putting.PutDown,
+        0: options.GoTo, 1: options.Search, 2: options.WalkUp, 3: options.PickUp, 4: options.GoTo, 5: options.PutDown,
         6: people.Report,
     },
     "search": {0: options.GoTo, 1: options.Search, 2: people.Show, 3: people.Report},
     "carry": {
-        0: options.GoTo, 1: options.Search, 2: people.Meet, 3: people.Escort, 4: putting.PutDown, 5: people.AwaitPerson,
+        0: options.GoTo, 1: options.Search, 2: people.Meet, 3: people.Escort, 4: options.PutDown, 5: people.AwaitPerson,
         6: people.Report,
     },
 }  # fmt: skip

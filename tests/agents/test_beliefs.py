@@ -8,11 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from vico.agents.assistant.beliefs import Beliefs
 from vico.agents.assistant.errands import Book
-from vico.agents.assistant.habits import OTHER, OUTDOORS, Habits, read_habits
+from vico.agents.assistant.estimates import OTHER, OUTDOORS, Habits, read_habits
+from vico.agents.assistant.rollouts import Beliefs
 from vico.agents.assistant.skills import AssistantSkills, ObservationView
-from vico.agents.navigation.memory import SeenThing
+from vico.agents.perception import RememberedSighting
 from vico.errors import SchemaError
 from vico.io.data_files import VARIABLE
 from vico.world.model import Category
@@ -45,7 +45,7 @@ class Seen:
 
     def __init__(self, room: str = "", time: float = 0.0) -> None:
         self.places = {"room": "cafe"}
-        thing = SeenThing(7, "resident", "Ida Roth", np.zeros(3), room, time, 400) if room else None
+        thing = RememberedSighting(7, "resident", "Ida Roth", np.zeros(3), room, time, 400) if room else None
         self.seen = SimpleNamespace(last_seen=lambda name: thing if name == "Ida Roth" else None)
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.agents.change_of_plans import ChangeOfPlans, Tolerance
+from vico.agents.day_plan import DayPlanChanges, WeatherTolerance, stays_of
 from vico.agents.schedule import followers_of
-from vico.agents.stays import stays_of
 from vico.agents.travel import Traveller
 from vico.seeds import rng
 from vico.sim.config import SimConfig
@@ -57,7 +56,7 @@ def test_some_of_those_at_leisure_go_to_a_concert_and_look_at_the_stage() -> Non
     stay = type(stay)(stay.leave, stay.due, stay.type, "leisure", stay.activity, stay.place)
     event = {"id": 1, "kind": "concert", "name": "a concert", "goes_on": True, "closed_places": []}
     info = {"weather": FAIR, "events": [event | {"position": [20.0, -20.0, 0.0]}]}
-    plans = [ChangeOfPlans(public, [stay], seed=seed, name=ME) for seed in range(40)]
+    plans = [DayPlanChanges(public, [stay], seed=seed, name=ME) for seed in range(40)]
     there = [plan.place_of(stay, info, "") for plan in plans]
     comes = [plan.watched(place) is not None for plan, place in zip(plans, there, strict=True)]
     assert 8 <= sum(comes) <= 24
@@ -73,7 +72,7 @@ def test_some_of_those_at_leisure_go_to_a_concert_and_look_at_the_stage() -> Non
 def test_on_snow_and_ice_one_sets_out_earlier_and_leaves_the_bicycle() -> None:
     public = PublicMap.from_world(toy_city.world())
     stays = stays_of(toy_city.community().residents[0].schedule, public.place_by_id)
-    plan = ChangeOfPlans(public, stays, seed=0, name=ME)
+    plan = DayPlanChanges(public, stays, seed=0, name=ME)
     way = stays[-1]
     for weather, earlier, avoided in (
         (FAIR, 0.0, ()),
@@ -87,12 +86,12 @@ def test_on_snow_and_ice_one_sets_out_earlier_and_leaves_the_bicycle() -> None:
 
 
 def test_people_differ_in_how_much_rain_they_stand() -> None:
-    limits = [Tolerance.of(0, f"resident_{k}").rain for k in range(100)]
+    limits = [WeatherTolerance.of(0, f"resident_{k}").rain for k in range(100)]
     assert 0.5 <= min(limits) < 1.5
     assert 5.0 < max(limits) <= 6.0
     drizzle = FAIR | {"rain": 0.4}
-    assert not any(Tolerance.of(0, f"resident_{k}").is_exceeded(drizzle) for k in range(100))
-    assert all(Tolerance.of(0, f"resident_{k}").is_exceeded(DOWNPOUR) for k in range(100))
+    assert not any(WeatherTolerance.of(0, f"resident_{k}").is_exceeded(drizzle) for k in range(100))
+    assert all(WeatherTolerance.of(0, f"resident_{k}").is_exceeded(DOWNPOUR) for k in range(100))
 
 
 def test_a_trip_is_planned_without_the_modes_one_avoids(helsinki_city: World) -> None:

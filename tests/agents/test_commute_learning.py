@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.agents.commute.learning.city import CityArrays, is_sound
-from vico.agents.commute.learning.env import CommuteVectorEnv, Draws, TrainingCity
-from vico.agents.commute.learning.fields import (
+from vico.agents.commute.abstract_city import (  # fmt: skip
     ACTIONS,
-    ALL_FIELDS,
     BIKE,
     BUS,
     CASH,
@@ -26,16 +23,21 @@ from vico.agents.commute.learning.fields import (
     FORWARD,
     GOAL_X,
     LAST,
-    SEEN,
-    SEEN_NAMES,
+    OBSERVATION_NAMES,
+    OBSERVATION_SIZE,
     SINCE,
+    STATE_SIZE,
     TIME,
     TURN_LEFT,
     VEHICLE,
+    CityArrays,
     X,
-)  # fmt: skip
-from vico.agents.commute.learning.kernels import ray, see_all, step_all
-from vico.agents.commute.learning.policy import Network
+    cast_ray,
+    is_sound,
+    observe_all,
+    step_all,
+)
+from vico.agents.commute.learning import CommuteVectorEnv, EpisodeDraws, Network, TrainingCity
 from vico.errors import MissingFileError, SchemaError
 
 
@@ -61,7 +63,7 @@ def agent(
     x: float, *, goal: float, vehicle: int = FOOT, time: float = 900.0, cash: float = 30.0
 ) -> NDArray[np.float64]:
     """One agent that looks east."""
-    state = np.zeros((1, ALL_FIELDS))
+    state = np.zeros((1, STATE_SIZE))
     state[0, [X, GOAL_X, VEHICLE, TIME, DUE, CASH]] = x, goal, vehicle, time, time + 60.0, cash
     return state
 
@@ -103,8 +105,8 @@ def test_a_wall_stops_one() -> None:
         step(state, FORWARD)
     assert 49.0 < state[0, X] < 50.0
     assert step(state, FORWARD)[0] == pytest.approx(-1.1)
-    assert ray(toy(), 20.0, 0.0, 0.0) == 20.0
-    assert ray(toy(), 40.0, 0.0, 0.0) == pytest.approx(10.0, abs=0.5)
+    assert cast_ray(toy(), 20.0, 0.0, 0.0) == 20.0
+    assert cast_ray(toy(), 40.0, 0.0, 0.0) == pytest.approx(10.0, abs=0.5)
 
 
 def test_the_bus_goes_by_its_timetable() -> None:
@@ -136,9 +138,9 @@ def test_a_bicycle_is_taken_at_a_station_and_brought_back() -> None:
 
 
 def test_what_is_seen_has_a_name_each() -> None:
-    state, out = agent(0.0, goal=30.0), np.zeros((1, SEEN), np.float32)
-    see_all(toy(), state, out)
-    seen = dict(zip(SEEN_NAMES, out[0].tolist(), strict=True))
+    state, out = agent(0.0, goal=30.0), np.zeros((1, OBSERVATION_SIZE), np.float32)
+    observe_all(toy(), state, out)
+    seen = dict(zip(OBSERVATION_NAMES, out[0].tolist(), strict=True))
     assert seen["goal_ahead"] == 1.0
     assert seen["goal_distance"] == pytest.approx(math.log(31.0) / 6.0, abs=1e-6)
     assert seen["station_ahead"] == -1.0
@@ -150,7 +152,7 @@ def test_what_is_seen_has_a_name_each() -> None:
 def environment() -> CommuteVectorEnv:
     points = np.array([[-60.0, 0.0], [0.0, 60.0], [30.0, -60.0]])
     city = TrainingCity(toy(), points, points)
-    return CommuteVectorEnv([city], num_envs=6, seed=5, draws=Draws(least=30.0, most=200.0))
+    return CommuteVectorEnv([city], num_envs=6, seed=5, draws=EpisodeDraws(least=30.0, most=200.0))
 
 
 def test_the_same_seed_gives_the_same_episodes() -> None:
@@ -178,7 +180,7 @@ def test_the_packaged_policies_fit(name: str) -> None:
     from vico.io.data_files import PACKAGED
 
     network = Network.read(PACKAGED / "commute" / f"{name}.npz")
-    logits = network.logits(np.zeros(SEEN, np.float32))
+    logits = network.logits(np.zeros(OBSERVATION_SIZE, np.float32))
     assert logits.shape == (len(ACTIONS),)
     assert np.isfinite(logits).all()
 

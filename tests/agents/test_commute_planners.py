@@ -12,12 +12,11 @@ import pytest
 from commute_map import EAST, RACK_EAST, RACK_WEST, WEST, commute_map, instructions
 from llm_server import Script, model_server, refuses
 from vico.agents.commute import METHODS, make_planner
+from vico.agents.commute.commuter import CommuteQuery, WalkPlanner
 from vico.agents.commute.legs import LegMaker
 from vico.agents.commute.llm import CommutePlan, LlmPlanner
 from vico.agents.commute.mcts import MctsPlanner, reward
 from vico.agents.commute.ours import DayPlanner
-from vico.agents.commute.question import Question
-from vico.agents.commute.rule import WalkPlanner
 from vico.errors import InputError, SchemaError
 from vico.llm import Connection, Endpoint, LanguageModel
 from vico.llm.prompts import read_prompt
@@ -25,12 +24,12 @@ from vico.world.model import Point2
 from vico.world.trips import Trip
 
 
-def question(here: Point2, goal: Point2, **changes: Any) -> Question:
+def question(here: Point2, goal: Point2, **changes: Any) -> CommuteQuery:
     asked: dict[str, Any] = {
         "here": here, "goal": goal, "now": 32_400.0, "due": 33_300.0, "cash": 60.0, "vehicle": "", "index": 1,
         "closed": (), "first": True,
     }  # fmt: skip
-    return Question(**(asked | changes))
+    return CommuteQuery(**(asked | changes))
 
 
 def modes(trip: Trip | None) -> tuple[str, ...]:

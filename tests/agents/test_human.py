@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from vico.agents.human import LET_GO, Held, HumanAgent, Mailbox, drive, fly, walk
+from vico.agents.human import LET_GO, HeldInput, HumanAgent, Mailbox, drive, fly, walk
 from vico.errors import InputError
 
 
@@ -17,8 +17,8 @@ def seen(yaw: float = 0.0, **state: Any) -> dict[str, Any]:
     return {"pose": [0.0, 0.0, 0.0, math.cos(yaw), math.sin(yaw), 0.0], "state": usual | state}
 
 
-def held(*keys: str, yaw: float | None = None, seq: int = 0, **axes: float) -> Held:
-    return Held(seq, frozenset(keys), yaw, None, axes)
+def held(*keys: str, yaw: float | None = None, seq: int = 0, **axes: float) -> HeldInput:
+    return HeldInput(seq, frozenset(keys), yaw, None, axes)
 
 
 def test_the_arrow_ahead_walks_straight_and_with_the_run_key_runs() -> None:

@@ -12,30 +12,32 @@ import pytest
 
 from challenges.invented_people import invented_people
 from llm_server import model_server
-from vico.agents.influence.courtship import Courtship
-from vico.agents.influence.days import DayPlan, Stay
-from vico.agents.influence.language import (
+from vico.agents.influence.main_agent import Courtship
+from vico.agents.influence.situation import DayPlan, PlannedStay, Situation, Talk, forms_of_address
+from vico.agents.influence.strategies import (
+    DIALOGUES,
+    TARGETS,
     Asker,
+    ExpectedGainTarget,
     LanguageDialogue,
     LanguageMember,
     LanguageTarget,
     MessageReply,
+    NearestTarget,
+    RandomTarget,
     RankingReply,
     TargetReply,
-    shortened,
+    make_strategy,
+    read_lines,
+    shorten,
 )
-from vico.agents.influence.lines import lines
-from vico.agents.influence.profiles import forms_of_address
-from vico.agents.influence.situation import Situation, Talk
-from vico.agents.influence.strategies import DIALOGUES, TARGETS, make_strategy
-from vico.agents.influence.targets import ExpectedGainTarget, NearestTarget, RandomTarget
 from vico.challenges.influence.lexicon import Lexicon, Topic, lexicon_files
 from vico.errors import InputError, LlmReplyError, SchemaError, SourceError
 from vico.llm import Connection, Endpoint, LanguageModel, Reply, Usage
 from vico.llm.prompts import read_prompt
 
-AT_HOME = DayPlan((Stay(0.0, 86400.0, "home", "main", "Rest"),))
-AWAY = DayPlan((Stay(0.0, 86400.0, None, "commute", "Walk"),))
+AT_HOME = DayPlan((PlannedStay(0.0, 86400.0, "home", "main", "Rest"),))
+AWAY = DayPlan((PlannedStay(0.0, 86400.0, None, "commute", "Walk"),))
 
 
 def situation(**changes: Any) -> Situation:
@@ -59,7 +61,7 @@ def situation(**changes: Any) -> Situation:
 
 def test_who_commutes_sleeps_or_is_given_up_on_is_chosen_by_nobody() -> None:
     chance = np.random.default_rng(0)
-    asleep = DayPlan((Stay(0.0, 86400.0, "home", "sleep", "Sleep"),))
+    asleep = DayPlan((PlannedStay(0.0, 86400.0, "home", "sleep", "Sleep"),))
     gone = situation(days={"resident_2": AWAY, "resident_3": asleep, "resident_4": AT_HOME})
     for name, target in TARGETS.items():
         assert target().choose(gone, chance) == "resident_4", name
@@ -69,7 +71,7 @@ def test_who_commutes_sleeps_or_is_given_up_on_is_chosen_by_nobody() -> None:
 
 
 def test_the_nearest_is_the_one_with_the_shortest_walk() -> None:
-    other = DayPlan((Stay(0.0, 86400.0, "office", "main", "Work"),))
+    other = DayPlan((PlannedStay(0.0, 86400.0, "office", "main", "Work"),))
     near = situation(
         days={"resident_2": AT_HOME, "resident_3": AWAY, "resident_4": other},
         seconds_to=lambda place: 30.0 if place == "office" else 90.0,
@@ -89,17 +91,17 @@ def test_ours_prefers_the_undecided_to_those_who_named_the_rival() -> None:
 
 def test_every_line_reads_as_what_it_is_about() -> None:
     lexicon = Lexicon(lexicon_files(), hobbies=["kite flying"], groups=["Tea round"])
-    for value in lines().value:
+    for value in read_lines().value:
         for line in (*value.shared, *value.theirs):
             topics = lexicon.read(line).topics
             assert Topic("value", value.name) in topics, line
             assert all(topic.kind != "value" or topic.name == value.name for topic in topics), line
-    for kind, part, name in (("hobby", lines().hobby, "kite flying"), ("group", lines().group, "Tea round")):
+    for kind, part, name in (("hobby", read_lines().hobby, "kite flying"), ("group", read_lines().group, "Tea round")):
         for line in (*part.shared, *part.theirs, *part.own):
             said = line.format(hobby=name, group=name)
             assert lexicon.read(said).topics == (Topic(kind, name),), said
-    for line in (*lines().openings, *(one for name in type(lines().endings).model_fields
-                                     for one in getattr(lines().endings, name))):  # fmt: skip
+    for line in (*read_lines().openings, *(one for name in type(read_lines().endings).model_fields
+                                     for one in getattr(read_lines().endings, name))):  # fmt: skip
         reading = lexicon.read(line)
         assert reading.topics == (), line
         assert (reading.pressure, reading.boasting, reading.flattery) == (False, False, False), line
@@ -217,7 +219,7 @@ def test_a_models_words_are_said_in_one_line_and_cut_short() -> None:
     assert said is not None
     assert len(said) <= 600
     assert set(said.split(" ")) == {"word"}
-    assert shortened("a" * 700) == "a" * 600
+    assert shorten("a" * 700) == "a" * 600
 
 
 def test_what_others_say_cannot_close_its_mark_in_a_prompt() -> None:

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vico.agents.influence.lookouts import left_over, lookouts
-from vico.agents.influence.visiting import Visitor
+from vico.agents.influence.visiting import Visitor, remaining_viewpoints, room_viewpoints
 from vico.seeds import rng
 
 
@@ -24,7 +23,7 @@ def stopped(status: str) -> dict[str, Any]:
 def test_every_point_of_a_large_room_is_near_a_spot_or_the_door() -> None:
     room = np.array([10.0, -4.0, math.radians(30.0), 9.0, 6.0])
     door = (10.0 + 9.0 * math.cos(room[2]), -4.0 + 9.0 * math.sin(room[2]))
-    spots = [*lookouts(room, door), door]
+    spots = [*room_viewpoints(room, door), door]
     for along in np.linspace(-9.0, 9.0, 19):
         for across in np.linspace(-6.0, 6.0, 13):
             x = 10.0 + along * math.cos(room[2]) - across * math.sin(room[2])
@@ -33,12 +32,12 @@ def test_every_point_of_a_large_room_is_near_a_spot_or_the_door() -> None:
 
 
 def test_a_small_room_is_seen_from_its_door_and_there_are_no_spots_outdoors() -> None:
-    assert lookouts(np.array([0.0, 0.0, 0.0, 2.0, 1.5]), (1.5, 0.0)) == []
-    assert lookouts(np.array([0.0, 0.0, 0.0, np.inf, np.inf]), (1.5, 0.0)) == []
+    assert room_viewpoints(np.array([0.0, 0.0, 0.0, 2.0, 1.5]), (1.5, 0.0)) == []
+    assert room_viewpoints(np.array([0.0, 0.0, 0.0, np.inf, np.inf]), (1.5, 0.0)) == []
 
 
 def test_the_next_spot_is_the_nearest_that_was_not_looked_from() -> None:
-    assert left_over([(9.0, 0.0), (1.0, 0.0), (4.0, 0.0)], (0.0, 0.0)) == [(4.0, 0.0), (9.0, 0.0)]
+    assert remaining_viewpoints([(9.0, 0.0), (1.0, 0.0), (4.0, 0.0)], (0.0, 0.0)) == [(4.0, 0.0), (9.0, 0.0)]
 
 
 def test_who_keeps_being_stopped_goes_a_step_another_way() -> None:

@@ -17,8 +17,8 @@ from vico.agents.assistant import make_planner
 from vico.agents.assistant.errands import Choice
 from vico.agents.assistant.llm_planner import LlmPlanner
 from vico.agents.assistant.skills import ObservationView
-from vico.agents.navigation.memory import SeenThing
-from vico.agents.wrappers import model_faults_of, usage_of
+from vico.agents.base import model_faults_of, usage_of
+from vico.agents.perception import RememberedSighting
 from vico.errors import InputError
 from vico.io.plain_data import decode, encode, read_plain, write_plain
 from vico.llm import Budget, LanguageModel
@@ -82,7 +82,7 @@ def moment(
 
 def in_view(made: LlmPlanner, view: ObservationView, name: str, x: float, y: float, *, kind: str = "object") -> None:
     """Let something have been seen just now."""
-    made.skills.seen._put(SeenThing(7, kind, name, np.array([x, y, 0.0]), "", float(view.state["time"]), 60))
+    made.skills.seen._put(RememberedSighting(7, kind, name, np.array([x, y, 0.0]), "", float(view.state["time"]), 60))
 
 
 def test_a_model_that_reads_what_it_is_told_goes_where_it_is_near(public_map: PublicMap) -> None:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vico.agents.narrow_places import WIDE, leads_out, way_out
+from vico.agents.travel import TURNING_CLEARANCE, can_ride_out, find_way_out
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 
@@ -37,31 +37,31 @@ def ends(position: tuple[float, float], heading: float, actions: list[dict[str, 
 
 
 def test_who_points_along_a_passage_rides_out_of_it(passage: WalkableMap) -> None:
-    actions = way_out(passage, (0.25, 0.0), math.radians(88.0))
+    actions = find_way_out(passage, (0.25, 0.0), math.radians(88.0))
     assert actions is not None
     assert {action["type"] for action in actions[-2:]} == {"move_forward"}
     x, y = ends((0.25, 0.0), math.radians(88.0), actions)
-    assert passage.clearance_of(x, y) >= WIDE
+    assert passage.clearance_of(x, y) >= TURNING_CLEARANCE
 
 
 def test_no_ride_is_longer_than_is_legal(passage: WalkableMap) -> None:
     rides = []
     for k in range(40):
         # Where numbers are rounded one way and the other.
-        actions = way_out(passage, (0.25 + 0.001 * k, -6.0 + 0.0137 * k), math.radians(88.0 + 0.1 * k))
+        actions = find_way_out(passage, (0.25 + 0.001 * k, -6.0 + 0.0137 * k), math.radians(88.0 + 0.1 * k))
         assert actions is not None
         rides += [action["distance"] for action in actions if action["type"] == "move_forward"]
     assert max(rides) == 3.0
 
 
 def test_where_it_is_wide_nothing_has_to_be_done(passage: WalkableMap) -> None:
-    assert way_out(passage, (0.0, 12.0), 1.0) == []
+    assert find_way_out(passage, (0.0, 12.0), 1.0) == []
 
 
 def test_there_is_no_way_out_for_who_points_to_the_blind_end(passage: WalkableMap) -> None:
-    assert way_out(passage, (0.25, 0.0), math.radians(-90.0)) is None
+    assert find_way_out(passage, (0.25, 0.0), math.radians(-90.0)) is None
 
 
 def test_a_rack_in_the_passage_can_be_used_and_one_in_a_shaft_cannot(passage: WalkableMap) -> None:
-    assert leads_out(passage, (0.25, 0.0))
-    assert not leads_out(walled((-0.5, -1.5, 1.0, 1.5), (-10, 6, 10, 20)), (0.25, 0.0))
+    assert can_ride_out(passage, (0.25, 0.0))
+    assert not can_ride_out(walled((-0.5, -1.5, 1.0, 1.5), (-10, 6, 10, 20)), (0.25, 0.0))

@@ -9,24 +9,26 @@ import pytest
 
 from errands import LOOK, Crow, told, view_from
 from vico.agents.assistant.errands import Book, Choice
-from vico.agents.assistant.estimates import DOOR, FINDS, PICK, PUT, Estimates
-from vico.agents.assistant.ordering import Plan, best_plan
-from vico.agents.assistant.outlook import Model, Outlook
+from vico.agents.assistant.estimates import DOOR, FIND_CHANCE, PICK, PUT, Estimates
 from vico.agents.assistant.rollouts import DONE
 from vico.agents.assistant.skills import ObservationView
-from vico.agents.navigation.memory import SeenThing
+from vico.agents.assistant.task_planning import TaskModel, TaskPlan, TaskState, best_plan
+from vico.agents.perception import RememberedSighting
 from vico.seeds import rng
 
 
 def model_of(
-    instructions: list[dict[str, Any]], *, seen: dict[int, SeenThing] | None = None, view: ObservationView | None = None
-) -> Model:
+    instructions: list[dict[str, Any]],
+    *,
+    seen: dict[int, RememberedSighting] | None = None,
+    view: ObservationView | None = None,
+) -> TaskModel:
     book = Book(instructions)
     crow = cast(Estimates, Crow())
-    return Model(book, crow, list(book.instructions), view or view_from(0.0, 0.0), seen or {})
+    return TaskModel(book, crow, list(book.instructions), view or view_from(0.0, 0.0), seen or {})
 
 
-def drawn(seed: int, category: str, count: int) -> Model:
+def drawn(seed: int, category: str, count: int) -> TaskModel:
     """A model over places in a square of 200 m."""
     chance = rng(seed, "ordering", category)
 
@@ -43,10 +45,10 @@ def drawn(seed: int, category: str, count: int) -> Model:
     )  # fmt: skip
 
 
-def best_by_trying_all(model: Model, left: float) -> float:
+def best_by_trying_all(model: TaskModel, left: float) -> float:
     """The worth of the best of all sequences of choices."""
 
-    def from_here(outlook: Outlook, worth: float) -> float:
+    def from_here(outlook: TaskState, worth: float) -> float:
         best = worth
         for _, reached, likely in model.steps(outlook):
             if reached.time <= left:
@@ -57,7 +59,7 @@ def best_by_trying_all(model: Model, left: float) -> float:
     return from_here(model.start, 0.0)
 
 
-def followed(model: Model, plan: Plan, left: float) -> tuple[float, float, int]:
+def followed(model: TaskModel, plan: TaskPlan, left: float) -> tuple[float, float, int]:
     """What the choices of a plan come to in the model: worth, time of the last success, subtasks done."""
     outlook, worth, last, done = model.start, 0.0, 0.0, 0
     for choice in plan.choices:
@@ -126,7 +128,7 @@ def test_a_pair_of_things_takes_both_hands() -> None:
 
 
 def test_what_was_seen_is_fetched_without_a_look() -> None:
-    lies = SeenThing(7, "object", "thing 0.0", np.array([10.0, 0.0, 0.0]), "", 0.0, 50)
+    lies = RememberedSighting(7, "object", "thing 0.0", np.array([10.0, 0.0, 0.0]), "", 0.0, 50)
     model = model_of([told(0, "search", [(40.0, 0.0)], (0.0, 0.0))], seen={0: lies})
     assert best_plan(model, 1500.0).choices == (Choice("fetch", 0),)
     assert best_plan(model, 1500.0).time == pytest.approx(5.0 + PUT)
@@ -135,7 +137,7 @@ def test_what_was_seen_is_fetched_without_a_look() -> None:
 def test_what_takes_too_long_is_not_planned() -> None:
     model = model_of([told(0, "search", [(40.0, 0.0)], (0.0, 0.0))])
     assert best_plan(model, 20.0 + LOOK + PUT).done == 1
-    assert best_plan(model, 19.9 + LOOK + PUT) == Plan()
+    assert best_plan(model, 19.9 + LOOK + PUT) == TaskPlan()
 
 
 def test_who_is_indoors_has_a_door_to_pass() -> None:
@@ -144,5 +146,5 @@ def test_who_is_indoors_has_a_door_to_pass() -> None:
         best_plan(model_of(asked, view=view_from(0.0, 0.0, room=room)), 1500.0) for room in ("r_cafe", "")
     )
     assert inside.time - outside.time == pytest.approx(DOOR)
-    assert 0.0 < FINDS < 1.0
-    assert outside.worth == pytest.approx(FINDS * (1.0 - 0.25 * outside.time / 1500.0))
+    assert 0.0 < FIND_CHANCE < 1.0
+    assert outside.worth == pytest.approx(FIND_CHANCE * (1.0 - 0.25 * outside.time / 1500.0))

@@ -12,8 +12,8 @@ import toy_city
 from vico.agents.base import Agent
 from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, WAITS_FOR, Requester
 from vico.agents.schedule import followers_of
-from vico.agents.talk.address import is_called
-from vico.challenges.assistant import thresholds
+from vico.agents.talk.acquaintance import is_called
+from vico.challenges.assistant import tasks
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
@@ -89,8 +89,8 @@ def test_names_may_have_signs(name: str, text: str) -> None:
 
 
 def test_the_numbers_of_the_challenge_are_theirs() -> None:
-    assert (thresholds.CALL_DISTANCE, thresholds.HAND_OVER_DISTANCE) == (CALL_DISTANCE, HAND_OVER_DISTANCE)
-    assert thresholds.WAITS_FOR == WAITS_FOR
+    assert (tasks.CALL_DISTANCE, tasks.HAND_OVER_DISTANCE) == (CALL_DISTANCE, HAND_OVER_DISTANCE)
+    assert tasks.WAITS_FOR == WAITS_FOR
 
 
 def test_nobody_stops_for_who_does_not_say_their_name() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.agents.base import by_group
+from vico.agents.base import split_groups
 from vico.agents.residents import Residents
 from vico.agents.schedule import followers_of
 from vico.community.author import procedural_author
@@ -119,6 +119,6 @@ def test_a_member_that_fails_is_told_in_its_place() -> None:
 
 def test_stock_residents_belong_to_one_group() -> None:
     followers = followers_of(toy_city.community(), PublicMap.from_world(toy_city.world()))
-    ((_, names),), alone = by_group(followers)
+    ((_, names),), alone = split_groups(followers)
     assert names == list(followers)
     assert alone == []

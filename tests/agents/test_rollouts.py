@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vico.agents.assistant.rollouts import DONE, IN_HAND, OPEN, Situation, choose, draw_worlds, worth
+from vico.agents.assistant.rollouts import (
+    DONE,
+    IN_HAND,
+    OPEN,
+    Situation,
+    best_first_choice,
+    draw_worlds,
+    expected_worth,
+)
 from vico.seeds import rng
 
 LEFT = 600.0
@@ -45,7 +53,7 @@ def situation(
 
 
 def chosen(one: Situation, *, seed: int = 0) -> int:
-    return choose(one, rng(seed, "rollouts"), worlds=200)
+    return best_first_choice(one, rng(seed, "rollouts"), worlds=200)
 
 
 def test_the_nearer_of_two_equal_spots_comes_first() -> None:
@@ -92,11 +100,11 @@ def test_worlds_are_drawn_by_the_chances() -> None:
 
 
 def test_worth_counts_what_is_done_in_time() -> None:
-    sure = worth(situation([(0, 10.0, 1.0), (1, 20.0, 1.0)], tasks=2), rng(0, "worth"), worlds=50)
-    half = worth(situation([(0, 10.0, 0.5), (1, 20.0, 0.5)], tasks=2), rng(0, "worth"), worlds=50)
+    sure = expected_worth(situation([(0, 10.0, 1.0), (1, 20.0, 1.0)], tasks=2), rng(0, "worth"), worlds=50)
+    half = expected_worth(situation([(0, 10.0, 0.5), (1, 20.0, 0.5)], tasks=2), rng(0, "worth"), worlds=50)
     assert 1.9 < sure <= 2.0
     assert half == pytest.approx(sure / 2, abs=0.05)
-    assert worth(situation([(0, 10.0, 1.0)], tasks=1, left=5.0), rng(0, "worth"), worlds=50) == 0.0
+    assert expected_worth(situation([(0, 10.0, 1.0)], tasks=1, left=5.0), rng(0, "worth"), worlds=50) == 0.0
 
 
 @pytest.mark.parametrize("seed", range(20))

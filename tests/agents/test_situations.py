@@ -9,22 +9,19 @@ import numpy as np
 import pytest
 
 from errands import LOOK, Crow, told, view_from
-from vico.agents.assistant.beliefs import Beliefs
 from vico.agents.assistant.errands import Book, Choice
-from vico.agents.assistant.estimates import FINDS, Estimates
-from vico.agents.assistant.habits import read_habits
-from vico.agents.assistant.rollouts import IN_HAND, OPEN, choose
-from vico.agents.assistant.situations import Situations
-from vico.agents.navigation.memory import SeenThing
+from vico.agents.assistant.estimates import FIND_CHANCE, Estimates, read_habits
+from vico.agents.assistant.rollouts import IN_HAND, OPEN, Beliefs, SituationBuilder, best_first_choice
+from vico.agents.perception import RememberedSighting
 from vico.seeds import rng
 from vico.world.public import PublicMap
 
 MAP = cast(PublicMap, SimpleNamespace(place_by_id={}))
 
 
-def situations_of(*instructions: dict[str, object]) -> Situations:
+def situations_of(*instructions: dict[str, object]) -> SituationBuilder:
     book = Book(list(instructions))
-    return Situations(book, cast(Estimates, Crow()), Beliefs(book, MAP, read_habits()))
+    return SituationBuilder(book, cast(Estimates, Crow()), Beliefs(book, MAP, read_habits()))
 
 
 def test_people_are_looked_for_at_each_place_and_walked_home() -> None:
@@ -32,7 +29,7 @@ def test_people_are_looked_for_at_each_place_and_walked_home() -> None:
     situation, choices = made.now([0], view_from(0.0, 0.0), {}, 900.0)
     assert choices == [Choice("look", 0, 0), Choice("look", 0, 1), Choice("deliver", 0)]
     assert situation.spot_seconds.tolist() == [LOOK, LOOK]
-    assert situation.spot_finds.tolist() == [FINDS, FINDS]
+    assert situation.spot_finds.tolist() == [FIND_CHANCE, FIND_CHANCE]
     assert 0.9 < situation.spot_chance.sum() <= 1.0
     assert situation.travel[0, situation.spot_point].tolist() == [5.0, 15.0]
     # The way home is walked at their pace: 40 m from the first place, sqrt(200) m from the second.
@@ -44,12 +41,12 @@ def test_people_are_looked_for_at_each_place_and_walked_home() -> None:
 def test_what_was_seen_is_likelier_than_where_it_was_not() -> None:
     made = situations_of(told(0, "carry", [(10.0, 0.0), (0.0, 30.0)], (10.0, 40.0)))
     now = float(view_from(0.0, 0.0).state["time"])
-    seen = {0: SeenThing(7, "resident", "P0 Q", np.array([5.0, 5.0, 0.0]), "", now, 400)}
+    seen = {0: RememberedSighting(7, "resident", "P0 Q", np.array([5.0, 5.0, 0.0]), "", now, 400)}
     situation, choices = made.now([0], view_from(0.0, 0.0), seen, 900.0)
     assert choices[0] == Choice("fetch", 0)
     assert situation.spot_chance[0] > 0.9
     assert situation.spot_chance.sum() <= 1.0
-    assert choices[choose(situation, rng(0, "situations"), worlds=50)] == Choice("fetch", 0)
+    assert choices[best_first_choice(situation, rng(0, "situations"), worlds=50)] == Choice("fetch", 0)
 
 
 def test_what_is_in_hand_has_no_spots_and_closed_subtasks_are_left_out() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vico.agents.wrappers import NoStateError, as_agent, usage_of
+from vico.agents.base import NoStateError, as_agent, usage_of
 from vico.errors import InputError
 
 

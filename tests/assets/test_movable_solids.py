@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from vico.assets.models.movable import kinds_for, movable_kinds, movable_prototype, movable_surfaces
 from vico.assets.models.schema import MovableEntry
 from vico.assets.models.solids import Solid, movable_mass, movable_solids
-from vico.challenges.pick_place.task import fitting_kinds
+from vico.challenges.pick_place.tasks import fitting_kinds
 
 WITH_SOLIDS = sorted(kind for kind in movable_kinds() if movable_solids(movable_prototype(kind, "red")))
 

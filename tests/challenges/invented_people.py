@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.agents.influence.profiles import Profile, Tie
+from vico.agents.influence.situation import Profile, Tie
 
 VALUES = (
     "self-direction", "stimulation", "hedonism", "achievement", "power",

@@ -23,7 +23,7 @@ from assistant_by_hand import (
     subtask,
     task,
 )
-from vico.challenges.assistant.causes import CAUSES
+from vico.challenges.assistant.evaluate import CAUSES
 from vico.world.world import World
 
 RED = "red helmet"

@@ -11,7 +11,7 @@ import pytest
 
 import toy_city
 from assistant_by_hand import CAFE_TABLE, CLEO, OUTDOORS, SHOP, subtask, task
-from vico.challenges.assistant.model import Category, Task, read_task, write_task
+from vico.challenges.assistant.tasks import Category, Task, read_task, write_task
 from vico.errors import SchemaError
 from vico.world.world import World
 

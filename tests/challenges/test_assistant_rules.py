@@ -19,8 +19,8 @@ from assistant_by_hand import (
     Truth,
     picture,
 )
-from vico.challenges.assistant.rules import entrance_of, has_arrived, is_carried_home, is_delivered, is_in_view
-from vico.challenges.assistant.thresholds import ADVANCED, STANDARD, Thresholds, thresholds
+from vico.challenges.assistant.evaluate import entrance_of, has_arrived, is_carried_home, is_delivered, is_in_view
+from vico.challenges.assistant.tasks import ADVANCED, STANDARD, Thresholds, thresholds
 from vico.world.model import Point3
 from vico.world.world import World
 

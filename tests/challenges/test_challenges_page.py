@@ -11,9 +11,9 @@ import pytest
 
 import toy_city
 from assistant_by_hand import CAFE_TABLE, SHOP, subtask, task
-from vico.challenges.assistant import thresholds as t
-from vico.challenges.assistant.causes import CAUSES
+from vico.challenges.assistant import tasks as t
 from vico.challenges.assistant.challenge import ASSISTANT
+from vico.challenges.assistant.evaluate import CAUSES
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "challenges.md").read_text(encoding="utf-8")
@@ -45,8 +45,8 @@ def test_thresholds_are_those_of_the_code() -> None:
          f"{hard.surface_distance:g} m"),
         ("Search: pixels, distance", f"{usual.search_pixels}, {usual.search_distance:g} m",
          f"{hard.search_pixels}, {hard.search_distance:g} m"),
-        ("source regions: Delivery and Search, Carry", f"{usual.regions}, {t.HAUNTS * usual.regions}",
-         f"{hard.regions}, {t.HAUNTS * hard.regions}"),
+        ("source regions: Delivery and Search, Carry", f"{usual.regions}, {t.FREQUENTED_PLACES * usual.regions}",
+         f"{hard.regions}, {t.FREQUENTED_PLACES * hard.regions}"),
         ("walk from the start, at most: Delivery and Search, Carry", f"{t.REACH:g} m, {t.CARRY_REACH:g} m", same),
         ("radius of regions outdoors: Delivery and Carry, Search", f"{t.SOURCE_RADIUS:g} m, {t.SEARCH_RADIUS:g} m",
          same),

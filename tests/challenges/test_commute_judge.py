@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from commute_day import toy_task
-from vico.challenges.commute.judge import DayJudge
-from vico.challenges.commute.legal import CommuteInfo, LegalAgent, refusal
+from vico.challenges.commute.challenge import CommuteInfo, LegalAgent, refusal
+from vico.challenges.commute.evaluate import DayJudge
 from vico.runner.loop import Step
 
 AGENT = "assistant_0"

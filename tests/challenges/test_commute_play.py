@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vico.challenges.commute import COMMUTE
-from vico.challenges.commute.causes import CAUSES
+from vico.challenges.commute.evaluate import CAUSES
 from vico.challenges.records import EpisodeRecord, Job
 from vico.errors import InputError
 from vico.world.world import World

@@ -15,7 +15,7 @@ import pytest
 
 from ray_nodes import needs_ray
 from toy_service import Known
-from vico.challenges.commute.shards import ShardedCommuters, shard, shard_makers
+from vico.challenges.learning.commute import ShardedCommuters, shard, shard_makers
 from vico.envs.workers import Call, Workers
 from vico.errors import InputError
 

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from commute_day import toy_task
-from vico.challenges.commute import rules
+from vico.challenges.commute import tasks
 from vico.challenges.commute.generate import generate_commute
-from vico.challenges.commute.model import read_task, write_task
+from vico.challenges.commute.tasks import read_task, write_task
 from vico.clock import clock_of
 from vico.errors import EmptyInputError, InputError, SchemaError
 from vico.world.world import World
@@ -32,17 +32,17 @@ def test_days_keep_the_rules(helsinki_city: World) -> None:
     for seed in range(6):
         task = generate_commute(helsinki_city, seed=seed, hours=3.0)
         day = task.appointments
-        assert rules.LEAST_PLACES <= len({a.place for a in day}) <= rules.MOST_PLACES
+        assert tasks.LEAST_PLACES <= len({a.place for a in day}) <= tasks.MOST_PLACES
         assert day[0].place == task.appointments[0].candidates[0]
         for before, after in pairwise(day):
             away = math.dist(before.position, after.position)
             share = (after.start - before.end) / away - 1.0
             # Rounded to whole seconds: half a second either way.
-            assert rules.SLACK[0] - 0.5 / away <= share <= rules.SLACK[1] + 0.5 / away
-            assert len(after.candidates) <= rules.CANDIDATES
+            assert tasks.SLACK[0] - 0.5 / away <= share <= tasks.SLACK[1] + 0.5 / away
+            assert len(after.candidates) <= tasks.CANDIDATES
         assert all(places[a.place].position[:2] == a.position for a in day)
         least = sum(b.start - a.end for a, b in pairwise(day))
-        least += rules.LEAST_STAY * (len(day) - 2) + rules.LAST_STAY
+        least += tasks.LEAST_STAY * (len(day) - 2) + tasks.LAST_STAY
         # Each stay is rounded to a second.
         assert task.seconds == pytest.approx(max(3.0 * 3600, least), abs=len(day))
 

@@ -13,19 +13,17 @@ import pytest
 
 import planted_agents
 from command_line import vico
-from vico.challenges.assistant import episode as playing
-from vico.challenges.assistant.causes import CAUSES
-from vico.challenges.assistant.challenge import ASSISTANT
-from vico.challenges.assistant.episode import play_task
+from vico.challenges.assistant import challenge as playing
+from vico.challenges.assistant.challenge import ASSISTANT, play_task
+from vico.challenges.assistant.evaluate import CAUSES
 from vico.challenges.assistant.generate import generate_task
-from vico.challenges.assistant.model import Category, Task, read_task, write_task
-from vico.challenges.assistant.thresholds import RESIDENTS
+from vico.challenges.assistant.tasks import RESIDENTS, Category, Task, read_task, write_task
 from vico.challenges.records import EpisodeRecord, Job
 from vico.community import build_community
 from vico.community.model import Community
 from vico.errors import InputError, SchemaError
-from vico.runner.faults import Fault
 from vico.runner.foreign import Terms
+from vico.runner.gather import Fault
 from vico.sim.recording import read_run
 from vico.viewer.repeat import RepeatedRun
 from vico.world.world import World

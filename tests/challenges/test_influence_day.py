@@ -12,18 +12,20 @@ import pytest
 
 from challenges.invented_people import about, invented_people
 from toytown import make_world
-from vico.agents.influence.days import DayPlan, Stay
-from vico.agents.influence.language import Asker
-from vico.agents.influence.profiles import forms_of_address
-from vico.agents.influence.strategies import make_strategy
-from vico.agents.influence.visits import Ending
+from vico.agents.influence.situation import DayPlan, Ending, PlannedStay, forms_of_address
+from vico.agents.influence.strategies import Asker, make_strategy
 from vico.challenges.influence import INFLUENCE, evaluate
-from vico.challenges.influence.by_schedule import Walks, play_by_schedule
-from vico.challenges.influence.day import Day, make_day
-from vico.challenges.influence.generate import community_of, generate_influence, rides_in
-from vico.challenges.influence.ledger import Ledger
-from vico.challenges.influence.model import InfluenceSettings, settings_of, strategies_of
+from vico.challenges.influence.challenge import Walks, play_by_schedule
+from vico.challenges.influence.day import Day, Ledger, make_day
 from vico.challenges.influence.opinion import OpinionModel
+from vico.challenges.influence.tasks import (
+    InfluenceSettings,
+    community_of,
+    generate_influence,
+    rides_in,
+    settings_of,
+    strategies_of,
+)
 from vico.challenges.records import Challenge, Job
 from vico.community.model import Community, ItemType
 from vico.errors import InputError, SourceError
@@ -345,9 +347,9 @@ def test_the_challenge_is_one() -> None:
 def test_a_plan_knows_when_somebody_can_be_met() -> None:
     plan = DayPlan(
         (
-            Stay(0.0, 100.0, "home", "sleep", ""),
-            Stay(100.0, 200.0, None, "commute", ""),
-            Stay(200.0, 86400.0, "work", "main", ""),
+            PlannedStay(0.0, 100.0, "home", "sleep", ""),
+            PlannedStay(100.0, 200.0, None, "commute", ""),
+            PlannedStay(200.0, 86400.0, "work", "main", ""),
         )
     )
     assert [plan.at(t).can_talk for t in (50.0, 150.0, 250.0)] == [False, False, True]

@@ -11,11 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from challenges.invented_people import HOBBIES, SAYS, VALUES, about, invented_people
-from vico.agents.influence.profiles import Profile, Tie
-from vico.challenges.influence.constants import AverageForm, SocialForm, SumForm, opinion_constants
+from vico.agents.influence.situation import Profile, Tie
 from vico.challenges.influence.lexicon import Lexicon, Topic, lexicon_files
-from vico.challenges.influence.opinion import Impression, OpinionModel, opinion_after
-from vico.challenges.influence.reception import Heard
+from vico.challenges.influence.opinion import (
+    AverageForm,
+    HeardMessage,
+    Impression,
+    OpinionModel,
+    SocialForm,
+    SumForm,
+    opinion_after,
+    opinion_constants,
+)
 from vico.errors import InputError
 
 EVENING = 20 * 3600.0
@@ -28,15 +35,15 @@ def model_of(people: list[Profile], seed: int = 0) -> OpinionModel:
     return OpinionModel(people, MAINS, seed=seed)
 
 
-def said(listener: str, *texts: str, speaker: str = "resident_0", start: float = 13 * 3600.0) -> list[Heard]:
+def said(listener: str, *texts: str, speaker: str = "resident_0", start: float = 13 * 3600.0) -> list[HeardMessage]:
     """One conversation for every three texts, half an hour apart."""
     return [
-        Heard(start + (k // 3) * 1800 + k % 3 * 20, speaker, listener, text, k // 3, k % 3)
+        HeardMessage(start + (k // 3) * 1800 + k % 3 * 20, speaker, listener, text, k // 3, k % 3)
         for k, text in enumerate(texts)
     ]
 
 
-def gain(model: OpinionModel, heard: list[Heard], variant: str, member: str) -> float:
+def gain(model: OpinionModel, heard: list[HeardMessage], variant: str, member: str) -> float:
     """By how much talk raises the first main agent in a member's eyes."""
     after = model.opinions(heard, now=EVENING, variant=variant)[member, "resident_0"]
     return after - model.opinions([], now=EVENING, variant=variant)[member, "resident_0"]

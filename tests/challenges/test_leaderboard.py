@@ -10,16 +10,16 @@ import pytest
 
 from command_line import vico
 from toy_challenge import TOY, toy_world
-from vico.challenges import registry
+from vico.challenges import records
 from vico.challenges.evaluation import evaluate, jobs_for
-from vico.challenges.tables.files import write_results
 from vico.challenges.tables.leaderboard import Leaderboard, add_entries, boards, entries_of, read_leaderboard
+from vico.challenges.tables.results import write_results
 from vico.errors import InputError, SchemaError
 
 
 @pytest.fixture(autouse=True)
 def _toy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.CHALLENGES, "toy", "toy_challenge:TOY")
+    monkeypatch.setitem(records.CHALLENGES, "toy", "toy_challenge:TOY")
 
 
 def results(folder: Path, *, methods: tuple[str, ...] = ("bad", "good"), seeds: int = 2) -> Path:

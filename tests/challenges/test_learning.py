@@ -14,8 +14,8 @@ from gymnasium.utils.env_checker import check_env
 import toy_city
 import vico.envs  # noqa: F401  (registers the ids)
 from vico.challenges.learning.make import make_point_goal, make_robot_point_goal
-from vico.challenges.learning.point_goal import ways_to
-from vico.envs.registry import TASKS
+from vico.challenges.learning.point_goal import path_lengths_to
+from vico.envs.spec import TASKS
 from vico.errors import EmptyInputError, InputError
 from vico.world.world import World
 
@@ -129,7 +129,7 @@ def test_a_robot_gets_nearer_by_its_velocity() -> None:
 def test_ways_lead_round_the_house() -> None:
     walkable = toy_city.world().walkable
     goal = np.array([0.25, 25.25])
-    ways, (left, bottom) = ways_to(walkable, goal, 60.0)
+    ways, (left, bottom) = path_lengths_to(walkable, goal, 60.0)
     column, row = walkable.cell_of([0.25, 0.25]).tolist()
     way = float(ways[row - bottom, column - left])
     # 20 m wide and 12 m deep: from the middle of one side to beyond the other.

@@ -10,8 +10,7 @@ import pytest
 import toy_city
 from llm_server import Script, model_server, refuses
 from scripted_planner import impatient
-from vico.challenges.assistant.choose import Question
-from vico.challenges.assistant.choose_llm import llm_chooser
+from vico.challenges.assistant.candidates import ChoiceQuestion, llm_chooser
 from vico.challenges.assistant.generate import generate_task
 from vico.community.model import Community
 from vico.llm import Budget
@@ -21,8 +20,8 @@ WHO = toy_city.community().residents[0]
 NAMES = [f"Place {k}" for k in range(9)]
 
 
-def question(text: str = "Where do the things lie?") -> Question:
-    return Question(text, "delivery", WHO)
+def question(text: str = "Where do the things lie?") -> ChoiceQuestion:
+    return ChoiceQuestion(text, "delivery", WHO)
 
 
 def picks(index: int) -> str:

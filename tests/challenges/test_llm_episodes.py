@@ -11,10 +11,9 @@ import toy_city
 from llm_server import model_server, refuses
 from scripted_planner import ScriptedPlanner, nearest, planner_server
 from vico.assets.models.movable import movable_kinds
-from vico.challenges.assistant.episode import play_task
-from vico.challenges.assistant.model import Person, Region, Start, Subtask, Task, TaskObject
-from vico.challenges.records import EpisodeRecord
-from vico.challenges.registry import check_methods, load_challenge
+from vico.challenges.assistant.challenge import play_task
+from vico.challenges.assistant.tasks import Person, Region, Start, Subtask, Task, TaskObject
+from vico.challenges.records import EpisodeRecord, check_methods, load_challenge
 from vico.community.folder import digest_of
 from vico.errors import InputError
 

@@ -18,13 +18,12 @@ from vico.challenges.learning.manipulation import (
     make_manipulation,
     make_manipulation_vec,
 )
-from vico.challenges.learning.manipulation.copies import Copies
-from vico.challenges.learning.manipulation.draws import SIDES, TABLES
-from vico.challenges.learning.manipulation.expert import ScriptedExpert
+from vico.challenges.learning.manipulation.batch import BatchedScene
 from vico.challenges.learning.manipulation.observation import FULL
-from vico.challenges.learning.manipulation.options import SUBSTEPS, ManipulationOptions
-from vico.challenges.learning.manipulation.rewards import paper
-from vico.envs.registry import ARM_TASKS
+from vico.challenges.learning.manipulation.policies import ScriptedExpert
+from vico.challenges.learning.manipulation.scene import SIDES, SUBSTEPS, TABLES, ManipulationOptions
+from vico.challenges.learning.manipulation.tasks import paper_reward
+from vico.envs.spec import ARM_TASKS
 from vico.errors import InputError, SchemaError
 from vico.seeds import rng
 
@@ -89,7 +88,7 @@ def test_copies_of_a_batch_do_what_single_environments_do(options: dict[str, Any
 
 
 def test_batched_stepping_is_mujocos_plain_stepping() -> None:
-    copies = Copies(MANIPULATION["lift"], ManipulationOptions(), 3)
+    copies = BatchedScene(MANIPULATION["lift"], ManipulationOptions(), 3)
     copies.seeds[:] = [3, 4, 5]
     copies.begin(range(3))
     for actions in actions_of(10, 3):
@@ -215,14 +214,18 @@ def test_rewards_of_the_paper_are_its_four_terms() -> None:
     r = env.readings
     away = float(np.linalg.norm(r.hand - r.thing)), float(np.linalg.norm(r.thing - r.goal))
     terms = ("object", "goal", "grasp", "place")
-    assert paper(r, terms)[0] == pytest.approx(-0.02 * sum(away))
+    assert paper_reward(r, terms)[0] == pytest.approx(-0.02 * sum(away))
     far = r._replace(hand=r.thing + 50.0)
-    assert paper(far, ("object",))[0] == pytest.approx(-0.2)
+    assert paper_reward(far, ("object",))[0] == pytest.approx(-0.2)
     up = r.thing + np.array([0.0, 0.0, 4.0 * float(r.height_half[0])])
     gripped = r._replace(thing=up, pressure=np.full((1, 2), 10.0))
-    assert paper(gripped, ("grasp",))[0] == 5.0
-    assert paper(gripped._replace(pressure=np.array([[10.0, 0.0]])), ("grasp",))[0] == 0.0
-    assert [float(paper(r._replace(at_goal=np.array([n])), ("place",))[0]) for n in (99, 100, 101)] == [0, 100, 0]
+    assert paper_reward(gripped, ("grasp",))[0] == 5.0
+    assert paper_reward(gripped._replace(pressure=np.array([[10.0, 0.0]])), ("grasp",))[0] == 0.0
+    assert [float(paper_reward(r._replace(at_goal=np.array([n])), ("place",))[0]) for n in (99, 100, 101)] == [
+        0,
+        100,
+        0,
+    ]
     _, rewards = play(env, 0)
     assert sum(reward > 90.0 for reward in rewards) == 1
 

@@ -13,11 +13,15 @@ import numpy as np
 import pytest
 
 from vico.challenges.learning.manipulation import ArrayPolicy, make_manipulation, make_manipulation_vec, read_policy
-from vico.challenges.learning.manipulation.controller import ArmController, ArmMoment
-from vico.challenges.learning.manipulation.decomposed import PLACES, DecomposedPolicy
-from vico.challenges.learning.manipulation.observation import size_of, usual
-from vico.challenges.learning.manipulation.policy import write_policy
-from vico.challenges.learning.manipulation.scoring import score
+from vico.challenges.learning.manipulation.environment import score
+from vico.challenges.learning.manipulation.observation import input_scaling, size_of
+from vico.challenges.learning.manipulation.policies import (
+    PLACES,
+    ArmController,
+    ArmState,
+    DecomposedPolicy,
+    write_policy,
+)
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.files import read_json, sha256_of
 from vico.seeds import rng
@@ -131,7 +135,7 @@ def test_a_policy_on_a_robot_elsewhere_does_what_it_does_in_its_environment() ->
         r, state = env.readings, env.copies.state[0]
         positions, rates = state[1 : 1 + env.copies.scene.model.nq], state[1 + env.copies.scene.model.nq :]
         joints, speeds = positions[env.copies.scene.joints], rates[env.copies.scene.joint_rates]
-        moment = ArmMoment(
+        moment = ArmState(
             joints, speeds, r.thing[0] - stand, r.thing_rotation[0], r.half[0], r.goal[0] - stand, r.pressure[0] > 0.5
         )
         np.testing.assert_allclose(controller.observation(moment)[0], seen, atol=1e-6)
@@ -144,7 +148,7 @@ def test_what_networks_are_told_is_of_the_order_of_one() -> None:
     for observation in ("full", "paper"):
         batch = make_manipulation_vec("pick_place", num_envs=64, observation=observation)
         seen, _ = batch.reset(seed=0)
-        mean, deviation = usual(observation)
+        mean, deviation = input_scaling(observation)
         assert np.abs((seen - mean) / deviation).max() < 6.0
 
 

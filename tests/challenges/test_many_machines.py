@@ -15,9 +15,9 @@ from ray_nodes import RayNodes, needs_ray
 from s3_server import S3Server, needs_s3
 from toy_challenge import NAME, TOY, played, toy_world
 from toy_challenge import toy_jobs as jobs
-from vico.challenges import worker
+from vico.challenges import evaluation
 from vico.challenges.evaluation import evaluate
-from vico.challenges.tables.files import write_results
+from vico.challenges.tables.results import write_results
 from vico.errors import InputError
 from vico.io.stores import Store, store_at
 
@@ -98,10 +98,10 @@ def test_a_machine_that_sees_another_folder_or_has_other_code_is_refused(tmp_pat
         "challenge": NAME, "store": str(tmp_path), "code": "other", "record": False, "seen": ".seen-head-1",
     }  # fmt: skip
     with pytest.raises(InputError, match="not the same folder on every machine; give an --out that all of them share"):
-        worker.player(options, lambda _: None)
+        evaluation.player(options, lambda _: None)
     (tmp_path / ".seen-head-1").touch()
     with pytest.raises(InputError, match="other code"):
-        worker.player(options, lambda _: None)
+        evaluation.player(options, lambda _: None)
 
 
 # What dies, while it runs on three nodes of this machine:

@@ -15,7 +15,7 @@ from vico.challenges.episodes import Outcome
 from vico.challenges.influence import INFLUENCE
 from vico.challenges.influence.evaluate import CAUSES
 from vico.challenges.records import EpisodeRecord, Job, Part
-from vico.challenges.tables.files import write_results
+from vico.challenges.tables.results import write_results
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 

@@ -10,22 +10,26 @@ import pytest
 import toy_city
 from assistant_by_hand import Truth
 from vico.agents.assistant import METHODS
-from vico.agents.talk.address import first_name
+from vico.agents.talk.acquaintance import first_name
 from vico.assets.models.movable import movable_colours, movable_kinds
+from vico.challenges.assistant.evaluate import is_carried_home, is_delivered
 from vico.challenges.assistant.generate import generate_task
-from vico.challenges.assistant.model import CATEGORIES, Category, Region, Subtask, Task
-from vico.challenges.assistant.rules import is_carried_home, is_delivered
-from vico.challenges.assistant.thresholds import (
+from vico.challenges.assistant.tasks import (
     APART,
     CANDIDATES,
     CARRY_REACH,
-    HAUNTS,
+    CATEGORIES,
+    FREQUENTED_PLACES,
     OFF_MIDDLE,
     REACH,
     RESIDENTS,
     SEARCH_RADIUS,
     SOURCE_RADIUS,
     SUBTASKS,
+    Category,
+    Region,
+    Subtask,
+    Task,
     thresholds,
 )
 from vico.clock import seconds_of_day
@@ -155,7 +159,7 @@ def test_the_advanced_setting_names_three_times_as_many_regions_and_surfaces(
     helsinki: World, tasks: Made, category: Category
 ) -> None:
     usual, advanced = tasks[category, False], tasks[category, True]
-    base = HAUNTS if category == "carry" else 1
+    base = FREQUENTED_PLACES if category == "carry" else 1
     assert {len(s.sources) for s in usual.subtasks} == {base}
     assert {len(s.sources) for s in advanced.subtasks} == {3 * base}
     assert all(region.surface is None for s in usual.subtasks for region in regions_of(s))

@@ -13,7 +13,7 @@ import pytest
 import toy_challenge
 from command_line import kill_once, vico
 from toy_challenge import toy_world
-from vico.challenges import registry
+from vico.challenges import records
 from vico.io.files import read_json
 
 
@@ -21,7 +21,7 @@ from vico.io.files import read_json
 def _toy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the toy stand for two of the challenges."""
     for name in ("commute", "assistant", "toy"):
-        monkeypatch.setitem(registry.CHALLENGES, name, "toy_challenge:TOY")
+        monkeypatch.setitem(records.CHALLENGES, name, "toy_challenge:TOY")
 
 
 @pytest.fixture
@@ -172,7 +172,7 @@ def test_what_cannot_be_is_one_sentence_and_leaves_nothing(
 def test_a_challenge_that_is_not_there_is_one_sentence(
     worlds: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(registry.CHALLENGES, "influence", "vico.challenges.nothing_of_the_kind:X")
+    monkeypatch.setitem(records.CHALLENGES, "influence", "vico.challenges.nothing_of_the_kind:X")
     assert vico("eval", "influence", "--worlds", worlds[0], "--method", "a+b", "--out", tmp_path / "out") == 2
     assert "this version does not have it" in capsys.readouterr().err
 
@@ -199,7 +199,7 @@ def test_a_killed_evaluation_of_assistants_comes_to_the_same_table(helsinki_path
 def test_what_influence_is_asked_for_is_its_setting(
     worlds: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(registry.CHALLENGES, "influence", "toy_challenge:TOY")
+    monkeypatch.setitem(records.CHALLENGES, "influence", "toy_challenge:TOY")
 
     def setting(*more: object) -> Any:
         out = tmp_path / f"out{len(list(tmp_path.iterdir()))}"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from command_line import vico
-from vico.challenges.tables.files import EVALUATION_FOLDER
+from vico.challenges.tables.results import EVALUATION_FOLDER
 from vico.cli.demo import EVENING
 from vico.community.folder import COMMUNITY_FOLDER
 from vico.datasets.folder import DATASET_FOLDER

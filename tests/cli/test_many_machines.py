@@ -13,7 +13,7 @@ from command_line import vico
 from ray_nodes import needs_ray
 from s3_server import S3Server, needs_s3
 from toy_challenge import toy_world
-from vico.challenges import registry
+from vico.challenges import records
 from vico.cli.options import with_ray_address
 from vico.io.stores import store_at
 from vico.world.folder import read_world
@@ -47,7 +47,7 @@ def test_an_evaluation_lives_in_a_bucket_with_its_worlds(
     bucket: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("commute", "toy"):  # the leaderboard knows it by its own name
-        monkeypatch.setitem(registry.CHALLENGES, name, "toy_challenge:TOY")
+        monkeypatch.setitem(records.CHALLENGES, name, "toy_challenge:TOY")
     worlds, urls = [], []
     for name in ("east", "west"):
         worlds.append(toy_world(tmp_path / "worlds" / name))

@@ -14,13 +14,10 @@ import pytest
 
 from command_line import vico
 from ray_nodes import needs_ray
-from vico.datasets.build import BuildRequest, Contents, build_dataset, tasks_of
-from vico.datasets.card import card_of
-from vico.datasets.checking import findings_of
-from vico.datasets.contact_sheet import write_contact_sheet
-from vico.datasets.folder import Dataset
+from vico.datasets.build import BuildRequest, Contents, SplitRule, build_dataset, tasks_of
+from vico.datasets.folder import Dataset, card_of
 from vico.datasets.formats import webdataset
-from vico.datasets.splits import SplitRule
+from vico.datasets.inspection import findings_of, write_contact_sheet
 from vico.errors import InputError, SchemaError
 from vico.io.files import read_json, write_json
 from vico.jobs import Service

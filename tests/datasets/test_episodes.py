@@ -14,8 +14,8 @@ import pytest
 
 from command_line import kill_once, vico
 from shared_folders import Shared
-from vico.datasets.checking import findings_of
 from vico.datasets.folder import Dataset
+from vico.datasets.inspection import findings_of
 
 PLAY = ["--challenge", "search", "--steps", 12, "--subtasks", 1, "--test", 0, "--workers", 1]
 CHECK = Path(__file__).parents[2] / "scripts" / "check_lerobot.py"

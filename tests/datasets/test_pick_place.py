@@ -13,8 +13,8 @@ from command_line import vico
 from shared_folders import Shared
 from vico.agents.robot.increments import INCREMENTS, STATE
 from vico.datasets.build import BuildRequest, Contents, tasks_of
-from vico.datasets.checking import findings_of
 from vico.datasets.folder import Dataset
+from vico.datasets.inspection import findings_of
 from vico.errors import InputError
 
 ARGUMENTS = (

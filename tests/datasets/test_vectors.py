@@ -11,13 +11,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vico.challenges.assistant.episode import play_task
-from vico.challenges.assistant.generate import generate_task, shortened
+from vico.challenges.assistant.challenge import play_task
+from vico.challenges.assistant.generate import first_subtasks, generate_task
 from vico.community import build_community
-from vico.datasets.actions import IDLE, ActionForm, described
-from vico.datasets.demonstrations import demonstrations_of
-from vico.datasets.tasks import EpisodeFacts, current_part
-from vico.datasets.vectors import GOAL, PERSON_STATE, goal_vector, in_own_frame, in_world_frame, person_state
+from vico.datasets.demonstrations import EpisodeFacts, current_part, demonstrations_of
+from vico.datasets.vectors import (
+    GOAL,
+    IDLE,
+    PERSON_STATE,
+    ActionForm,
+    action_caption,
+    goal_vector,
+    in_own_frame,
+    in_world_frame,
+    person_state,
+)
 from vico.errors import InputError
 from vico.runner.loop import Hook, Step
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
@@ -67,7 +75,7 @@ def nearly(one: Any, other: Any) -> bool:
     return math.isclose(one, other, abs_tol=1e-4) if isinstance(one, float) else one == other
 
 
-@pytest.mark.parametrize("action", EXAMPLES, ids=described)
+@pytest.mark.parametrize("action", EXAMPLES, ids=action_caption)
 def test_an_action_comes_back_from_its_vector(action: dict[str, Any]) -> None:
     vector, text = FORM.encode(action, POSE)
     assert vector.shape == (len(FORM.names),)
@@ -75,7 +83,7 @@ def test_an_action_comes_back_from_its_vector(action: dict[str, Any]) -> None:
     assert nearly(FORM.decode(vector, POSE, text), action)
 
 
-@pytest.mark.parametrize("action", ROBOT_EXAMPLES, ids=described)
+@pytest.mark.parametrize("action", ROBOT_EXAMPLES, ids=action_caption)
 def test_a_robots_action_comes_back_from_its_vector(action: dict[str, Any]) -> None:
     vector, text = ROBOT.encode(action, POSE)
     assert nearly(ROBOT.decode(vector, POSE, text), action)
@@ -160,7 +168,7 @@ class Watch(Hook):
 
 def test_states_of_a_recording_are_those_of_the_live_observations(helsinki: World, tmp_path: Path) -> None:
     people = build_community(helsinki, residents=15, seed=0)
-    task = shortened(generate_task(helsinki, people, "delivery", seed=1, steps=25), subtasks=1)
+    task = first_subtasks(generate_task(helsinki, people, "delivery", seed=1, steps=25), subtasks=1)
     assert len(task.subtasks) == 1
     watch = Watch()
     play_task(helsinki, people, task, method="heuristic", recording=tmp_path / "run", hooks=[watch])

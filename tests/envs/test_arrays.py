@@ -14,17 +14,16 @@ from pettingzoo.test import parallel_api_test
 import toy_city
 import vico
 from vico.envs import CommunityEnv, EnvSpec, SingleAgentEnv
-from vico.envs.arrays.action import PHRASES, ActionTable, Entry
-from vico.envs.arrays.form import ArrayForm
-from vico.envs.arrays.observation import TEXT_BYTES, arrays_markdown
-from vico.envs.arrays.surroundings import Something, Surroundings
+from vico.envs.array_actions import PHRASES, ActionTable, Entry
+from vico.envs.array_observations import TEXT_BYTES, NearbyEntity, Surroundings, arrays_markdown
+from vico.envs.forms import ArrayForm
 from vico.errors import InputError
 from vico.sim.actions import PEOPLE_ACTIONS, Command, parse
 
 SOME = Surroundings(
-    things=tuple(Something(f"t{k}", "object", np.array([k, 1.0, 0.5]), entity=70 + k) for k in range(3)),
-    people=tuple(Something(f"resident_{k}", "resident", np.zeros(3), entity=90 + k) for k in range(2)),
-    places=tuple(Something(f"p{k}", "place", np.zeros(3)) for k in range(2)),
+    things=tuple(NearbyEntity(f"t{k}", "object", np.array([k, 1.0, 0.5]), entity=70 + k) for k in range(3)),
+    people=tuple(NearbyEntity(f"resident_{k}", "resident", np.zeros(3), entity=90 + k) for k in range(2)),
+    places=tuple(NearbyEntity(f"p{k}", "place", np.zeros(3)) for k in range(2)),
 )
 
 

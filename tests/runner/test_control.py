@@ -16,13 +16,10 @@ from command_line import vico
 from live_toy import live_toy
 from vico.agents.schedule import followers_of
 from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError
-from vico.runner.branches import branched_run, free_name
-from vico.runner.control import Control, Switch, waited
-from vico.runner.faults import FaultLog
-from vico.runner.gather import Gatherer
+from vico.runner.control import Control, Pace, Switch, wait_for
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loop import Runner
-from vico.runner.pace import Pace
-from vico.runner.recording import RecordedRun
+from vico.runner.recording import RecordedRun, branched_run, free_name
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
@@ -135,8 +132,8 @@ def test_a_branch_that_is_there_already_is_refused_and_the_run_goes_on(tmp_path:
     control = Control(tmp_path / "run", paused=True)
     with live_toy(tmp_path / "run", control=control):
         with pytest.raises(InputError, match="another name"):
-            waited(control.command("branch", {"name": "wet"}), 10)
-        waited(control.command("step", {"steps": 1}), 10)
+            wait_for(control.command("branch", {"name": "wet"}), 10)
+        wait_for(control.command("step", {"steps": 1}), 10)
         assert not control.over
 
 
@@ -155,16 +152,16 @@ def test_who_asked_for_a_branch_is_told_once_the_run_is_there(tmp_path: Path) ->
 def test_a_run_waits_makes_single_steps_and_goes_on(tmp_path: Path) -> None:
     control = Control(tmp_path / "run", paused=True)
     with live_toy(tmp_path / "run", control=control) as toy:
-        assert waited(control.command("bookmarks", {}), 10) == {"bookmarks": []}
+        assert wait_for(control.command("bookmarks", {}), 10) == {"bookmarks": []}
         assert control.told()["status"] == "paused"
         assert toy.sim.metrics.steps == 0
-        waited(control.command("step", {"steps": 3}), 10)
+        wait_for(control.command("step", {"steps": 3}), 10)
         while control.told()["step"] < 3:
             pass
-        waited(control.command("bookmark", {"text": "here"}), 10)
+        wait_for(control.command("bookmark", {"text": "here"}), 10)
         assert toy.sim.metrics.steps == 3
-        assert waited(control.command("bookmarks", {}), 10)["bookmarks"][0]["step"] == 3
-        waited(control.command("resume", {}), 10)
+        assert wait_for(control.command("bookmarks", {}), 10)["bookmarks"][0]["step"] == 3
+        wait_for(control.command("resume", {}), 10)
         while control.told()["step"] < 10:
             pass
         assert control.told()["status"] == "running"
@@ -195,10 +192,10 @@ def test_what_cannot_be_done_is_refused_in_a_sentence_and_changes_nothing(
 ) -> None:
     control = Control(tmp_path / "run", paused=True)
     with live_toy(tmp_path / "run", control=control) as toy:
-        before = waited(control.ask(lambda runner: runner.sim.state_hash()), 10)
+        before = wait_for(control.ask(lambda runner: runner.sim.state_hash()), 10)
         with pytest.raises(InputError, match=reason):
-            waited(control.command(command, arguments), 10)
-        assert waited(control.ask(lambda runner: runner.sim.state_hash()), 10) == before
+            wait_for(control.command(command, arguments), 10)
+        assert wait_for(control.ask(lambda runner: runner.sim.state_hash()), 10) == before
         assert read_interventions(toy.control.out) == []
 
 
@@ -207,7 +204,7 @@ def test_where_somebody_is_judged_nothing_can_be_changed(tmp_path: Path) -> None
     with live_toy(tmp_path / "run", control=control):
         for command in ("weather", "drop", "perform", "speed", "branch"):
             with pytest.raises(InputError, match="no command here"):
-                waited(control.command(command, {}), 10)
+                wait_for(control.command(command, {}), 10)
 
 
 def test_a_file_of_interventions_that_is_none_is_refused(tmp_path: Path) -> None:

@@ -2,11 +2,11 @@
 
 import gc
 
-from vico.runner.garbage import settled
+from vico.runner.loop import freeze_heap
 
 
 def test_what_is_there_is_left_alone_until_the_run_ends() -> None:
     kept = [[] for _ in range(1000)]
-    with settled():
+    with freeze_heap():
         assert gc.get_freeze_count() > len(kept)
     assert gc.get_freeze_count() == 0

@@ -13,10 +13,8 @@ import pytest
 import planted_agents
 import toy_city
 from vico.agents.schedule import followers_of
-from vico.runner.faults import Fault
-from vico.runner.foreign import Terms, foreign_agents
-from vico.runner.gather import Gatherer
-from vico.runner.isolated import IsolatedAgent
+from vico.runner.foreign import IsolatedAgent, Terms, foreign_agents
+from vico.runner.gather import Fault, Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.sim.config import SimConfig
@@ -170,7 +168,7 @@ def test_a_process_ends_with_its_agent(tmp_path: Path) -> None:
 HOLDER = """
 import sys, time
 from pathlib import Path
-from vico.runner.isolated import IsolatedAgent
+from vico.runner.foreign import IsolatedAgent
 from vico.runner.loading import AgentSeat
 agent = IsolatedAgent(sys.argv[1], AgentSeat("assistant_0"), world=Path("nowhere"))
 print(agent._process.pid, flush=True)

@@ -10,9 +10,8 @@ import pytest
 import planted_agents
 import toy_city
 from vico.runner.check import AgentCheck, check_agent
-from vico.runner.faults import Fault
 from vico.runner.foreign import Terms, foreign_agents
-from vico.runner.gather import Gatherer
+from vico.runner.gather import Fault, Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Runner
 from vico.sim.config import SimConfig

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import toy_city
+from vico.agents.activities import Clerk
 from vico.agents.indoor_walk import IndoorWalker
-from vico.agents.serving import Clerk
 from vico.sim.bodies.seats import PRICE, SERVICE, SPACING
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation

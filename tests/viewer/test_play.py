@@ -16,8 +16,7 @@ from assistant_by_hand import OUTDOORS, subtask, task
 from live_toy import live_toy
 from person_at_keys import Person
 from vico.agents.human import HumanAgent, Mailbox
-from vico.challenges.assistant.episode import play_task
-from vico.challenges.assistant.theatre import PlayedByHand
+from vico.challenges.assistant.challenge import PlayedByHand, play_task
 from vico.challenges.records import EpisodeRecord
 from vico.community.folder import digest_of
 from vico.errors import InputError

@@ -13,8 +13,7 @@ from helsinki_traffic import network, traffic_by
 from road_city import HALF
 from vico.agents.schedule import followers_of
 from vico.errors import InputError, SchemaError
-from vico.runner.faults import FaultLog
-from vico.runner.gather import Gatherer
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig

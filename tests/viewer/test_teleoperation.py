@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_field
-from vico.agents.human import Held, HumanAgent, Mailbox
+from vico.agents.human import HeldInput, HumanAgent, Mailbox
 from vico.assets.robots import robot_model
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
@@ -32,7 +32,7 @@ class Driven:
 
     def hold(self, *keys: str, seconds: float, **axes: float) -> None:
         self._seq += 1
-        self.mailbox.hold(Held(self._seq, frozenset(keys), None, None, axes))
+        self.mailbox.hold(HeldInput(self._seq, frozenset(keys), None, None, axes))
         for _ in range(round(seconds * 10)):
             observations, infos = self.sim.observe(self.sim.due)
             action = self.human.act(observations["robot_0"], infos["robot_0"])

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from vico.agents.base import Action, Info, Observation, heading, wrapped
-from vico.agents.state import AgentState
+from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
 from vico.errors import InputError
 from vico.rules import BIKE_SPEED, RUN_SPEED, WALK_SPEED
 
@@ -47,7 +46,7 @@ _IDLE_STICK = 0.12
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldInput:
     """What is held down at a moment.
 
     Attributes
@@ -92,13 +91,13 @@ class Mailbox:
     def __init__(self, *, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self._held, self._at = Held(), -math.inf
+        self._held, self._at = HeldInput(), -math.inf
         self._asked: deque[tuple[Action, Future[dict[str, Any]]]] = deque()
         self._closed = ""
         #: Number of the last message that an action took into account.
         self.taken = -1
 
-    def hold(self, held: Held) -> None:
+    def hold(self, held: HeldInput) -> None:
         """Take in what is held down; an older message than the last one is ignored."""
         with self._lock:
             if held.seq > self._held.seq:
@@ -107,7 +106,7 @@ class Mailbox:
     def release(self) -> None:
         """Let go of everything; the next message may count from anywhere."""
         with self._lock:
-            self._held, self._at = Held(), -math.inf
+            self._held, self._at = HeldInput(), -math.inf
 
     def do(self, action: Action) -> Future[dict[str, Any]]:
         """Have an action done as soon as it is time; its outcome is the result."""
@@ -119,10 +118,10 @@ class Mailbox:
                 self._asked.append((action, told))
         return told
 
-    def take(self) -> tuple[Held, tuple[Action, Future[dict[str, Any]]] | None]:
+    def take(self) -> tuple[HeldInput, tuple[Action, Future[dict[str, Any]]] | None]:
         """Return what is held down now, and an action that is asked for."""
         with self._lock:
-            held = self._held if self._clock() - self._at <= LET_GO else Held(self._held.seq)
+            held = self._held if self._clock() - self._at <= LET_GO else HeldInput(self._held.seq)
             self.taken = held.seq
             return held, self._asked.popleft() if self._asked else None
 
@@ -142,7 +141,7 @@ class Mailbox:
 
 
 #: Turns what is held down into an action, given what the agent observes.
-Steering = Callable[[Held, Observation], Action]
+Steering = Callable[[HeldInput, Observation], Action]
 
 
 class HumanAgent:
@@ -193,7 +192,7 @@ class HumanAgent:
         told.set_result({"ok": state["action_status"] == "ok", **outcome})
 
 
-def walk(held: Held, observation: Observation) -> Action:
+def walk(held: HeldInput, observation: Observation) -> Action:
     """Return how keys move a body on legs or on a bicycle over the coming moment.
 
     With a direction of gaze, forward is there, and left, right and back are seen from there: the body turns that way
@@ -208,7 +207,7 @@ def walk(held: Held, observation: Observation) -> Action:
     turning = held.axis("turn", "turn_left", "turn_right")
     if push > 0.0:
         looks = heading(observation) if held.yaw is None or turning else held.yaw
-        away = math.degrees(wrapped(looks + math.atan2(-aside, ahead) - heading(observation)))
+        away = math.degrees(wrap_angle(looks + math.atan2(-aside, ahead) - heading(observation)))
         away = min(max(away / PERIOD, -SWING_SPEED), SWING_SPEED) if not turning else turning * TURN_SPEED
         straight = abs(away) * PERIOD <= TURNS_FIRST and abs(away) < SWING_SPEED
         return {"type": "move_forward", "distance": speed * push if straight else 0.0, "turn": away}
@@ -218,18 +217,18 @@ def walk(held: Held, observation: Observation) -> Action:
     return _look(held, observation)
 
 
-def _look(held: Held, observation: Observation) -> Action:
+def _look(held: HeldInput, observation: Observation) -> Action:
     """Return how somebody who stands turns to where they look."""
     if held.yaw is None:
         return {"type": "wait"}
-    away = math.degrees(wrapped(held.yaw - heading(observation)))
+    away = math.degrees(wrap_angle(held.yaw - heading(observation)))
     if abs(away) < 1.0:
         return {"type": "wait"}
     swing = min(abs(away) / PERIOD, SWING_SPEED)
     return {"type": "turn_left" if away > 0 else "turn_right", "degrees": swing}
 
 
-def drive(held: Held, observation: Observation) -> Action:
+def drive(held: HeldInput, observation: Observation) -> Action:
     """Return how keys and sticks drive a robot on wheels or legs: its ``velocity`` space."""
     ahead, turn = held.axis("y", "forward", "back"), held.axis("turn", "turn_left", "turn_right")
     turn = turn or -held.axis("x", "right", "left")
@@ -237,7 +236,7 @@ def drive(held: Held, observation: Observation) -> Action:
     return {"type": "control", "space": "velocity", "vector": [_FASTEST * ahead * fast, 0.0, _FASTEST_TURN * turn]}
 
 
-def fly(held: Held, observation: Observation) -> Action:
+def fly(held: HeldInput, observation: Observation) -> Action:
     """Return how keys and sticks fly a drone: its ``velocity`` space."""
     ahead, aside = held.axis("y", "forward", "back"), -held.axis("x", "right", "left")
     climb, turn = held.axis("up", "up", "down"), held.axis("turn", "turn_left", "turn_right")

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from vico.agents.state import AgentState
+from vico.agents.base import AgentState
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError, VicoError
 from vico.llm import Connection, LanguageModel, Sampling, Usage
 from vico.llm.prompts import Prompt
@@ -48,13 +48,13 @@ def model_from_environment(*, method: str) -> LanguageModel:
     """
     named = tuple(sorted((key, value) for key, value in os.environ.items() if key.startswith(("VICO_LLM_", "OPENAI_"))))
     try:
-        return _shared(named)
+        return _shared_model(named)
     except InputError as error:
         raise InputError(f"method {method}: {error}") from None
 
 
 @lru_cache(maxsize=1)
-def _shared(named: tuple[tuple[str, str], ...]) -> LanguageModel:
+def _shared_model(named: tuple[tuple[str, str], ...]) -> LanguageModel:
     return LanguageModel.from_environment(dict(named), connection=_CONNECTION, sampling=_SAMPLING)
 
 

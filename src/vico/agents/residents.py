@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation
-from vico.agents.conversation import GREETING_DISTANCE, GREETING_PAUSE
-from vico.agents.strides import Stride, stride_lengths
-from vico.agents.talk.crowd_memory import CrowdMemory
+from vico.agents.talk.conversation import GREETING_DISTANCE, GREETING_PAUSE
+from vico.agents.talk.memory import CrowdMemory
+from vico.agents.wayfinding import Stride, stride_lengths
 from vico.clock import DAY
 from vico.crowd import Crowd
 from vico.world.walkable import WalkableMap
 
+__all__ = ["BatchResident", "Residents"]
 _LYING = 2
 _NEVER = -1e9
 
 
-class Resting(Protocol):
+class BatchResident(Protocol):
     """A resident that may have nothing to decide for a while, and remembers nothing new meanwhile."""
 
     @property
@@ -66,7 +67,7 @@ class Residents:
         Where they walk.
     """
 
-    def __init__(self, members: Mapping[str, Resting], walkable: WalkableMap) -> None:
+    def __init__(self, members: Mapping[str, BatchResident], walkable: WalkableMap) -> None:
         self._walkable = walkable
         self._members = list(members.values())
         self._number = {name: k for k, name in enumerate(members)}
@@ -191,6 +192,3 @@ class Residents:
             rows = np.array([crowd.index.get(name, -1) for name in self._number], np.int64)
             self._rows = crowd.index, rows
         return self._rows[1]
-
-
-__all__ = ["Residents", "Resting"]

@@ -8,25 +8,18 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Protocol
 
-from vico.agents.base import Action, Info, Observation, Plan
-from vico.agents.buying import Buyer
-from vico.agents.change_of_plans import ChangeOfPlans
-from vico.agents.conversation import Conversation, Errand, Speaker
+from vico.agents.activities import Buyer, Clerk, SeatSeeker
+from vico.agents.base import Action, AgentState, Info, Observation, Plan, generator_state, restore_generator
+from vico.agents.day_plan import DayPlanChanges, ScheduleItem, Stay, plan_of_day, stays_of, with_travel_times
 from vico.agents.indoor_walk import IndoorWalker
-from vico.agents.plans import plan_of_day
 from vico.agents.residents import Residents
-from vico.agents.resting import SeatSeeker
-from vico.agents.serving import Clerk
-from vico.agents.state import AgentState, generator_state, restore_generator
-from vico.agents.stays import Item, Stay, stays_of, with_ways
-from vico.agents.strides import Stride, pace_in_time, paces_of
 from vico.agents.talk.acquaintance import Acquaintance, acquaintances_of
-from vico.agents.talk.facts import Knowledge, moment_of, person_of
+from vico.agents.talk.answers import HEARING_RANGE, Knowledge, Talk, Talker, moment_of, person_of
+from vico.agents.talk.conversation import Conversation, Errand, Speaker
+from vico.agents.talk.grammar import activity_of
 from vico.agents.talk.memory import ResidentMemory
-from vico.agents.talk.phrases import activity_of
-from vico.agents.talk.talker import RANGE, Talk, Talker
 from vico.agents.travel import Traveller
-from vico.agents.wayfinding import Walker
+from vico.agents.wayfinding import Stride, Walker, speed_to_arrive, walking_speeds_of
 from vico.clock import DAY
 from vico.rules import DOOR_REACH
 from vico.seeds import rng
@@ -66,7 +59,7 @@ class Scheduled(Speaker, Protocol):
     """A resident, as the community has them."""
 
     @property
-    def schedule(self) -> Sequence[Item]:
+    def schedule(self) -> Sequence[ScheduleItem]:
         """The day without gaps."""
 
 
@@ -111,9 +104,9 @@ class ScheduleFollower:
         self.stride: Stride | None = None
         self.walks_until = -math.inf
         self._name = resident.id
-        self._ease, self._haste = paces or paces_of(resident.age)
+        self._ease, self._haste = paces or walking_speeds_of(resident.age)
         self._map = public_map
-        self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map, self._ease)
+        self._stays = with_travel_times(stays_of(resident.schedule, public_map.place_by_id), public_map, self._ease)
         nights = (stay.place for stay in self._stays if stay.type == "sleep")
         self._home = str(getattr(resident, "home", None) or next(nights, ""))
         self._rng = generator
@@ -131,7 +124,7 @@ class ScheduleFollower:
         people = {person.agent: person for person in known}
         self._talker = Talker(Knowledge(person_of(resident), public_map, people, names, memory, self._stays), talk)
         self._posture = "standing"
-        self._changes = ChangeOfPlans(public_map, self._stays, seed=seed, name=resident.id, age=resident.age)
+        self._changes = DayPlanChanges(public_map, self._stays, seed=seed, name=resident.id, age=resident.age)
         # So that not everybody takes a sip at once.
         self._offset = int(generator.integers(_ROUND))
         self._tried: set[str] = set()
@@ -273,7 +266,7 @@ class ScheduleFollower:
         if answered is None:
             return None
         self._conversation.meet(answered[0], observation["state"]["time"])
-        return {"type": "communicate", "text": answered[1], "range": RANGE}
+        return {"type": "communicate", "text": answered[1], "range": HEARING_RANGE}
 
     def _stay_at(self, second: float) -> Stay | None:
         departures = self._changes.departures
@@ -497,7 +490,7 @@ class ScheduleFollower:
         return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}
 
     def _pace(self, metres: float, seconds: float) -> float:
-        return pace_in_time(metres, seconds, self._ease, self._haste)
+        return speed_to_arrive(metres, seconds, self._ease, self._haste)
 
     def _travel(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         """Go by bus, tram or bicycle, as the schedule says; where that fails, as one gets there first."""

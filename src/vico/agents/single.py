@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Unpack
 
-from vico.agents.base import Action, Agent, Info, Observation, by_group
+from vico.agents.base import Action, Agent, Info, Observation, split_groups
 from vico.agents.schedule import followers_of
-from vico.envs.parallel import CommunityEnv, CommunitySource, WorldSource, make
-from vico.envs.single import Answers, SingleAgentEnv
+from vico.envs.parallel import Answers, CommunityEnv, CommunitySource, SingleAgentEnv, WorldSource, make
 from vico.envs.spec import EnvOptions
-from vico.envs.vector import VectorAgentEnv, makers
+from vico.envs.vector import VectorAgentEnv, env_makers
 
 
 def residents_of(env: CommunityEnv, seed: int) -> Mapping[str, Agent]:
@@ -21,12 +20,12 @@ def residents_of(env: CommunityEnv, seed: int) -> Mapping[str, Agent]:
     return {name: follower for name, follower in followers.items() if name in env.possible_agents}
 
 
-def answers_of(agents: Mapping[str, Agent]) -> Answers:
+def action_function(agents: Mapping[str, Agent]) -> Answers:
     """Return what asks agents for their actions: those that belong together at once, the others one by one.
 
     An error of an agent's is raised.
     """
-    groups, alone = by_group(agents)
+    groups, alone = split_groups(agents)
 
     def answers(observations: Mapping[str, Observation], infos: Mapping[str, Info]) -> dict[str, Action]:
         found: dict[str, Action] = {}
@@ -44,9 +43,9 @@ def answers_of(agents: Mapping[str, Agent]) -> Answers:
     return answers
 
 
-def residents_together(env: CommunityEnv, seed: int) -> Answers:
+def residents_as_group(env: CommunityEnv, seed: int) -> Answers:
     """Return what asks all residents that take part, who follow their schedules."""
-    return answers_of(residents_of(env, seed))
+    return action_function(residents_of(env, seed))
 
 
 def make_single(
@@ -72,7 +71,7 @@ def make_single(
         If there is no such agent, or the community belongs to another world.
     """
     given: EnvOptions = {"assistants": 1, "observe": (agent,), **options}
-    return SingleAgentEnv(make(world, community, **given), agent, others=residents_together)
+    return SingleAgentEnv(make(world, community, **given), agent, others=residents_as_group)
 
 
 def make_vec(
@@ -102,4 +101,4 @@ def make_vec(
         If an environment cannot be made: no such agent, a community of another world.
     """
     given = {"agent": agent, **options}
-    return VectorAgentEnv(makers(make_single, world, community, num_envs=num_envs, options=given))
+    return VectorAgentEnv(env_makers(make_single, world, community, num_envs=num_envs, options=given))

@@ -1,25 +1,173 @@
-"""Travelling: follows a planned trip leg by leg, on foot, by bus, tram and bicycle, and plans anew when it fails."""
+"""Travelling by a trip: on foot, by bus, tram and bicycle, leg by leg, and planning anew when a trip fails.
+
+Legs of a trip under way are saved as plain data. A bicycle with its rider is longer than wide and does not go
+backwards, so in a narrow passage it can't be turned about where it stands. `find_way_out` finds the few turns and
+metres straight on that lead out, by breadth-first search over where the bicycle is and which way it points.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Sequence
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, Info, Observation, heading
-from vico.agents.narrow_places import way_out
-from vico.agents.saved_trips import leg_state, restored_leg
-from vico.agents.state import AgentState
-from vico.agents.stays import RUN
+from vico.agents.base import Action, AgentState, Info, Observation, heading
+from vico.agents.day_plan import RUN_PACE
 from vico.agents.wayfinding import Walker, closed_ground
 from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, TRAM_WIDTH, WALK_SPEED, ReasonCode, code_name
+from vico.world.model import Point2
 from vico.world.public import PublicMap
 from vico.world.transit_model import Line, Stop, TramLine, TramStop
 from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
-from vico.world.walkable import ROADWAY
+from vico.world.walkable import ROADWAY, WalkableMap
+
+__all__ = [
+    "TURNING_CLEARANCE",
+    "Traveller",
+    "TripPlanner",
+    "can_ride_out",
+    "find_way_out",
+    "leg_from_state",
+    "leg_state",
+]
+_LEG_FIELDS = ("mode", "depart", "arrive", "metres", "price", "line", "origin", "destination")
+
+
+def leg_state(leg: Leg) -> dict[str, Any]:
+    """Return a leg as plain data."""
+    fields = {name: getattr(leg, name) for name in _LEG_FIELDS}
+    return fields | {"start": list(leg.start), "end": list(leg.end), "polyline": leg.polyline.copy()}
+
+
+def leg_from_state(state: dict[str, Any]) -> Leg:
+    """Return the leg that `leg_state` returned as data."""
+    start, end = ((float(x), float(y)) for x, y in (state["start"], state["end"]))
+    polyline = np.array(state["polyline"], np.float64).reshape(-1, 2)
+    return Leg(start=start, end=end, polyline=polyline, **{name: state[name] for name in _LEG_FIELDS})
+
+
+#: Where walls are no nearer than this, metres, a bicycle is turned about with ease.
+TURNING_CLEARANCE = 0.9
+# Room to walls that a bicycle needs, metres, at these points along it.
+_SIDE_CLEARANCE = 0.28
+_BICYCLE_SAMPLES = (-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6)
+# Steps of the search: degrees of a turn and metres of a ride, and how fine places are told apart.
+_TURN_STEP, _RIDE_STEP, _SEARCH_CELL = 15, 0.5, 0.25
+_HEADINGS = 360 // _TURN_STEP
+_MAX_SEARCH_NODES = 1500
+# Where one gets on: on the spot or a step or two aside, as the rules of mounting have it.
+_MOUNT_OFFSETS = [(0.0, 0.0)] + [
+    (r * math.cos(k * math.pi / 4), r * math.sin(k * math.pi / 4)) for r in (0.9, 1.8) for k in range(8)
+]
+
+# x, y and the direction: steps of `_DEGREES` from where the bicycle points at first.
+_BicyclePose = tuple[float, float, int]
+
+
+def find_way_out(walkable: WalkableMap, position: Sequence[float], heading: float) -> list[Action] | None:
+    """Return the fewest actions that bring a bicycle to where it is turned about with ease.
+
+    Parameters
+    ----------
+    position
+        Of the rider, ENU metres.
+    heading
+        Counter-clockwise from east, radians.
+
+    Returns
+    -------
+    list of dict or None
+        Empty where it is wide already; None if no way out was found.
+    """
+    x, y = float(position[0]), float(position[1])
+    found = _search_manoeuvre(walkable, [(x, y, 0)], heading)
+    if found is None:
+        return None
+    actions: list[Action] = []
+    for (ax, ay, before), (bx, by, after) in pairwise(found):
+        if before == after:
+            # Whole steps: by rounding alone the longest would be a little more than is allowed.
+            steps = round(math.hypot(bx - ax, by - ay) / _RIDE_STEP)
+            actions.append({"type": "move_forward", "distance": steps * _RIDE_STEP})
+        else:
+            turn = ((after - before) * _TURN_STEP + 180) % 360 - 180
+            actions.append({"type": "turn_left" if turn > 0 else "turn_right", "degrees": float(abs(turn))})
+    return actions
+
+
+def can_ride_out(walkable: WalkableMap, station: Point2) -> bool:
+    """Return whether a bicycle that one gets on at a station can be ridden to where there is room to turn it."""
+    poses = [
+        (station[0] + east, station[1] + north, turned)
+        for east, north in _MOUNT_OFFSETS
+        for turned in range(0, _HEADINGS, 45 // _TURN_STEP)
+    ]
+    return _search_manoeuvre(walkable, [pose for pose in poses if _bicycle_fits(walkable, pose, 0.0)], 0.0) is not None
+
+
+def _search_manoeuvre(
+    walkable: WalkableMap, starts: Sequence[_BicyclePose], heading: float
+) -> list[_BicyclePose] | None:
+    """Return the poses from a start to where it is wide, with the fewest actions; None if there are none."""
+    before: dict[tuple[int, int, int], _BicyclePose | None] = {}
+    queue: deque[_BicyclePose] = deque()
+    for pose in starts:
+        if _pose_key(pose) not in before:
+            before[_pose_key(pose)] = None
+            queue.append(pose)
+    for _ in range(_MAX_SEARCH_NODES):
+        if not queue:
+            return None
+        pose = queue.popleft()
+        if walkable.clearance_of(pose[0], pose[1]) >= TURNING_CLEARANCE:
+            return _backtrack(before, pose)
+        for onward in _next_poses(walkable, pose, heading):
+            if _pose_key(onward) not in before:
+                before[_pose_key(onward)] = pose
+                queue.append(onward)
+    return None
+
+
+def _next_poses(walkable: WalkableMap, pose: _BicyclePose, heading: float) -> Iterator[_BicyclePose]:
+    """Yield where one action leads: straight on, or turned to either side as far as nothing is in the way."""
+    x, y, turned = pose
+    angle = heading + math.radians(turned * _TURN_STEP)
+    for k in range(1, int(BIKE_SPEED / _RIDE_STEP) + 1):
+        ahead = (x + k * _RIDE_STEP * math.cos(angle), y + k * _RIDE_STEP * math.sin(angle), turned)
+        if not _bicycle_fits(walkable, ahead, heading):
+            break
+        yield ahead
+    for side in (1, -1):
+        for k in range(1, _HEADINGS // 2 + 1):
+            about = (x, y, (turned + side * k) % _HEADINGS)
+            if not _bicycle_fits(walkable, about, heading):
+                break
+            yield about
+
+
+def _bicycle_fits(walkable: WalkableMap, pose: _BicyclePose, heading: float) -> bool:
+    x, y, turned = pose
+    angle = heading + math.radians(turned * _TURN_STEP)
+    c, s = math.cos(angle), math.sin(angle)
+    return all(walkable.clearance_of(x + along * c, y + along * s) >= _SIDE_CLEARANCE for along in _BICYCLE_SAMPLES)
+
+
+def _pose_key(pose: _BicyclePose) -> tuple[int, int, int]:
+    return round(pose[0] / _SEARCH_CELL), round(pose[1] / _SEARCH_CELL), pose[2]
+
+
+def _backtrack(before: dict[tuple[int, int, int], _BicyclePose | None], pose: _BicyclePose) -> list[_BicyclePose]:
+    found = [pose]
+    while (parent := before[_pose_key(found[-1])]) is not None:
+        found.append(parent)
+    return found[::-1]
+
 
 # This near to where one waits for a bus, or to a rack, is there, metres. At a stop something or others may stand in the
 # spot: then beside it will do, but not on the road or so near to the middle of a track, where one would keep the bus or
@@ -39,20 +187,20 @@ _LATE, _LOST = 240.0, 300.0
 _GRACE = 60.0
 # After so many seconds of trying when the bus should be there one steps back from the road for as long, so many metres;
 # who stands on the road or a track for as long, as one gets no nearer to a stop, does without it.
-_IN_THE_WAY, _BACK = 15, 2.5
+_IN_THE_WAY, _STEP_BACK = 15, 2.5
 # From so long before a bus is to leave who waits beside the place for it tries to come up to it, seconds.
 _COMES_UP = 10.0
 # So long before a bus is to leave one tries to board: it stands for half a minute, and may be early.
 _EARLY = 2 * BUS_DWELL
 # Stands who has moved less than this in a second, metres; a bus stands that has for so many seconds.
-_STILL, _STANDS = 0.05, 3
+_STILL, _STANDSTILL_SECONDS = 0.05, 3
 # How often one looks for another spot to get on a bicycle before going elsewhere.
 _TRIES = 4
 # How often one tries to turn a bicycle where it is narrow before leaving it there: that costs as much as 100 minutes.
 _PUSHES = 120
 
 #: Modes in which one is taken along.
-_RIDDEN = ("bus", "tram")
+_TRANSIT_MODES = ("bus", "tram")
 
 _NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY, _CLOSED, _HIT_BODY = map(
     code_name,
@@ -106,7 +254,7 @@ class Traveller:
         *,
         modes: Collection[str] = MODES,
         planner: TripPlanner | None = None,
-        fastest: float = RUN,
+        fastest: float = RUN_PACE,
     ) -> None:
         self._map = public_map
         self._rng = generator
@@ -156,7 +304,7 @@ class Traveller:
         """Go on with the trip that `state` returned."""
         self._walker.restore(state["walker"])
         self._goal = None if state["goal"] is None else (float(state["goal"][0]), float(state["goal"][1]))
-        legs = tuple(restored_leg(state["legs"][str(k)]) for k in range(len(state["legs"])))
+        legs = tuple(leg_from_state(state["legs"][str(k)]) for k in range(len(state["legs"])))
         self.trip = None if state["depart"] is None else Trip(float(state["depart"]), legs)
         self.plans, self._leg = int(state["plans"]), int(state["leg"])
         self._closed, self._asked = [str(name) for name in state["closed"]], str(state["asked"])
@@ -173,7 +321,11 @@ class Traveller:
     @property
     def waits_for_bus(self) -> bool:
         """Whether it stands at a stop until its bus comes."""
-        return self.trip is not None and self._leg < len(self.trip.legs) and self.trip.legs[self._leg].mode in _RIDDEN
+        return (
+            self.trip is not None
+            and self._leg < len(self.trip.legs)
+            and self.trip.legs[self._leg].mode in _TRANSIT_MODES
+        )
 
     @property
     def way(self) -> list[tuple[float, float]]:
@@ -236,7 +388,7 @@ class Traveller:
         leg = self._leg_on_foot(goal, observation)
         if leg is None:
             return None
-        if leg.mode in _RIDDEN:
+        if leg.mode in _TRANSIT_MODES:
             return self._board(leg, observation, info)
         if leg.mode == "bike":
             return self._mount(leg, observation, info)
@@ -251,9 +403,9 @@ class Traveller:
         """Begin the ride from as near as one gets, as others stand in the place for it; do without it from farther."""
         assert self.trip is not None
         ride = self.trip.legs[self._leg + 1]
-        away = _away(observation, ride.start)
+        away = _distance_to(observation, ride.start)
         # Nobody waits at a rack: there one is in no bus's way.
-        is_in_the_way = ride.mode in _RIDDEN and self._is_in_the_way(observation["pose"][:2])
+        is_in_the_way = ride.mode in _TRANSIT_MODES and self._is_in_the_way(observation["pose"][:2])
         if away > _BY_OTHERS or (is_in_the_way and self._still >= _IN_THE_WAY):
             self._close(leg)
         elif not is_in_the_way:
@@ -267,7 +419,7 @@ class Traveller:
         if trip is not None and self._asked in ("exit_bus", "exit_bike"):
             # Got off: where it was planned, or somewhere else.
             leg = trip.legs[self._leg]
-            if _away(observation, leg.end) > _BUS_AT_STOP:
+            if _distance_to(observation, leg.end) > _BUS_AT_STOP:
                 trip = None
             self._leg, self._tries = self._leg + 1, 0
         self.trip = trip
@@ -308,14 +460,14 @@ class Traveller:
         """Return the speed on foot at which the bus that comes next is not missed, if that can be done."""
         trip = self.trip
         ride = trip.legs[self._leg + 1] if trip is not None and self._leg + 1 < len(trip.legs) else None
-        if ride is None or ride.mode not in _RIDDEN:
+        if ride is None or ride.mode not in _TRANSIT_MODES:
             return speed
         left = ride.depart - AHEAD - float(observation["state"]["time"])
         return max(speed, min(self._fastest, self.remaining(observation["pose"]) / max(left, 1.0)))
 
     def _is_at_the_ride(self, ride: Leg, observation: Observation) -> bool:
         """Return whether one stands where a ride begins."""
-        away = _away(observation, ride.start)
+        away = _distance_to(observation, ride.start)
         if ride.mode == "bike":
             return away <= _AT_RACK
         state = observation["state"]
@@ -352,7 +504,7 @@ class Traveller:
             return {"type": "wait"}
         if self._asked == "enter_bus" and state["action_code"] == _NO_VEHICLE and now > leg.depart - BUS_DWELL:
             self._tries += 1
-            if now > leg.depart - _COMES_UP and _away(observation, leg.start) > _BY_STOP:
+            if now > leg.depart - _COMES_UP and _distance_to(observation, leg.start) > _BY_STOP:
                 # Others who stand there go when their bus comes.
                 step = self._walker.towards(leg.start, WALK_SPEED, observation, info)
                 if step is not None:
@@ -376,7 +528,7 @@ class Traveller:
         rows, columns = np.nonzero(walkable.cls[low_y : int(iy) + k + 1, low_x : int(ix) + k + 1] == ROADWAY)
         road = walkable.centre_of(np.column_stack([columns + low_x, rows + low_y]))
         around = np.arange(0.0, 2 * math.pi, math.pi / 8)
-        ring = here + _BACK * np.column_stack([np.cos(around), np.sin(around)])
+        ring = here + _STEP_BACK * np.column_stack([np.cos(around), np.sin(around)])
         ring = ring[walkable.is_connected(ring) & (walkable.clearance_at(ring) >= 0.3)]
         if not len(road) or not len(ring):
             return spot
@@ -388,12 +540,12 @@ class Traveller:
         """Stay in until the bus stands where one wants to get off."""
         trip = self.trip
         leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
-        if leg is None or leg.mode not in _RIDDEN:
+        if leg is None or leg.mode not in _TRANSIT_MODES:
             return {"type": "exit_bus"}
-        if _away(observation, leg.end) <= _BUS_AT_STOP:
+        if _distance_to(observation, leg.end) <= _BUS_AT_STOP:
             return {"type": "exit_bus"}
         late = float(observation["state"]["time"]) > leg.arrive + _LOST
-        if self._still >= _STANDS and (late or self._is_off_the_line(leg, observation)):
+        if self._still >= _STANDSTILL_SECONDS and (late or self._is_off_the_line(leg, observation)):
             return {"type": "exit_bus"}
         return {"type": "wait"}
 
@@ -401,7 +553,7 @@ class Traveller:
         """Return whether the bus stands at a stop of other lines only: it is not the one that was meant."""
         stops: list[Stop | TramStop] = [*self._map.stops, *self._map.tram_stops]
         lines: list[Line | TramLine] = [*self._map.lines, *self._map.tram_lines]
-        near = [stop.id for stop in stops if _away(observation, stop.wait) <= _BUS_AT_STOP]
+        near = [stop.id for stop in stops if _distance_to(observation, stop.wait) <= _BUS_AT_STOP]
         mine = next(line.stops for line in lines if line.id == leg.line)
         return bool(near) and not any(stop in mine for stop in near)
 
@@ -434,7 +586,7 @@ class Traveller:
             freed = self._freed(observation)
             return freed or self._walker.towards(leg.end, BIKE_SPEED, observation, info, room=_TURNING)
         end = leg.end if leg is not None and leg.mode == "bike" else self._nearest_station(observation)
-        if end is None or _away(observation, end) <= _TO_RACK:
+        if end is None or _distance_to(observation, end) <= _TO_RACK:
             refused = self._asked == "exit_bike" and observation["state"]["action_code"] == _NO_FREE_SPOT
             if end is None or not refused:
                 return {"type": "exit_bike"}
@@ -442,7 +594,7 @@ class Traveller:
         if freed is not None:
             return freed
         action = self._walker.towards(end, BIKE_SPEED, observation, info, room=_TURNING)
-        if action is None and _away(observation, end) > _TO_RACK:
+        if action is None and _distance_to(observation, end) > _TO_RACK:
             # Where there is room to turn is not near enough: the rest of the way is narrow.
             self._walker.stop()
             action = self._walker.towards(end, BIKE_SPEED, observation, info)
@@ -474,13 +626,13 @@ class Traveller:
 
     def _out_of_narrow_place(self, observation: Observation) -> Action | None:
         """Return the first action on the way to where a bicycle can be turned, the others to come; None if it can."""
-        self._out = way_out(self._map.walkable, observation["pose"][:2], heading(observation)) or []
+        self._out = find_way_out(self._map.walkable, observation["pose"][:2], heading(observation)) or []
         self._walker.stop()
         return self._out.pop(0) if self._out else None
 
     def _nearest_station(self, observation: Observation) -> tuple[float, float] | None:
         spots = [(s.position[0], s.position[1]) for s in self._map.bike_stations]
-        return min(spots, key=lambda spot: _away(observation, spot), default=None)
+        return min(spots, key=lambda spot: _distance_to(observation, spot), default=None)
 
     def _close(self, leg: Leg) -> Action:
         """Do without the place where a ride should have begun."""
@@ -496,9 +648,6 @@ class Traveller:
         return {"type": "wait"}
 
 
-def _away(observation: Observation, point: tuple[float, ...]) -> float:
+def _distance_to(observation: Observation, point: tuple[float, ...]) -> float:
     x, y = observation["pose"][:2]
     return math.hypot(float(x) - point[0], float(y) - point[1])
-
-
-__all__ = ["Traveller", "TripPlanner"]

@@ -1,20 +1,128 @@
-"""Walking to a point by turning and stepping ahead, from what one sees and the public map."""
+"""Walking outdoors: the walker that follows paths of the public map, and the same rules in arrays for many residents.
+
+`Walker` turns and steps ahead from what it sees and the public map. `stride_lengths` finds in arrays who goes straight
+to a corner with nothing on the way to decide. Its rules are the walker's; whoever is near the bounds of one of them is
+to be asked.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, Info, Observation, heading, wrapped
-from vico.agents.state import AgentState
-from vico.agents.strides import ALONG, CORNER, DRIFT, NARROW, NARROW_DRIFT, ROAD
-from vico.rules import ReasonCode, code_name
+from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.day_plan import EASY_PACE, RUN_PACE, SLACK, SLACK_SHARE
+from vico.rules import ReasonCode, code_name, walk_speed
 from vico.world.public import PublicMap
+from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
+
+#: Corners count as passed this close, metres.
+CORNER = 0.35
+#: Off the line by more than this after a step means turning first, metres; where there is no more room than `NARROW`
+#: metres anywhere along the step, by more than `NARROW_DRIFT`.
+DRIFT, NARROW, NARROW_DRIFT = 0.12, 0.6, 0.03
+#: Shares of a step at which the room to walls is looked at.
+CLEARANCE_SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: Surfaces that are not stepped on without a look for vehicles.
+ROAD_SURFACES = (ROADWAY, CROSSING)
+
+# Sines and roots may differ by less than this between one and many, metres.
+_MARGIN = 1e-6
+
+
+class Stride(NamedTuple):
+    """What somebody on a straight way goes on with, outdoors and on foot.
+
+    Attributes
+    ----------
+    x, y
+        The corner ahead, ENU metres.
+    left
+        From the corner to the end of the way, metres.
+    pace
+        Metres a second; NaN: as the time left until `due` asks for.
+    due
+        When to be there, second of the day.
+    ease, haste
+        Pace with time to spare, and when late, metres a second.
+    place_x, place_y, least, most
+        A point, ENU metres, and between which distances from it nothing changes, metres.
+    """
+
+    x: float
+    y: float
+    left: float
+    pace: float
+    due: float
+    ease: float
+    haste: float
+    place_x: float
+    place_y: float
+    least: float
+    most: float
+
+
+def stride_lengths(
+    strides: NDArray[np.float64], pose: NDArray[np.float64], second: float, walkable: WalkableMap
+) -> NDArray[np.float64]:
+    """Return how far ahead each of some walkers goes in the coming second, metres; NaN for those with a decision.
+
+    Parameters
+    ----------
+    strides
+        Rows of `Stride`, shape ``(n, 11)``.
+    pose
+        As observations have it, shape ``(n, 6)``.
+    second
+        Of the day.
+    """
+    corner_x, corner_y, left, pace, due, ease, haste, place_x, place_y, least, most = strides.T
+    x, y, heading_x, heading_y = pose[:, 0], pose[:, 1], pose[:, 3], pose[:, 4]
+    east, north = corner_x - x, corner_y - y
+    away = np.sqrt(east * east + north * north)
+    speed = np.where(np.isnan(pace), _speeds_to_arrive(away + left, due - second, ease, haste), pace)
+    far = np.hypot(x - place_x, y - place_y)
+    goes = (away > np.maximum(speed, CORNER) + _MARGIN) & (far > least + _MARGIN) & (far < most - _MARGIN)
+    scale = 1.0 / np.maximum(away, 1e-9)
+    aside = speed * np.abs(heading_x * north - heading_y * east) * scale / np.hypot(heading_x, heading_y)
+    position = np.column_stack([x, y])
+    room = walkable.clearance_at(position)
+    norm = speed / np.hypot(heading_x, heading_y)
+    for share in CLEARANCE_SAMPLES[1:]:
+        step = np.column_stack([x + share * norm * heading_x, y + share * norm * heading_y])
+        room = np.minimum(room, walkable.clearance_at(step))
+    allowed = np.where(room > NARROW + _MARGIN, DRIFT, NARROW_DRIFT)
+    goes &= (aside < allowed - _MARGIN) & (heading_x * east + heading_y * north > 0.0)
+    ahead = np.column_stack([x + east * scale, y + north * scale])
+    goes &= np.isin(walkable.class_at(position), ROAD_SURFACES) | ~np.isin(walkable.class_at(ahead), ROAD_SURFACES)
+    return np.where(goes, speed, np.nan)
+
+
+def walking_speeds_of(age: float) -> tuple[float, float]:
+    """Return how fast somebody goes who has time, and who is late, metres a second."""
+    ease = walk_speed(age)
+    # Past sixty people run less and less, and past ninety they walk quickly at most.
+    slower = min(max((age - 60.0) / 30.0, 0.0), 1.0)
+    return ease, RUN_PACE + (1.25 * ease - RUN_PACE) * slower
+
+
+def speed_to_arrive(metres: float, seconds: float, ease: float = EASY_PACE, haste: float = RUN_PACE) -> float:
+    """Return how fast to walk, m/s: at ease while there is time, briskly when it gets short, and to run when late."""
+    return min(haste, max(ease, metres * (1.0 + SLACK_SHARE) / max(1.0, seconds - SLACK)))
+
+
+def _speeds_to_arrive(
+    metres: NDArray[np.float64], seconds: NDArray[np.float64], ease: NDArray[np.float64], haste: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the same as `speed_to_arrive`, to the last bit, for many."""
+    needed = metres * (1.0 + SLACK_SHARE) / np.maximum(1.0, seconds - SLACK)
+    return np.asarray(np.minimum(haste, np.maximum(ease, needed)), np.float64)
+
 
 VEHICLES = ("car", "bus", "bicycle", "tram", "cyclist")
 # The last point of a path is walked to more closely than other corners, metres.
@@ -24,13 +132,13 @@ _CAR_NEAR, _PATIENCE = 9.0, 8
 # Red is waited for this long, seconds; and it counts this far beside its crossing, metres.
 _SIGNAL_PATIENCE, _BESIDE = 150, 0.5
 # A goal that moved no farther than this is the same one still; and from so far from walls there is much room, metres.
-_SAME, _WIDE = 12.0, 1.5
+_SAME_GOAL, _WIDE = 12.0, 1.5
 # Radius of what is taken to be closed where one keeps being stopped, and its growth each time, metres.
-_BLOCK, _GROW = 0.5, 0.4
+_BLOCK, _BLOCK_GROWTH = 0.5, 0.4
 # Who stepped aside joins its way again this far on, metres, unless that is longer than straight on by so much.
 _REJOIN, _DETOUR = 8.0, 6.0
 # Degrees one turns for a step aside, and for one back; who is stopped so often steps back, for aside it is no wider.
-_ASIDE, _BACK, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
+_ASIDE_ANGLES, _BACK_ANGLES, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 # Who rides and is stopped by a vehicle lets it pass, so many times two seconds: a tram is long and stands at stops.
 _LETS_PASS, _LETS_TRAM_PASS = 2, 15
@@ -39,7 +147,7 @@ _FROM_EDGE, _FROM_OTHERS = 0.3, 0.55
 # On foot one steps so far back from a vehicle, metres, and lets it pass until it has stopped one so often.
 _STEPS_BACK, _LETS_BY = 0.8, 3
 # Who rides steps aside where there is so much room to walls, metres, that the bicycle can be turned there.
-_TURNED = 0.9
+_TURNING_ROOM = 0.9
 
 Point = tuple[float, float]
 
@@ -116,7 +224,7 @@ class Walker:
             return 0.0
         corner = self._path[self._next]
         east, north = corner[0] - float(position[0]), corner[1] - float(position[1])
-        # As `vico.agents.strides` reckons for many, to the last bit.
+        # As `vico.agents.wayfinding` reckons for many, to the last bit.
         return math.sqrt(east * east + north * north) + self._left[self._next]
 
     @property
@@ -157,7 +265,7 @@ class Walker:
             self._avoid(avoided)
         if goal != self._goal:
             # Who goes after somebody has a goal that moves: what stands in the way is passed all the same.
-            if self._goal is None or math.dist(goal, self._goal) > _SAME:
+            if self._goal is None or math.dist(goal, self._goal) > _SAME_GOAL:
                 self._closed, self._blocked, self._aside = [], 0, []
             self._goal = goal
             self._plan(position)
@@ -249,10 +357,10 @@ class Walker:
         east, north = corner[0] - position[0], corner[1] - position[1]
         away = math.sqrt(east * east + north * north)
         yaw = heading(observation)
-        error = wrapped(math.atan2(north, east) - yaw)
+        error = wrap_angle(math.atan2(north, east) - yaw)
         stride = min(away, speed)
         # Where it is narrow there is no room for drifting: all along the step, for a post may stand beside it.
-        room = min(self._room(_ahead(position, yaw, stride * share)) for share in ALONG)
+        room = min(self._room(_point_ahead(position, yaw, stride * share)) for share in CLEARANCE_SAMPLES)
         drift = NARROW_DRIFT if room <= NARROW else DRIFT if room <= _WIDE else self.wide_drift
         if abs(error) > 1e-3 and (abs(stride * math.sin(error)) > drift or math.cos(error) <= 0.0):
             return {"type": "turn_left" if error > 0 else "turn_right", "degrees": abs(math.degrees(error))}
@@ -269,7 +377,7 @@ class Walker:
     def _should_let_pass(self, position: Point, ahead: Point, observation: Observation, info: Info) -> bool:
         """Whether one stands at the kerb, with the point a metre ahead on the road, and a vehicle is near."""
         surface = self._map.walkable.class_of
-        if surface(*position) in ROAD or surface(*ahead) not in ROAD:
+        if surface(*position) in ROAD_SURFACES or surface(*ahead) not in ROAD_SURFACES:
             return False
         if self._waited < _SIGNAL_PATIENCE and shows_red(ahead, info):
             return True
@@ -292,21 +400,21 @@ class Walker:
         if not self._turns_in and self._steps_back_from_vehicle(position, yaw, patience):
             return
         if self._blocked % 4 == 0:
-            x, y = _ahead(position, yaw, 0.9)
+            x, y = _point_ahead(position, yaw, 0.9)
             # Stopped near a closed spot again: what stands there is wider than was thought.
             again = sum(math.dist((x, y), spot[:2]) < 2.5 for spot in self._closed)
-            self._closed = [*self._closed[-5:], (x, y, _BLOCK + _GROW * again)]
+            self._closed = [*self._closed[-5:], (x, y, _BLOCK + _BLOCK_GROWTH * again)]
         # Everybody passes on the right, mostly: so two who meet don't mirror each other.
         first = -1.0 if self._rng.random() < 0.8 else 1.0
-        least = _TURNED if self._turns_in and self._room(position) >= _TURNED else 0.3
+        least = _TURNING_ROOM if self._turns_in and self._room(position) >= _TURNING_ROOM else 0.3
         for side in (first, -first):
-            for degrees in _ASIDE if self._blocked < _BACK_FROM else _BACK:
+            for degrees in _ASIDE_ANGLES if self._blocked < _BACK_FROM else _BACK_ANGLES:
                 angle = yaw + side * math.radians(degrees)
                 reach = 0.8 + 0.2 * min(self._blocked, 4)
-                if _meets_others(position, angle, reach, info):
+                if _runs_into_people(position, angle, reach, info):
                     continue
-                if self._room(_ahead(position, angle, reach)) >= least and (
-                    self._room(_ahead(position, angle, reach / 2)) >= 0.28
+                if self._room(_point_ahead(position, angle, reach)) >= least and (
+                    self._room(_point_ahead(position, angle, reach / 2)) >= 0.28
                 ):
                     turn = "turn_left" if side > 0 else "turn_right"
                     self._aside = [{"type": turn, "degrees": degrees}, {"type": "move_forward", "distance": reach}]
@@ -318,7 +426,7 @@ class Walker:
         if not 1 < self._blocked <= min(patience, _LETS_BY):
             return False
         waits: list[Action] = [{"type": "wait"}] * (2 * self._blocked)
-        if self._blocked == 2 and self._room(_ahead(position, yaw + math.pi, _STEPS_BACK)) >= 0.3:
+        if self._blocked == 2 and self._room(_point_ahead(position, yaw + math.pi, _STEPS_BACK)) >= 0.3:
             waits = [{"type": "turn_left", "degrees": 180.0}, {"type": "move_forward", "distance": _STEPS_BACK}, *waits]
         self._aside = waits
         return True
@@ -352,11 +460,11 @@ def _patience_with(observation: Observation) -> int:
     return _LETS_PASS if what in VEHICLES else 0
 
 
-def _ahead(position: Point, yaw: float, reach: float) -> Point:
+def _point_ahead(position: Point, yaw: float, reach: float) -> Point:
     return position[0] + reach * math.cos(yaw), position[1] + reach * math.sin(yaw)
 
 
-def _meets_others(position: Point, angle: float, reach: float, info: Info) -> bool:
+def _runs_into_people(position: Point, angle: float, reach: float, info: Info) -> bool:
     """Return whether a step aside would lead into people whom one has in view."""
     if "in_view" not in info:
         return False

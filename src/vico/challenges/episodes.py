@@ -16,8 +16,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from vico.challenges.records import Challenge, EpisodeRecord, Job, Progress, setting_of_task
-from vico.challenges.registry import foreign_parts
+from vico.challenges.records import Challenge, EpisodeRecord, Job, Progress, foreign_parts, setting_of_task
 from vico.errors import OutputError, SchemaError, VicoError, line_of, sentence_of
 from vico.io.data_files import own_folder
 from vico.io.files import json_bytes
@@ -101,7 +100,7 @@ class Player:
         OutputError
             If nothing can be written: that is no episode's fault, and there is no use in going on.
         """
-        told = None if progress is None else partial(_told, progress, label_of(job))
+        told = None if progress is None else partial(_report_progress, progress, label_of(job))
         try:
             return self._play(job, told)
         except OutputError:
@@ -228,7 +227,7 @@ def _check(challenge: Challenge, record: EpisodeRecord) -> None:
             raise ValueError(f"part {part.name!r}: success {part.success} with the cause {part.cause!r}")
 
 
-def _told(progress: Progress, label: str, _: str, step: int, limit: int) -> None:
+def _report_progress(progress: Progress, label: str, _: str, step: int, limit: int) -> None:
     """Tell how far an episode is, under a name that no other one has."""
     progress(label, step, limit)
 

@@ -174,8 +174,8 @@ def dataset_check(path: Positional[Path], json: bool = False) -> int:
         json: Print JSON.
     """
     from vico.cli.output import print_json, progress_bars
-    from vico.datasets.checking import findings_of
     from vico.datasets.folder import Dataset
+    from vico.datasets.inspection import findings_of
 
     dataset = Dataset(path)
     with progress_bars() as report:
@@ -206,8 +206,8 @@ def dataset_show(
         json: Print the frames' values as JSON.
     """
     from vico.cli.output import print_json
-    from vico.datasets.contact_sheet import write_contact_sheet
     from vico.datasets.folder import Dataset
+    from vico.datasets.inspection import write_contact_sheet
 
     if out.exists() and not force:
         raise OutputExistsError(f"{out}: exists; give another name, or --force")
@@ -235,7 +235,7 @@ def dataset_export(
         force: Replace a file that is there.
     """
     from vico.cli.output import progress_bars
-    from vico.datasets.rerun_export import write_rerun  # an extra's
+    from vico.datasets.inspection import write_rerun  # an extra's
 
     if out.exists() and not force:
         raise OutputExistsError(f"{out}: exists; give another name, or --force")
@@ -247,10 +247,9 @@ def dataset_export(
 
 def request_of(options: DatasetOptions) -> BuildRequest:
     """Return what the library is asked for."""
-    from vico.challenges.assistant.thresholds import SUBTASKS
-    from vico.challenges.pick_place.task import SECONDS
-    from vico.datasets.build import BuildRequest, Contents
-    from vico.datasets.splits import SplitRule
+    from vico.challenges.assistant.tasks import SUBTASKS
+    from vico.challenges.pick_place.tasks import SECONDS
+    from vico.datasets.build import BuildRequest, Contents, SplitRule
     from vico.runner.foreign import Terms
     from vico.threads import workers as processors
 

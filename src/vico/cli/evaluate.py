@@ -15,15 +15,21 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from vico.challenges.assistant.thresholds import SUBTASKS
+from vico.challenges.assistant.tasks import SUBTASKS
 from vico.challenges.episodes import Outcome, label_of
 from vico.challenges.evaluation import Finished, evaluate, jobs_for
-from vico.challenges.records import Challenge, Setting
+from vico.challenges.records import Challenge, Setting, foreign_parts, load_challenge
 from vico.challenges.records import Progress as Told
-from vico.challenges.registry import foreign_parts, load_challenge
-from vico.challenges.tables.files import EVALUATION_FOLDER, results_content, write_results
-from vico.challenges.tables.markdown import fault_lines, not_played_lines, results_page, time_lines
-from vico.challenges.tables.published import published_rows
+from vico.challenges.tables.results import (
+    EVALUATION_FOLDER,
+    fault_lines,
+    not_played_lines,
+    published_rows,
+    results_content,
+    results_page,
+    time_lines,
+    write_results,
+)
 from vico.challenges.tables.summary import summarise
 from vico.cli.evaluation_options import (
     AssistantOptions,
@@ -40,8 +46,7 @@ from vico.errors import InputError, OutputError, OutputExistsError
 from vico.io.files import write_errors
 from vico.io.folders import is_being_written, new_folder
 from vico.io.stores import Store, is_url, store_at
-from vico.runner.foreign import Terms
-from vico.runner.isolated import check_loads
+from vico.runner.foreign import Terms, check_loads
 from vico.runner.loading import load_agent
 from vico.threads import workers as processors
 from vico.viewer.server import require_server
@@ -117,7 +122,7 @@ def robot(options: RobotOptions) -> int:
     if options.steps < 1:
         raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
     categories = None if options.category == "all" else (options.category,)
-    from vico.challenges.robot.policy_files import policy_settings  # physics is slow to import
+    from vico.challenges.robot.arm_policies import policy_settings  # physics is slow to import
 
     by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
     setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}

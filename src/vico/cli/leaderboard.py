@@ -65,8 +65,7 @@ def add_to_leaderboard(
     results: Path, *, file: Path, date: str | None, replace: bool, json: bool = False, quiet: bool = False
 ) -> None:
     """Add the entries of a results folder, or of its ``results.json``; say nothing of it if `quiet`."""
-    from vico.challenges.registry import load_challenge
-    from vico.challenges.tables.files import read_results
+    from vico.challenges.records import load_challenge
     from vico.challenges.tables.leaderboard import (
         Leaderboard,
         add_entries,
@@ -74,6 +73,7 @@ def add_to_leaderboard(
         read_leaderboard,
         write_leaderboard,
     )
+    from vico.challenges.tables.results import read_results
     from vico.cli.output import print_json
 
     path = results / "results.json" if results.is_dir() else results
@@ -92,7 +92,7 @@ def add_to_leaderboard(
 
 def board_lines(entries: list[Entry]) -> list[str]:
     """Return the markdown of one board, best first."""
-    from vico.challenges.tables.markdown import setting_words, table
+    from vico.challenges.tables.results import setting_words, table
 
     first = entries[0]
     keys = [first.rank_by, *(key for key in first.metrics if key != first.rank_by)]

@@ -27,14 +27,12 @@ from vico.errors import InputError, OutputExistsError, SchemaError
 from vico.io.files import read_json
 from vico.io.folders import check_replaceable, remove
 from vico.llm import LanguageModel, Sampling
-from vico.runner.branches import branched_run
 from vico.runner.control import Control
-from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms, foreign_agents
-from vico.runner.gather import Gatherer
+from vico.runner.gather import FaultLog, Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
-from vico.runner.recording import RecordedRun, go_on_from
+from vico.runner.recording import RecordedRun, branched_run, go_on_from
 from vico.sim.config import SimConfig, find_by_name
 from vico.sim.environment.environment import first_date
 from vico.sim.loop.simulation import Simulation

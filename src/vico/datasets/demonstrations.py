@@ -1,30 +1,169 @@
-"""From a recorded run to demonstrations: what one agent saw, knew, was asked for and did, an agent step a frame."""
+"""From a recorded run to demonstrations: what one agent saw, knew, was asked for and did, an agent step a frame.
+
+The task of an episode in words, and what it came to, are read from the files beside the run.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from vico.assets.robots import robot_model
-from vico.datasets.actions import ActionForm
-from vico.datasets.increments import Form
-from vico.datasets.tasks import EpisodeFacts, current_part
+from vico.challenges.assistant.tasks import Task
+from vico.challenges.episodes import record_of
+from vico.challenges.records import EpisodeRecord
 from vico.datasets.vectors import (
     PERSON_STATE,
+    ActionForm,
+    VectorForm,
     goal_vector,
     recorded_person_states,
     recorded_robot_states,
     robot_state_names,
 )
-from vico.errors import EmptyInputError, InputError
+from vico.errors import EmptyInputError, InputError, SchemaError
+from vico.io.files import read_json
 from vico.sim.recording import Run
 from vico.sim.state.steps import TICKS_PER_SECOND
+
+EPISODE_FILE, TASK_FILE = "episode.json", "task.json"
+
+
+@dataclass(frozen=True)
+class EpisodeFacts:
+    """What a dataset tells of the episode that a demonstration is of.
+
+    Attributes
+    ----------
+    challenge, category, method
+        What was played, and by whom; empty for a run that was no episode of a challenge.
+    seed
+        Of the episode or the run.
+    success
+        Whether all that was asked for was done; None where nobody judged.
+    done
+        Which parts of it were.
+    instructions
+        As assistants are given them, one a part; empty without a task.
+    persons
+        Ids of the residents who ask.
+    """
+
+    challenge: str = ""
+    category: str = ""
+    method: str = ""
+    seed: int = 0
+    success: bool | None = None
+    done: Sequence[bool] = ()
+    instructions: Sequence[Mapping[str, Any]] = field(default_factory=list)
+    persons: Sequence[str] = ()
+
+    def record(self) -> dict[str, Any]:
+        """Return it as JSON."""
+        return asdict(self)
+
+
+def facts_of_episode(record: EpisodeRecord, task: Mapping[str, Any]) -> EpisodeFacts:
+    """Return what an episode's record and its task tell."""
+    done = [part.success for part in record.parts]
+    instructions: list[dict[str, Any]] = []
+    persons: list[str] = []
+    if record.challenge == "assistant":
+        asked = _assistant_task(task)
+        instructions = asked.instructions()
+        persons = [subtask.person.agent for subtask in asked.subtasks]
+    return EpisodeFacts(
+        record.challenge,
+        record.category,
+        record.method,
+        record.seed,
+        success=bool(done) and all(done),
+        done=done,
+        instructions=instructions,
+        persons=list(dict.fromkeys(persons)),
+    )
+
+
+def facts_of_run(run: Path, seed: int) -> EpisodeFacts:
+    """Return what lies beside a recorded run about the episode it is of.
+
+    ``RUN/episode.json`` and ``RUN/task.json`` are looked for, then what `vico eval --record` leaves: ``episodes`` and
+    ``tasks`` beside the folder ``runs``. A run that is no episode has neither: nobody asked for anything, or judged.
+
+    Raises
+    ------
+    SchemaError
+        If a file is damaged.
+    """
+    episode = next((path for path in (run / EPISODE_FILE, _file_beside(run, "episodes")) if path.exists()), None)
+    if episode is None:
+        return EpisodeFacts(seed=seed)
+    content = read_json(episode)
+    record = record_of(content.get("episode") if isinstance(content, dict) else None)
+    task = next((path for path in (run / TASK_FILE, *_tasks_for(run, record)) if path.exists()), None)
+    if task is None:
+        raise SchemaError(f"{episode}: the task of the episode is not beside it (tasks/*.json, or {run / TASK_FILE})")
+    return facts_of_episode(record, read_json(task))
+
+
+def _file_beside(run: Path, folder: str) -> Path:
+    return run.resolve().parent.parent / folder / f"{run.resolve().name}.json"
+
+
+def _tasks_for(run: Path, record: EpisodeRecord) -> list[Path]:
+    """Return the files of tasks that an evaluation left for an episode; one, unless it has several settings."""
+    path = run.resolve()
+    parts = path.name.split(".")  # category, method, world, seed, key
+    world = parts[2] if len(parts) == 5 else "*"
+    return sorted((path.parent.parent / "tasks").glob(f"{record.category}.{world}.{record.seed}.*.json"))
+
+
+def _assistant_task(task: Mapping[str, Any]) -> Task:
+    try:
+        return Task.model_validate(task)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "task"
+        raise SchemaError(f"task: {where}: {first['msg']}; play the episode anew") from None
+
+
+def current_part(actions: Sequence[Any], parts: int) -> list[int]:
+    """Return which part of a task an agent is about at each step: the one that it reports next.
+
+    After its last report it is the first one that it never reported, or the last.
+
+    Parameters
+    ----------
+    actions
+        What the agent asked for, a step each.
+    parts
+        How many there are.
+    """
+    reports = [_reported_subtask(action) for action in actions]
+    never = next((k for k in range(parts) if k not in reports), max(parts - 1, 0))
+    found: list[int] = []
+    coming = never
+    for report in reversed(reports):
+        if report is not None and report < parts:
+            coming = report
+        found.append(coming)
+    return found[::-1]
+
+
+def _reported_subtask(action: Any) -> int | None:
+    if not isinstance(action, Mapping) or action.get("type") != "task_complete":
+        return None
+    index = action.get("index")
+    return int(index) if isinstance(index, int | float) else None
+
 
 #: What stands for an instruction where nobody gave one.
 NO_INSTRUCTION = "No instruction."
@@ -54,7 +193,7 @@ class Demonstration:
     goal
         float32, shape ``(n, len(GOAL))``; None where there is no task.
     text
-        Text of each action; see `vico.datasets.actions`.
+        Text of each action; see `vico.datasets.vectors`.
     status
         How each action went, `vico.rules.ActionStatus`, int64, shape ``(n,)``.
     instructions
@@ -72,7 +211,7 @@ class Demonstration:
     steps: NDArray[np.int64]
     fps: int
     state_names: tuple[str, ...]
-    form: Form
+    form: VectorForm
     state: NDArray[np.float32]
     action: NDArray[np.float32]
     goal: NDArray[np.float32] | None
@@ -131,7 +270,7 @@ def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], inst
     else:
         model, form, names = "person", ActionForm(), PERSON_STATE
         state = recorded_person_states(rows | {name: body[name] for name in _WORLD_POSE})
-    vectors, texts = _encoded(form, taken, pose[own], f"{run.path}: {agent['name']}")
+    vectors, texts = _action_vectors(form, taken, pose[own], f"{run.path}: {agent['name']}")
     parts = current_part(taken, len(facts.instructions))
     # An agent that shares the task with others is told of all of it.
     told = [facts.instructions[part] if facts.instructions else None for part in parts]
@@ -171,7 +310,7 @@ def _action(text: str | None) -> Any:
     return None if text is None else json.loads(text)
 
 
-def _encoded(
+def _action_vectors(
     form: ActionForm, actions: Sequence[Any], poses: NDArray[np.float64], who: str
 ) -> tuple[NDArray[np.float32], list[str]]:
     vectors = np.zeros((len(actions), len(form.names)), np.float32)

@@ -1,14 +1,22 @@
-"""Pictures of an episode: kept while it is played, or read from a recording; as small as the dataset wants them."""
+"""Pictures of an episode: kept while it is played or read from a recording, reduced in size, and encoded.
+
+Colours are encoded as video or PNG, depth and entities exactly.
+"""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
+import av
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -17,6 +25,179 @@ from vico.io.files import read_json, write_json
 from vico.runner.loop import Hook, Step
 from vico.sim.recording import Run
 from vico.sim.recording.schema import VIEWS
+
+#: H.264 that looks like the picture and is decoded from anywhere: every second frame is whole, none looks ahead.
+VIDEO_OPTIONS = {"crf": "18", "preset": "veryfast", "g": "2", "bf": "0", "sc_threshold": "0"}
+_EXACT: dict[str, Any] = {"depth": np.float32, "segmentation": np.int32}
+
+
+class PictureWriter(Protocol):
+    """Takes a demonstration's pictures, a frame after the other."""
+
+    def add(self, pictures: Mapping[str, NDArray[Any]]) -> None:
+        """Take the pictures of a frame, by output."""
+
+    def close(self) -> None:
+        """Finish the files."""
+
+
+@dataclass(frozen=True)
+class PictureFiles:
+    """Where a demonstration's encoded pictures lie."""
+
+    folder: Path
+    stem: str
+
+    @property
+    def video(self) -> Path:
+        """Colours as H.264."""
+        return self.folder / f"{self.stem}.rgb.mp4"
+
+    @property
+    def blobs(self) -> Path:
+        """A row a frame, with a column of encoded files for each output."""
+        return self.folder / f"{self.stem}.pictures.parquet"
+
+    def exact(self, output: str) -> Path:
+        """Depth or entities as an array, shape ``(n, size, size)``."""
+        return self.folder / f"{self.stem}.{output}.npy"
+
+
+class VideoWriter:
+    """Writes colours as H.264 and the rest as arrays.
+
+    Parameters
+    ----------
+    files
+        Where to.
+    outputs
+        What there will be.
+    size
+        Side of the pictures, pixels; even.
+    fps
+        Frames a second.
+    frames
+        How many there will be.
+    """
+
+    def __init__(self, files: PictureFiles, outputs: Sequence[str], *, size: int, fps: int, frames: int) -> None:
+        self._exact: dict[str, Any] = {
+            name: np.lib.format.open_memmap(files.exact(name), "w+", _EXACT[name], (frames, size, size))
+            for name in outputs
+            if name in _EXACT
+        }
+        self._container: Any = None
+        self._frames = 0
+        if "rgb" in outputs:
+            self._container = av.open(str(files.video), "w")
+            self._stream = self._container.add_stream("libx264", rate=fps, options=dict(VIDEO_OPTIONS))
+            self._stream.width = self._stream.height = size
+            self._stream.pix_fmt = "yuv420p"
+            self._stream.time_base = self._frame_time = Fraction(1, fps)
+            # One thread: the same bytes whatever the machine is busy with.
+            self._stream.codec_context.thread_count = 1
+
+    def add(self, pictures: Mapping[str, NDArray[Any]]) -> None:
+        """Take the pictures of a frame."""
+        for name, array in self._exact.items():
+            array[self._frames] = pictures[name]
+        if self._container is not None:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pictures["rgb"]), format="rgb24")
+            frame.pts, frame.time_base = self._frames, self._frame_time
+            self._container.mux(self._stream.encode(frame))
+        self._frames += 1
+
+    def close(self) -> None:
+        """Finish the files."""
+        if self._container is not None:
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        for array in self._exact.values():
+            array.flush()
+        self._exact.clear()
+
+
+class BlobWriter:
+    """Writes colours as PNG and the rest as ``.npy``, all in one file with a row a frame."""
+
+    def __init__(self, files: PictureFiles, outputs: Sequence[str], *, size: int, fps: int, frames: int) -> None:
+        self._files = files
+        self._rows: dict[str, list[bytes]] = {name: [] for name in outputs}
+
+    def add(self, pictures: Mapping[str, NDArray[Any]]) -> None:
+        """Take the pictures of a frame."""
+        for name, rows in self._rows.items():
+            rows.append(png_of(pictures[name]) if name == "rgb" else npy_of(pictures[name]))
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._rows:
+            table = pa.table({name: pa.array(rows, pa.binary()) for name, rows in self._rows.items()})
+            pq.write_table(table, self._files.blobs, compression="zstd", use_dictionary=False)
+
+
+def png_of(picture: NDArray[np.uint8]) -> bytes:
+    """Return a picture as PNG."""
+    sink = io.BytesIO()
+    Image.fromarray(picture).save(sink, "PNG", compress_level=3)
+    return sink.getvalue()
+
+
+def npy_of(array: NDArray[Any]) -> bytes:
+    """Return an array as the content of a ``.npy`` file."""
+    sink = io.BytesIO()
+    np.save(sink, array, allow_pickle=False)
+    return sink.getvalue()
+
+
+def array_of_blob(output: str, blob: bytes) -> NDArray[Any]:
+    """Undo `png_of` and `npy_of`."""
+    if output == "rgb":
+        return np.asarray(Image.open(io.BytesIO(blob)).convert("RGB"))
+    array: NDArray[Any] = np.load(io.BytesIO(blob), allow_pickle=False)
+    return array
+
+
+def joined_video(out: Path, videos: Sequence[Path], lengths: Sequence[int], *, fps: int) -> None:
+    """Put videos of `VideoWriter` one after the other, without encoding anything again.
+
+    Parameters
+    ----------
+    lengths
+        Frames of each.
+    """
+    with av.open(str(out), "w") as container:
+        stream: Any = None
+        before = 0
+        for path, length in zip(videos, lengths, strict=True):
+            with av.open(str(path)) as source:
+                its: Any = source.streams.video[0]
+                if stream is None:
+                    stream = container.add_stream_from_template(its)
+                    stream.time_base = its.time_base
+                offset = int(before / fps / its.time_base)
+                for packet in source.demux(its):
+                    if packet.dts is None:
+                        continue
+                    packet.pts, packet.dts = packet.pts + offset, packet.dts + offset
+                    packet.stream = stream
+                    container.mux(packet)
+            before += length
+
+
+def frames_of_video(path: Path, first: int, count: int, *, fps: int) -> Iterator[NDArray[np.uint8]]:
+    """Yield `count` pictures of a video from its frame `first` on, uint8, shape ``(h, w, 3)``."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        if first:
+            container.seek(int(first / fps / stream.time_base), stream=stream, backward=True)
+        for frame in container.decode(stream):
+            place = round(float(frame.time) * fps)
+            if place >= first + count:
+                return
+            if place >= first:
+                yield frame.to_ndarray(format="rgb24")
+
 
 #: Outputs a dataset may hold, with the type of their values and their colours a pixel.
 PICTURES: dict[str, tuple[type[np.generic], int]] = {
@@ -42,7 +223,7 @@ class PictureSource(Protocol):
         """
 
 
-def reduced(picture: NDArray[Any], size: int) -> NDArray[Any]:
+def resize_picture(picture: NDArray[Any], size: int) -> NDArray[Any]:
     """Return a picture of `size` x `size` pixels, cut to a square: colours averaged, anything else picked.
 
     Depth is not averaged, for between two surfaces there is none; nor are entities.
@@ -111,7 +292,9 @@ class PictureKeeper(Hook):
             self._steps[name].append(number)
             for output in self._outputs:
                 kind = PICTURES[output][0]
-                self._file(name, output).write(np.ascontiguousarray(reduced(seen[output], self._size), kind).tobytes())
+                self._file(name, output).write(
+                    np.ascontiguousarray(resize_picture(seen[output], self._size), kind).tobytes()
+                )
 
     def _file(self, name: str, output: str) -> BinaryIO:
         if (name, output) not in self._files:
@@ -135,7 +318,7 @@ class KeptPictures:
             raise InputError(f"{agent}: saw nothing at step {missing[0]}; it has to observe at every step")
         arrays = {output: self._array(agent, output, side) for output in outputs}
         for step in steps:
-            yield {output: reduced(np.asarray(array[place[step]]), size) for output, array in arrays.items()}
+            yield {output: resize_picture(np.asarray(array[place[step]]), size) for output, array in arrays.items()}
 
     def _array(self, agent: str, output: str, side: int) -> NDArray[Any]:
         kind, colours = PICTURES[output]
@@ -156,7 +339,7 @@ class RecordedPictures:
         if kept.keys() >= set(steps) and set(outputs) <= set(_arrays_in(kept[steps[0]])):
             for step in steps:
                 arrays = _read_arrays(kept[step], outputs)
-                yield {output: reduced(arrays[output], size) for output in outputs}
+                yield {output: resize_picture(arrays[output], size) for output in outputs}
             return
         if list(outputs) != ["rgb"]:
             missing = next(output for output in outputs if output != "rgb")
@@ -177,7 +360,7 @@ class RecordedPictures:
         found = 0
         for _, frame in view.frames(wanted):
             found += 1
-            yield {"rgb": reduced(frame, size)}
+            yield {"rgb": resize_picture(frame, size)}
         if found < len(wanted):
             raise InputError(
                 f"{self.run.path}: the film of {agent} has {found} of {len(wanted)} steps; it has to observe at every "

@@ -1,7 +1,6 @@
 """Making one part of a dataset: play an episode, or read a recorded run, and encode what came of it.
 
-Everything in and out is JSON, and the same task twice leaves the same bytes: whoever hands out the tasks may use
-processes, a cluster, or nothing of the kind.
+Pick-and-place episodes are a source, too: shown by the arm's own skills in the real simulation.
 """
 
 from __future__ import annotations
@@ -9,32 +8,143 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from vico.challenges.assistant.challenge import ASSISTANT
-from vico.challenges.assistant.episode import Reported, play_task, world_and_people
-from vico.challenges.assistant.model import Task
+import numpy as np
+
+from vico.challenges.assistant.challenge import ASSISTANT, EpisodeProgress, play_task, world_and_people
+from vico.challenges.assistant.tasks import Task
 from vico.challenges.episodes import code_digest
+from vico.challenges.pick_place.episode import FPS, METHOD, STATE, DemonstratedEpisode, demonstrate
+from vico.challenges.pick_place.tasks import ENTITY_TABLE, SECONDS, level_field
 from vico.challenges.records import Job
-from vico.datasets.demonstrations import Demonstration, demonstrations_of
-from vico.datasets.episode_records import Origin, Tally, episode_record, origin_of_run
-from vico.datasets.formats.pictures import PictureFiles
+from vico.datasets.demonstrations import Demonstration, EpisodeFacts, demonstrations_of, facts_of_episode, facts_of_run
+from vico.datasets.episodes import Origin, Tally, episode_record, origin_of_run
 from vico.datasets.formats.registry import FORMATS
-from vico.datasets.parts import Contents, read_part, write_part
-from vico.datasets.pick_place import CHALLENGE, shown
-from vico.datasets.pictures import PictureKeeper, PictureSource, RecordedPictures
-from vico.datasets.tasks import EpisodeFacts, facts_of_episode, facts_of_run
-from vico.errors import InputError
+from vico.datasets.layout import Contents, read_part, write_part
+from vico.datasets.pictures import KeptPictures, PictureFiles, PictureKeeper, PictureSource, RecordedPictures
+from vico.datasets.vectors import IncrementForm
+from vico.errors import EmptyInputError, InputError
 from vico.io.stores import FolderStore
 from vico.jobs.shared import check_code, check_seen
+from vico.rules import ActionStatus
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
 from vico.sim.config import find_by_name
 from vico.sim.recording import Run, read_run
+from vico.version import __version__
 from vico.world.folder import is_world, read_world
 from vico.world.world import World
+
+#: Name of the challenge; what `--world` says of the level field.
+CHALLENGE, FIELD = "pick_place", "field"
+_ROBOT = "robot_0"
+
+
+@dataclass(frozen=True)
+class PickPlaceJob:
+    """An episode to show.
+
+    Attributes
+    ----------
+    world
+        World folder whose streets it is set in; "" for a level field.
+    seed
+        Of the task.
+    seconds
+        That it may last.
+    """
+
+    world: str
+    seed: int
+    seconds: int = SECONDS
+
+    def record(self) -> dict[str, Any]:
+        """Return it as JSON."""
+        return {"challenge": CHALLENGE, "world": self.world, "seed": self.seed, "seconds": self.seconds}
+
+    @property
+    def label(self) -> str:
+        """What it is called in messages."""
+        return f"{CHALLENGE}, {Path(self.world).name or FIELD}, seed {self.seed}"
+
+
+def demonstrate_job(
+    job: Mapping[str, Any], contents: Contents, work: Path
+) -> tuple[Demonstration, KeptPictures, Origin]:
+    """Show an episode; return what it was as a demonstration, its pictures, and where it comes from.
+
+    Parameters
+    ----------
+    job
+        Of `PickPlaceJob.record`.
+    work
+        Folder for pictures.
+
+    Raises
+    ------
+    EmptyInputError
+        If nothing was done in it.
+    """
+    world = _pick_place_world(job["world"])
+    keeper = PictureKeeper(work / "pictures", [_ROBOT], size=contents.size, outputs=contents.outputs)
+    made = demonstrate(
+        job["seed"],
+        world,
+        seconds=job["seconds"],
+        side=contents.size,
+        drop_below=contents.drop_below,
+        seen=lambda step, observation: keeper.keep(step, {_ROBOT: observation}),
+    )
+    if not len(made.kept):
+        raise EmptyInputError(f"{CHALLENGE}: seed {job['seed']}: nothing was done in it ({made.played.why})")
+    return _demonstration(made), keeper.close(), _origin(made, world or level_field(0))
+
+
+def _demonstration(made: DemonstratedEpisode) -> Demonstration:
+    kept, played, task = made.kept, made.played, made.task
+    return Demonstration(
+        agent=_ROBOT,
+        kind="robot",
+        body="manipulator",
+        person="",
+        steps=kept,
+        fps=FPS,
+        state_names=STATE,
+        form=IncrementForm(),
+        state=played.states[kept],
+        action=played.actions[kept],
+        goal=None,
+        text=[""] * len(kept),
+        status=np.full(len(kept), ActionStatus.OK.value, np.int64),
+        instructions=[task.instruction] * len(kept),
+        success=played.success,
+        facts=EpisodeFacts(CHALLENGE, task.source + " to " + task.destination, METHOD, task.seed, played.success),
+    )
+
+
+def _origin(made: DemonstratedEpisode, world: World) -> Origin:
+    return Origin(
+        {"name": world.manifest.name if world.path is None else world.path.name, "digest": world.digest},
+        [source.model_dump(mode="json") for source in world.manifest.sources],
+        "",
+        f"vico {__version__}",
+        int((np.diff(made.kept) > 1).sum()),
+        [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, world.entities],
+    )
+
+
+def _pick_place_world(path: str) -> World | None:
+    return _read_pick_place_world(Path(path)) if path else None
+
+
+@lru_cache(maxsize=2)
+def _read_pick_place_world(path: Path) -> World:
+    return read_world(path)
+
 
 Tell = Callable[[Mapping[str, Any]], None]
 _KINDS = {"residents": "resident", "assistants": "assistant", "robots": "robot"}
@@ -48,7 +158,7 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
     Parameters
     ----------
     options
-        ``parts``: folder of the parts; ``contents``: `vico.datasets.parts.Contents`, as JSON; ``seen`` and ``code``: a
+        ``parts``: folder of the parts; ``contents``: `vico.datasets.layout.Contents`, as JSON; ``seen`` and ``code``: a
         file that other machines must see there (empty on this one), and the digest of the code that they must have.
     tell
         Told ``label``, ``step`` and ``limit`` while an episode is played.
@@ -98,8 +208,8 @@ def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path,
     staged = work / "staged"
     staged.mkdir()
     if "job" in task and task["job"].get("challenge") == CHALLENGE:
-        made, kept, origin = shown(task["job"], contents, work)
-        about = encoded(made, kept, PictureFiles(staged, "0"), contents, origin)
+        made, kept, origin = demonstrate_job(task["job"], contents, work)
+        about = encode_demonstration(made, kept, PictureFiles(staged, "0"), contents, origin)
         write_part(folder, task["key"], [(about, made)], staged)
         return
     if "run" in task:
@@ -109,16 +219,18 @@ def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path,
         agents = chosen_agents(run, contents)
         pictures: PictureSource = RecordedPictures(run)
     else:
-        run, facts, pictures, world = _played(task["job"], contents, work, tell)
+        run, facts, pictures, world = _play_episode(task["job"], contents, work, tell)
         agents = chosen_agents(run, contents)
     episodes = []
     for k, one in enumerate(demonstrations_of(run, facts, agents, instruction=contents.instruction)):
-        about = encoded(one, pictures, PictureFiles(staged, str(k)), contents, origin_of_run(one, run, world))
+        about = encode_demonstration(
+            one, pictures, PictureFiles(staged, str(k)), contents, origin_of_run(one, run, world)
+        )
         episodes.append((about, one))
     write_part(folder, task["key"], episodes, staged)
 
 
-def _played(
+def _play_episode(
     job: Mapping[str, Any], contents: Contents, work: Path, tell: Tell
 ) -> tuple[Run, EpisodeFacts, PictureSource, World]:
     """Play an episode, its run recorded and its pictures kept."""
@@ -140,7 +252,7 @@ def _played(
     def told(label: str, step: int, limit: int) -> None:
         tell({"label": label, "step": step, "limit": limit})
 
-    hooks: list[Hook] = [keeper, Reported(told, task)]
+    hooks: list[Hook] = [keeper, EpisodeProgress(told, task)]
     record = play_task(
         world,
         people,
@@ -157,7 +269,7 @@ def _played(
     return read_run(work / "run"), facts_of_episode(record, content), keeper.close(), world
 
 
-def encoded(
+def encode_demonstration(
     demonstration: Demonstration,
     pictures: PictureSource,
     files: PictureFiles,

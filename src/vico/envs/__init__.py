@@ -1,10 +1,8 @@
 """How other people's code drives the simulation: PettingZoo and Gymnasium environments, their spaces and checks."""
 
 from vico.envs.check import EnvFinding, check_env
-from vico.envs.parallel import CommunityEnv, make
-from vico.envs.registry import register_ids
-from vico.envs.single import SingleAgentEnv
-from vico.envs.spec import EnvSpec
+from vico.envs.parallel import CommunityEnv, SingleAgentEnv, make
+from vico.envs.spec import EnvSpec, register_ids
 from vico.envs.vector import ParallelVectorEnv, VectorAgentEnv, make_parallel_vec
 from vico.envs.workers import WorkerError
 from vico.sim.loop.simulation import Simulation, StepResult

@@ -1,12 +1,17 @@
-"""The simulation as a PettingZoo `ParallelEnv`: residents, assistants and robots act at once."""
+"""The simulation as environments: a PettingZoo `ParallelEnv`, and a Gymnasium environment of one agent.
+
+Residents, assistants and robots act at once; in the environment of one agent, the others act by policies of their
+own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Protocol, Unpack
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -14,8 +19,7 @@ from pettingzoo import ParallelEnv
 
 from vico.community import read_community
 from vico.community.model import Community
-from vico.envs.form_options import FormOptions
-from vico.envs.forms import Form, forms_of
+from vico.envs.forms import Form, FormOptions, forms_of
 from vico.envs.spec import EnvOptions, EnvSpec
 from vico.errors import InputError
 from vico.seeds import rng
@@ -36,8 +40,8 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
     """A community in a world.
 
     Agents are called ``resident_0``, ``assistant_0``, ``robot_0`` and so on. Observations and actions are described
-    in `vico.envs.spaces`, and in `vico.envs.arrays` for ``spec.form`` ``"arrays"``. There is no reward of its own (0
-    for everybody): tasks judge the state. An episode ends, truncated, after ``spec.max_steps`` steps.
+    in `vico.envs.spaces`, and in `vico.envs.array_observations` for ``spec.form`` ``"arrays"``. There is no reward of
+    its own (0 for everybody): tasks judge the state. An episode ends, truncated, after ``spec.max_steps`` steps.
 
     A step is a second, unless ``spec.periods`` give some agents other control periods: then it lasts until the next
     agent is due, and what `step` returns holds those alone who are due, while ``agents`` lists all as ever. Only when
@@ -223,7 +227,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         """
         if self.world.path is None:
             raise InputError("env: one of a world in memory cannot go to another process; write the world first")
-        return _made_anew, (self.world.path, self.community, self.spec, self._setup)
+        return _rebuild_env, (self.world.path, self.community, self.spec, self._setup)
 
     def _told(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         observations: dict[str, Any] = {}
@@ -331,7 +335,7 @@ def make(
         - ``periods={}``: seconds from one action of an agent to the next, by name; 1 s without.
         - ``max_steps=1500``: length of an episode, steps: seconds, unless `periods` ask for others.
         - ``form='rich'``: in which observations and actions are given: ``"rich"``, ``"arrays"``, or fields of
-          `vico.envs.form_options.FormOptions`.
+          `vico.envs.forms.FormOptions`.
 
     Raises
     ------
@@ -342,7 +346,7 @@ def make(
     return CommunityEnv(_world(world), _community(community), spec=spec, setup=setup)
 
 
-def _made_anew(world: Path, community: Community | None, spec: EnvSpec, setup: Setup | None) -> CommunityEnv:
+def _rebuild_env(world: Path, community: Community | None, spec: EnvSpec, setup: Setup | None) -> CommunityEnv:
     return CommunityEnv(_world(world), community, spec=spec, setup=setup)
 
 
@@ -365,3 +369,107 @@ def _world(source: WorldSource) -> World:
 
 def _community(source: CommunitySource) -> Community | None:
     return source if source is None or isinstance(source, Community) else read_community(Path(source))
+
+
+class Policy(Protocol):
+    """Turns observations into actions; see `vico.agents.base.Agent`."""
+
+    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
+        """Return the action for the coming second."""
+
+
+#: Given what all observe and their infos, as the simulation tells them, the actions of some agents by name.
+Answers = Callable[[Mapping[str, dict[str, Any]], Mapping[str, dict[str, Any]]], Mapping[str, dict[str, Any]]]
+#: Given the community's environment and the seed of an episode, the policies of agents by name, or what asks them all.
+Others = Callable[[CommunityEnv, int], Mapping[str, Policy] | Answers]
+
+
+class SingleAgentEnv(gymnasium.Env[Any, Any]):
+    """One agent among others.
+
+    Parameters
+    ----------
+    env
+        The community.
+    agent
+        Whose observations and actions they are.
+    others
+        Gives those who act beside it; without it, and for whom it gives no policy, the others wait.
+
+    Raises
+    ------
+    InputError
+        If there is no such agent.
+    """
+
+    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012
+    render_mode = "rgb_array"
+
+    def __init__(self, env: CommunityEnv, agent: str, *, others: Others | None = None) -> None:
+        self.community = env
+        self.agent = agent
+        self.observation_space = env.observation_space(agent)
+        self.action_space = env.action_space(agent)
+        self._make_others = others
+        self._others: Answers = _no_actions
+        self._last: StepResult | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode; see `CommunityEnv.reset`."""
+        super().reset(seed=seed)
+        self._last = self.community.begin(seed)
+        if self._make_others is not None:
+            made = self._make_others(self.community, self.community.sim.config.seed)
+            self._others = made if callable(made) else _ask_policies(made)
+        return self.community.told(self.agent, self._last)
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Advance until the agent is due again; the others act upon what they saw last."""
+        own = {self.agent: action}
+        while True:
+            others = {} if self._last is None else self._others(self._last.observations, self._last.infos)
+            self._last = self.community.advance({**others, **own})
+            if self.agent in self._last.observations:
+                observation, info = self.community.told(self.agent, self._last)
+                return observation, 0.0, False, not self.community.agents, info
+            own = {}
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are possible now, as `sb3_contrib.MaskablePPO` asks for it.
+
+        Raises
+        ------
+        InputError
+            If the form of the environment has no masks.
+        """
+        community = self.community
+        mask = community.forms[self.agent].mask(community.possible_agents.index(self.agent), community.sim.state)
+        if mask is None:
+            raise InputError("env: there are masks with form='arrays' alone, and for people alone")
+        return mask.astype(bool)
+
+    def render(self) -> NDArray[np.uint8]:
+        """Return what the agent sees, uint8, shape ``(image, image, 3)``."""
+        seen = {} if self._last is None else self._last.observations[self.agent]
+        return seen["rgb"] if "rgb" in seen else self.community.render()
+
+    def close(self) -> None:
+        """Let go of the simulation."""
+        self.community.close()
+
+
+def _no_actions(
+    observations: Mapping[str, dict[str, Any]], infos: Mapping[str, dict[str, Any]]
+) -> Mapping[str, dict[str, Any]]:
+    return {}
+
+
+def _ask_policies(policies: Mapping[str, Policy]) -> Answers:
+    """Ask each of some policies that has an observation."""
+
+    def answers(
+        observations: Mapping[str, dict[str, Any]], infos: Mapping[str, dict[str, Any]]
+    ) -> Mapping[str, dict[str, Any]]:
+        return {n: one.act(observations[n], infos[n]) for n, one in policies.items() if n in observations}
+
+    return answers

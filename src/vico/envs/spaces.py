@@ -1,16 +1,12 @@
-"""The rich form: what an observation looks like in Gymnasium's own spaces, and actions as plain numbers for learners.
+"""The rich form: observations in Gymnasium's own spaces, and actions as plain numbers for learners.
 
-Actions may be given in two forms. The short one names the action and its fields, as in
-``{"type": "move_forward", "distance": 1.0}``. The other is an element of `action_space`: ``type`` is the action's
-number in `vico.sim.actions.PEOPLE_ACTIONS`, and every slot is there, whether the action uses it or not. Which slot each
-field of an action is read from stands in the table of actions, `vico.sim.actions.ACTIONS`.
-
-Every space is one of Gymnasium's own, so that libraries that know those know ours: numbers are `Box`es without axes,
-texts `Text`s, lists `Sequence`s. `vico.envs.rich` turns what the simulation tells into elements of them.
+The spaces, and the observations as elements of them: all that an agent is told, with text in the characters of
+`TextSpace`.
 """
 
 from __future__ import annotations
 
+import re
 import string
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -28,7 +24,7 @@ from vico.sim.robots import ActionSpace, Reading
 
 #: Characters that texts of observations hold: ASCII, and the letters of Latin, Greek and Cyrillic script with their
 #: marks and punctuation. `Text` keeps each in several tables, so all of Unicode would take seconds and megabytes for
-#: each text; `vico.envs.rich.told_text` writes others as ``\\u4eac``.
+#: each text; `vico.envs.spaces.escape_text` writes others as ``\\u4eac``.
 CHARACTERS = "".join(
     ["\t\n", *map(chr, range(0x20, 0x7F)), *map(chr, range(0xA0, 0x0530)), *map(chr, range(0x2010, 0x2030)), "€№→−"]
 )
@@ -47,14 +43,14 @@ class TextSpace(spaces.Text):
         return f"Text({self.min_length}, {self.max_length}, {len(self.character_set)} characters)"
 
 
-def told_space(longest: int) -> spaces.Text:
+def text_space(longest: int) -> spaces.Text:
     """Return the space of texts in observations that are no longer than so many characters."""
     # A copy shares the tables of characters, which take ten milliseconds, but not the stream of chance.
-    return copy(_text_space(longest))
+    return copy(_cached_text_space(longest))
 
 
 @cache
-def _text_space(longest: int) -> spaces.Text:
+def _cached_text_space(longest: int) -> spaces.Text:
     return TextSpace(longest, min_length=0, charset=CHARACTERS)
 
 
@@ -79,27 +75,27 @@ def observation_space(
     message = spaces.Dict(
         {
             "time": _number(0.0, FAR),
-            "speaker": told_space(LONGEST_NAME),
-            "text": told_space(LONGEST_TEXT),
+            "speaker": text_space(LONGEST_NAME),
+            "text": text_space(LONGEST_TEXT),
             "position": _number(-FAR, FAR, 3),
         }
     )
-    door = spaces.Dict({"to": told_space(LONGEST_NAME), "position": _number(-FAR, FAR, 3)})
+    door = spaces.Dict({"to": text_space(LONGEST_NAME), "position": _number(-FAR, FAR, 3)})
     state = spaces.Dict(
         {
             "time": _number(0.0, FAR),
             "cash": _number(-FAR, FAR),
             "held": spaces.Box(0, MOST_ENTITIES, (2,), np.int64),
-            "vehicle": told_space(LONGEST_NAME),
-            "building": told_space(LONGEST_NAME),
-            "room": told_space(LONGEST_NAME),
-            "place": told_space(LONGEST_NAME),
-            "accessible_places": spaces.Sequence(told_space(LONGEST_NAME)),
+            "vehicle": text_space(LONGEST_NAME),
+            "building": text_space(LONGEST_NAME),
+            "room": text_space(LONGEST_NAME),
+            "place": text_space(LONGEST_NAME),
+            "accessible_places": spaces.Sequence(text_space(LONGEST_NAME)),
             "doors": spaces.Sequence(door),
-            "posture": told_space(LONGEST_NAME),
-            "action_status": told_space(LONGEST_NAME),
-            "action_code": told_space(LONGEST_NAME),
-            "action_reason": told_space(LONGEST_TEXT),
+            "posture": text_space(LONGEST_NAME),
+            "action_status": text_space(LONGEST_NAME),
+            "action_code": text_space(LONGEST_NAME),
+            "action_reason": text_space(LONGEST_TEXT),
         }
     )
     parts: dict[str, spaces.Space[Any]] = {
@@ -217,3 +213,67 @@ def _read(field: Field, action: Mapping[str, Any], places: Sequence[str], people
 
 def _point(raw: Any) -> list[float]:
     return [float(value) for value in np.asarray(raw, np.float64)]
+
+
+_PLAIN = frozenset(CHARACTERS)
+_ESCAPED = re.compile(r"\\U([0-9a-f]{8})|\\u([0-9a-f]{4})")
+_NAMES = ("vehicle", "building", "room", "place", "posture", "action_status", "action_code")
+
+
+def rich_observation(observation: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an observation as an element of its `observation_space`.
+
+    Numbers become arrays without axes (float64), ``held`` an array (int64, shape ``(2,)``), points arrays (float64,
+    shape ``(3,)``), lists tuples; texts go through `escape_text`. Pictures and sensors stay what they are.
+    """
+    state = observation["state"]
+    told = {
+        "time": np.array(state["time"], np.float64),
+        "cash": np.array(state["cash"], np.float64),
+        "held": np.array(state["held"], np.int64),
+        "accessible_places": tuple(escape_text(place, LONGEST_NAME) for place in state["accessible_places"]),
+        "doors": tuple(
+            {"to": escape_text(door["to"], LONGEST_NAME), "position": np.array(door["position"], np.float64)}
+            for door in state["doors"]
+        ),
+        "action_reason": escape_text(state["action_reason"], LONGEST_TEXT),
+    }
+    told |= {name: escape_text(state[name], LONGEST_NAME) for name in _NAMES}
+    heard = tuple(
+        {
+            "time": np.array(message["time"], np.float64),
+            "speaker": escape_text(message["speaker"], LONGEST_NAME),
+            "text": escape_text(message["text"], LONGEST_TEXT),
+            "position": np.array(message["position"], np.float64),
+        }
+        for message in observation["events"]
+    )
+    return {**observation, "events": heard, "state": told}
+
+
+def escape_text(text: str, longest: int) -> str:
+    """Return a text in the characters that `vico.envs.spaces.CHARACTERS` has, cut off at a length.
+
+    Others are written as Python writes them, ``\\u4eac`` or ``\\U0001f600``; none is cut in two.
+    `unescape_text` undoes it.
+    """
+    if len(text) <= longest and ((text.isascii() and text.isprintable()) or _PLAIN.issuperset(text)):
+        return text
+    length, parts = 0, []
+    for character in text:
+        part = character if character in _PLAIN else _escape_character(character)
+        length += len(part)
+        if length > longest:
+            break
+        parts.append(part)
+    return "".join(parts)
+
+
+def unescape_text(text: str) -> str:
+    """Return what `escape_text` was given, as far as it was not cut off."""
+    return _ESCAPED.sub(lambda found: chr(int(found[1] or found[2], 16)), text)
+
+
+def _escape_character(character: str) -> str:
+    code = ord(character)
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

@@ -1,14 +1,14 @@
 """Many environments side by side, each in a process: for Gymnasium (one agent each) and for PettingZoo (everybody).
 
-Gymnasium's own `AsyncVectorEnv` is not used. Its shared memory carries no text and no lists, which our observations
-and actions hold; it makes one environment more than asked for, in the parent; and a worker that is killed leaves it
-with an end-of-file error that does not say which.
+Arrays of observations lie in memory that the processes share: pictures need not go through a pipe.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -16,16 +16,170 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
-from gymnasium.vector.utils import batch_space, iterate
+from gymnasium.vector.utils import batch_space, concatenate, create_empty_array, iterate
 from numpy.typing import NDArray
 
 from vico.community.model import Community
 from vico.envs.parallel import CommunitySource, WorldSource, make
-from vico.envs.shared import SharedArrays, Sharing
 from vico.envs.spec import EnvOptions
 from vico.envs.workers import Call, Workers
 from vico.errors import InputError
 from vico.world.world import World
+
+#: Where an array of an observation is: keys of Dicts, one in the other.
+SpacePath = tuple[str, ...]
+_ALIGNED = 64  # bytes at which arrays begin
+
+
+def boxes_of(space: spaces.Space[Any], where: SpacePath = ()) -> Iterator[tuple[SpacePath, spaces.Box[Any]]]:
+    """Yield the Boxes of a space and where they are."""
+    if isinstance(space, spaces.Box):
+        yield where, space
+    elif isinstance(space, spaces.Dict):
+        for name, one in space.spaces.items():
+            yield from boxes_of(one, (*where, name))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the arrays of several environments lie in a block of memory.
+
+    Attributes
+    ----------
+    arrays
+        By where they are in an observation: offset, bytes; shape of one; name of its type.
+    count
+        Environments.
+    size
+        Bytes of all.
+    """
+
+    arrays: Mapping[SpacePath, tuple[int, tuple[int, ...], str]]
+    count: int
+    size: int
+
+    @classmethod
+    def of(cls, space: spaces.Space[Any], count: int) -> Layout:
+        """Return a layout for so many environments."""
+        arrays, offset = {}, 0
+        for where, box in boxes_of(space):
+            arrays[where] = offset, tuple(box.shape), np.dtype(box.dtype).str
+            offset += -(-count * int(np.prod(box.shape, dtype=int)) * box.dtype.itemsize // _ALIGNED) * _ALIGNED
+        return cls(arrays, count, max(offset, 1))
+
+    def rows(self, memory: SharedMemory) -> dict[SpacePath, NDArray[Any]]:
+        """Return the arrays in a block, with a row for each environment."""
+        return {
+            where: np.ndarray((self.count, *shape), kind, memory.buf, offset)
+            for where, (offset, shape, kind) in self.arrays.items()
+        }
+
+
+class SharedArrays:
+    """The parent's side: makes the block, and takes it away when it is closed."""
+
+    def __init__(self, space: spaces.Space[Any], count: int) -> None:
+        self.space, self.layout = space, Layout.of(space, count)
+        self._memory: SharedMemory | None = SharedMemory(create=True, size=self.layout.size)
+        self._rows = self.layout.rows(self._memory)
+
+    @property
+    def name(self) -> str:
+        """By which workers find the block."""
+        assert self._memory is not None
+        return self._memory.name
+
+    def batched(self, rest: Sequence[Any]) -> Any:
+        """Return the observations of all environments as one element of the batched space; arrays are copies.
+
+        Parameters
+        ----------
+        rest
+            What the workers sent: observations without their arrays.
+        """
+        return self._batched(self.space, (), rest)
+
+    def single(self, k: int, rest: Any) -> Any:
+        """Return one environment's observation; arrays are copies."""
+        return _put_back(rest, (), {where: array[k : k + 1] for where, array in self._rows.items()})
+
+    def close(self) -> None:
+        """Take the block away."""
+        self._rows = {}
+        if self._memory is not None:
+            self._memory.close()
+            self._memory.unlink()
+            self._memory = None
+
+    def _batched(self, space: spaces.Space[Any], where: SpacePath, rest: Sequence[Any]) -> Any:
+        if where in self._rows:
+            return self._rows[where].copy()
+        if isinstance(space, spaces.Dict):
+            return {
+                name: self._batched(one, (*where, name), [None if part is None else part.get(name) for part in rest])
+                for name, one in space.spaces.items()
+            }
+        empty: Any = create_empty_array(space, len(rest))
+        return concatenate(space, rest, empty)
+
+
+class Sharing:
+    """The worker's side: an environment whose observations' arrays go to the block.
+
+    Parameters
+    ----------
+    make
+        Makes the environment: one of Gymnasium, or of PettingZoo.
+    """
+
+    def __init__(self, make: Callable[[], Any]) -> None:
+        self.env = make()
+        # In this order: the block cannot be closed while there are arrays in it.
+        self._rows: dict[SpacePath, NDArray[Any]] = {}
+        self._memory: SharedMemory | None = None
+
+    def attach(self, name: str, layout: Layout, k: int) -> None:
+        """Write to row `k` of a block from now on."""
+        self._memory = SharedMemory(name=name)
+        # A slice, not an item: an item of numbers without axes would be no part of the block.
+        self._rows = {where: rows[k : k + 1] for where, rows in layout.rows(self._memory).items()}
+
+    def reset(self, *arguments: Any, **options: Any) -> tuple[Any, Any]:
+        """Reset the environment; return what is not in the block."""
+        observation, info = self.env.reset(*arguments, **options)
+        return self._taken(observation), info
+
+    def step(self, action: Any) -> tuple[Any, ...]:
+        """Step the environment; return what is not in the block."""
+        observation, *rest = self.env.step(action)
+        return (self._taken(observation), *rest)
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Return what a method of the environment returns, or an attribute."""
+        found = getattr(self.env, name)
+        return found(*arguments) if callable(found) else found
+
+    def _taken(self, observation: Any) -> Any:
+        return _take_out(observation, (), self._rows)
+
+
+def _take_out(observation: Any, where: SpacePath, rows: Mapping[SpacePath, NDArray[Any]]) -> Any:
+    """Write arrays to their rows, and return the observation without them."""
+    if where in rows:
+        rows[where][0] = observation
+        return None
+    if isinstance(observation, Mapping):
+        return {name: _take_out(part, (*where, name), rows) for name, part in observation.items()}
+    return observation
+
+
+def _put_back(rest: Any, where: SpacePath, rows: Mapping[SpacePath, NDArray[Any]]) -> Any:
+    if where in rows:
+        return np.array(rows[where][0])
+    if isinstance(rest, Mapping):
+        return {name: _put_back(part, (*where, name), rows) for name, part in rest.items()}
+    return rest
+
 
 #: What `CommunityEnv.reset` and `CommunityEnv.step` return.
 Reset = tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]
@@ -39,7 +193,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
 
     An environment whose episode has ended begins the next one at the following step, whatever that step's action
     (Gymnasium's `AutoresetMode.NEXT_STEP`). Pictures and other arrays of observations come by shared memory
-    (`vico.envs.shared`); what `reset` and `step` return are copies.
+    (`vico.envs.vector`); what `reset` and `step` return are copies.
 
     Parameters
     ----------
@@ -83,7 +237,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
         calls = [Call("reset", (), {"seed": one, "options": options}) for one in _seeds(seed, self.num_envs)]
         observations, infos = zip(*self._workers.ask(calls), strict=True)
         self._over[:] = False
-        return self._batched(observations), _batched_infos(infos)
+        return self._batched(observations), _batch_infos(infos)
 
     def step(
         self, actions: Any
@@ -117,7 +271,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
             np.array(rewards, np.float64),
             terminations,
             truncations,
-            _batched_infos(infos),
+            _batch_infos(infos),
         )
 
     def render(self) -> tuple[Any, ...]:
@@ -241,10 +395,10 @@ def make_parallel_vec(
     InputError
         If the world has no folder.
     """
-    return ParallelVectorEnv(makers(make, world, community, num_envs=num_envs, options=dict(options)))
+    return ParallelVectorEnv(env_makers(make, world, community, num_envs=num_envs, options=dict(options)))
 
 
-def makers(
+def env_makers(
     function: Callable[..., Any],
     world: WorldSource,
     community: CommunitySource,
@@ -273,7 +427,7 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
     return list(seed)
 
 
-def _batched_infos(infos: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _batch_infos(infos: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return infos as arrays of objects, with ``_name`` beside each: which environments have it."""
     found: dict[str, Any] = {}
     for k, info in enumerate(infos):

@@ -168,14 +168,14 @@ def _serve(maker: Callable[[], Any], pipe: Connection, threads: str) -> None:
             found = getattr(made, call.method)
             answer = True, found(*call.arguments, **call.keywords) if callable(found) else found
         except Exception as error:
-            answer = False, _told(error)
+            answer = False, _error_text(error)
         try:
             pipe.send(answer)
         except OSError:
             return
 
 
-def _told(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     """Say what went wrong: our own errors in their sentence, others with where they came from."""
     if isinstance(error, VicoError):
         return str(error)

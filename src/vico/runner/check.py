@@ -12,14 +12,11 @@ from typing import Any
 from vico.agents.base import Action, Agent, AgentState
 from vico.errors import InputError, SchemaError
 from vico.io.plain_data import decode, encode
-from vico.runner.answers import MalformedError, plain_action
-from vico.runner.faults import is_malformed
-from vico.runner.foreign import Terms, foreign_agents
-from vico.runner.gather import failure_of
-from vico.runner.given import digest_of, own_info, own_observation
-from vico.runner.isolated import IsolatedAgent
+from vico.runner.audit import UnfairError
+from vico.runner.foreign import IsolatedAgent, Terms, foreign_agents
+from vico.runner.gather import failure_of, is_malformed
 from vico.runner.loading import AgentSeat
-from vico.runner.watch import UnfairError
+from vico.runner.messages import MalformedError, copy_info, copy_observation, digest_of, plain_action
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.world.world import World
@@ -152,10 +149,10 @@ def _play(
     for step in range(1, steps + 1):
         seen, info = observations[NAME], infos[NAME]
         if step == steps // 2:
-            restored = _restored(check, agent, another, step)
-        given = own_observation(seen), own_info(info)
+            restored = _restored_agent(check, agent, another, step)
+        given = copy_observation(seen), copy_info(info)
         before, began = digest_of(*given), time.perf_counter()
-        action = _asked(check, agent, given, step)
+        action = _ask_agent(check, agent, given, step)
         seconds = time.perf_counter() - began
         check.milliseconds.append(1000 * seconds)
         if seconds > deadline:
@@ -174,7 +171,9 @@ def _play(
             (restored, "state", "one restored from its state does {} where it does {}; state() leaves something out"),
         ):
             again = (
-                None if other is None else _asked(AgentCheck(), other, (own_observation(seen), own_info(info)), step)
+                None
+                if other is None
+                else _ask_agent(AgentCheck(), other, (copy_observation(seen), copy_info(info)), step)
             )
             if other is not None and again != action:
                 check.add(promise, step, what.format(again, action))
@@ -185,7 +184,9 @@ def _play(
             check.add("action", step, f"{state['action_reason']} ({state['action_code']})")
 
 
-def _asked(check: AgentCheck, agent: Agent, given: tuple[dict[str, Any], dict[str, Any]], step: int) -> Action | None:
+def _ask_agent(
+    check: AgentCheck, agent: Agent, given: tuple[dict[str, Any], dict[str, Any]], step: int
+) -> Action | None:
     """Return an agent's action; None if it has none, which is noted."""
     try:
         return plain_action(agent.act(*given))
@@ -198,7 +199,7 @@ def _asked(check: AgentCheck, agent: Agent, given: tuple[dict[str, Any], dict[st
         return None
 
 
-def _restored(check: AgentCheck, agent: Agent, another: Callable[[], Agent], step: int) -> Agent | None:
+def _restored_agent(check: AgentCheck, agent: Agent, another: Callable[[], Agent], step: int) -> Agent | None:
     """Return a fresh agent that remembers what this one does; None if there is no such state, which is noted."""
     try:
         state: AgentState = decode(encode(agent.state()))

@@ -10,14 +10,11 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from vico.agents.base import Action, Agent, Info, Observation
-from vico.agents.wrappers import FunctionAgent, usage_of
+from vico.agents.base import Action, Agent, FunctionAgent, Info, Observation, usage_of
 from vico.errors import VicoError, sentence_of
-from vico.runner.answers import MalformedError, plain_action
-from vico.runner.given import digest_of, received_info
+from vico.runner.audit import AuditHook
 from vico.runner.loading import AgentSeat, load_agent, make_agent, source_of
-from vico.runner.watch import Watch
-from vico.runner.wire import ClosedError, packed, receive, send
+from vico.runner.messages import ClosedError, MalformedError, decode_info, digest_of, pack, plain_action, receive, send
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 
@@ -38,12 +35,12 @@ def main(channel_number: int, lifeline: int) -> None:
             answer = served.answer(message)
             usage = usage_of(served.agent)
             reply = {"answer": answer, "tokens": usage.tokens, "cost": usage.cost, "left": served.left}
-            sent = packed(reply)
+            sent = pack(reply)
         except BaseException as error:
             kind = "malformed" if isinstance(error, MalformedError) else "crashed"
-            sent = packed({"error": _said(error), "kind": kind})
+            sent = pack({"error": _error_text(error), "kind": kind})
         if unfair := served.unfair():
-            sent = packed({"error": unfair[:1000], "kind": "unfair"})
+            sent = pack({"error": unfair[:1000], "kind": "unfair"})
         send(channel, sent)
 
 
@@ -59,7 +56,7 @@ class _Served:
     def __init__(self) -> None:
         self.left = True
         self._agent: Agent | None = None
-        self._watch: Watch | None = None
+        self._watch: AuditHook | None = None
         self._checked = False
 
     @property
@@ -78,7 +75,7 @@ class _Served:
             self._make(message)
             return None
         if message["do"] == "act":
-            return self._act(message["observation"], received_info(message["info"]))
+            return self._act(message["observation"], decode_info(message["info"]))
         if message["do"] == "state":
             return self.agent.state()
         self.agent.restore(message["state"])
@@ -94,7 +91,7 @@ class _Served:
         _limit_memory(int(message["memory"]))
         self._checked = bool(message["checked"])
         world, spec = Path(message["world"]), message["spec"]
-        watch = self._watch = Watch(world, source_of(spec))
+        watch = self._watch = AuditHook(world, source_of(spec))
         watch.start()
 
         def public_map() -> PublicMap:
@@ -104,10 +101,10 @@ class _Served:
         thing = load_agent(spec)
         # Without a seat it is only asked whether there is such an agent.
         seat = message["seat"]
-        self._agent = FunctionAgent(_waits) if seat is None else make_agent(thing, AgentSeat(**seat), public_map)
+        self._agent = FunctionAgent(_wait) if seat is None else make_agent(thing, AgentSeat(**seat), public_map)
 
 
-def _waits(observation: Observation, info: Info) -> Action:
+def _wait(observation: Observation, info: Info) -> Action:
     return {"type": "wait"}
 
 
@@ -132,7 +129,7 @@ def _end_with_the_run(lifeline: int) -> None:
     os._exit(1)
 
 
-def _said(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     try:
         text = str(error) if isinstance(error, (VicoError, MalformedError)) else sentence_of(error)
         return text.encode(errors="replace").decode()[:1000]

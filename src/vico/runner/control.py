@@ -1,8 +1,13 @@
-"""Hands in a run: it is paused, paced, looked into and changed between two steps, by commands from other threads."""
+"""Control of a run: it is paused, paced, inspected and changed between two steps, by commands from other threads.
+
+Arguments of commands are checked before they are used. The pace holds a run back to a speed by the clock on the wall,
+and measures it; it decides nothing in the run.
+"""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future
@@ -12,11 +17,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from vico.agents.base import Action
 from vico.errors import InputError, VicoError
-from vico.runner.arguments import Arguments
-from vico.runner.bookmarks import add_bookmark, bookmarks_of
-from vico.runner.branches import branch_path, free_name
 from vico.runner.loop import Runner
-from vico.runner.pace import Pace
+from vico.runner.recording import add_bookmark, bookmarks_of, branch_path, free_name
 from vico.sim.recording.interventions import (
     COMMANDS,
     InterventionLine,
@@ -28,6 +30,110 @@ from vico.sim.recording.interventions import (
     write_interventions,
 )
 from vico.sim.recording.schema import checkpoint_steps
+
+_LONGEST_NAME, _LONGEST_TEXT = 60, 1000
+
+#: Arguments of each command that has any.
+_ARGUMENTS = {
+    "step": ("steps",),
+    "speed": ("factor",),
+    "snapshot": ("name",),
+    "back": ("step", "name"),
+    "branch": ("name", "step"),
+    "bookmark": ("text", "step", "time"),
+}
+
+
+class CommandArguments:
+    """Arguments of a command, each of which is looked at before it is used."""
+
+    def __init__(self, command: str, given: Mapping[str, Any]) -> None:
+        self._command, self._given = command, given
+        known = _ARGUMENTS.get(command, ())
+        unknown = [name for name in given if name not in known]
+        if unknown:
+            raise InputError(f"{command}: no argument is called {unknown[0]!r}; there are {', '.join(known) or 'none'}")
+
+    def has(self, name: str) -> bool:
+        """Whether one is given."""
+        return self._given.get(name) is not None
+
+    def number(self, name: str, usual: float | None, low: float, high: float) -> float:
+        """Return a number, or the usual one where it is left out."""
+        value = self._given.get(name, usual)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise InputError(f"{self._command}: {name} is {value!r}; it has to be {low:g} to {high:g}")
+        return value
+
+    def text(self, name: str) -> str:
+        """Return a text; "" where it is left out."""
+        value = self._given.get(name, "")
+        if not isinstance(value, str) or len(value) > _LONGEST_TEXT:
+            raise InputError(f"{self._command}: {name} has to be a short text")
+        if name == "name" and (len(value) > _LONGEST_NAME or not all(c.isalnum() or c in "-_ " for c in value)):
+            raise InputError(f"{self._command}: name may have {_LONGEST_NAME} letters, digits, spaces, - and _")
+        return value.strip()
+
+
+# Who is later than this does not try to make up for it, seconds.
+_LATE = 0.5
+# The measured speed is that of so many seconds.
+_MEASURED = 3.0
+
+
+class Pace:
+    """Holds a run back to a speed.
+
+    Parameters
+    ----------
+    speed
+        Simulated seconds a second; 0 does not hold it back.
+    clock
+        Seconds of a clock that never goes back.
+
+    Attributes
+    ----------
+    factor
+        Simulated seconds a second of late.
+    """
+
+    def __init__(self, speed: float, *, clock: Callable[[], float] = time.monotonic) -> None:
+        self.speed = speed
+        self.factor = 0.0
+        self._clock = clock
+        self._anchor: tuple[float, float] | None = None
+        self._marks: deque[tuple[float, float]] = deque()
+
+    def ahead(self, second: float) -> float:
+        """Return how many seconds a run is ahead that is about to go on from a simulated second; 0 if it is not."""
+        now = self._clock()
+        if not self.speed:
+            self._measure(now, second)
+            return 0.0
+        if self._anchor is None:
+            self._anchor = now, second
+        due = self._anchor[0] + (second - self._anchor[1]) / self.speed
+        if due > now:
+            return due - now
+        if now - due > _LATE:
+            self._anchor = now, second
+        self._measure(now, second)
+        return 0.0
+
+    def forget(self) -> None:
+        """Begin anew: it was held up, or is to go at another speed."""
+        self._anchor = None
+        self._marks.clear()
+        self.factor = 0.0
+
+    def _measure(self, now: float, second: float) -> None:
+        self._marks.append((now, second))
+        while now - self._marks[0][0] > _MEASURED:
+            self._marks.popleft()
+        began, first = self._marks[0]
+        if now > began:
+            self.factor = (second - first) / (now - began)
+
 
 T = TypeVar("T")
 
@@ -260,7 +366,7 @@ class Control:
             raise InputError(f"{name!r} is no command here; there are {', '.join(self._can())}")
         if name in COMMANDS:
             return self._intervened(runner, InterventionLine(after=self.step, command=name, arguments=dict(arguments)))
-        return _COMMANDS[name](self, runner, Arguments(name, arguments))
+        return _COMMANDS[name](self, runner, CommandArguments(name, arguments))
 
     def _intervened(self, runner: Runner, line: InterventionLine) -> dict[str, Any]:
         told, actions = intervene(runner.sim, intervention_of(line.command, line.arguments))
@@ -275,35 +381,35 @@ class Control:
             if line.after == self.step:
                 self._intervened(runner, line)
 
-    def pause(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def pause(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Hold the run up."""
         self.paused, self._steps_left = True, 0
         return {}
 
-    def resume(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def resume(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Let it go on."""
         self.paused = False
         return {}
 
-    def do_steps(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def do_steps(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Make some steps, and hold it up again."""
         # Who asks again before they are made gets all of them.
         waiting = self._steps_left if self.paused else 0
         self.paused, self._steps_left = True, waiting + int(given.number("steps", 1, 1, 100_000))
         return {}
 
-    def set_speed(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def set_speed(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Set how fast it goes at most."""
         self._pace.speed = given.number("factor", None, 0, FASTEST)
         self._pace.forget()
         return {}
 
-    def stop(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def stop(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """End it."""
         self.stopping = True
         return {}
 
-    def snapshot(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def snapshot(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Write a checkpoint."""
         name = given.text("name")
         self._save(runner)
@@ -311,7 +417,7 @@ class Control:
             add_bookmark(self.out, step=self.step, time=runner.sim.state.second, text=name)
         return {"step": self.step}
 
-    def back(self, runner: Runner, given: Arguments) -> Switch:
+    def back(self, runner: Runner, given: CommandArguments) -> Switch:
         """Have the run go on from a checkpoint at or before a step, in a folder of its own."""
         step = int(given.number("step", None, 0, self.step))
         before = [k for k in checkpoint_steps(self.out) if k <= step]
@@ -321,7 +427,7 @@ class Control:
             raise InputError(f"back: no checkpoint at or before step {step}; {known}")
         return self._elsewhere(before[-1], given, f"from-{before[-1]}")
 
-    def branch(self, runner: Runner, given: Arguments) -> Switch:
+    def branch(self, runner: Runner, given: CommandArguments) -> Switch:
         """Have the run go on in a folder of its own, from here or from an earlier checkpoint."""
         if given.has("step"):
             return self.back(runner, given)
@@ -329,7 +435,7 @@ class Control:
         self._save(runner)
         return switch
 
-    def bookmark(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def bookmark(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Remember a step with a text."""
         step = int(given.number("step", self.step, 0, self.step))
         add_bookmark(
@@ -337,15 +443,15 @@ class Control:
         )
         return self.bookmarks(runner, given)
 
-    def bookmarks(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def bookmarks(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Tell all bookmarks."""
         return {"bookmarks": bookmarks_of(self.out)}
 
-    def things(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+    def things(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Tell what can be dropped."""
         return {"things": things_to_drop()}
 
-    def _elsewhere(self, step: int, given: Arguments, usual: str) -> Switch:
+    def _elsewhere(self, step: int, given: CommandArguments, usual: str) -> Switch:
         name = given.text("name")
         if name and branch_path(self.out, name).exists():
             raise InputError(f"there is a branch {name!r} already; give it another name")
@@ -358,7 +464,7 @@ class Control:
             )
 
 
-_COMMANDS: dict[str, Callable[[Control, Runner, Arguments], Any]] = {
+_COMMANDS: dict[str, Callable[[Control, Runner, CommandArguments], Any]] = {
     "pause": Control.pause,
     "resume": Control.resume,
     "step": Control.do_steps,
@@ -373,7 +479,7 @@ _COMMANDS: dict[str, Callable[[Control, Runner, Arguments], Any]] = {
 }
 
 
-def waited(told: Future[T], seconds: float) -> T:
+def wait_for(told: Future[T], seconds: float) -> T:
     """Return what something came to that was asked of a run, or say that the run is busy.
 
     Raises

@@ -1,27 +1,183 @@
-"""Asking agents what they want, each step: one that fails, is late or lies waits, and the run goes on."""
+"""Asking agents for their actions, each step: one that fails, is late or lies waits, and the run goes on.
+
+Faults are counted by kind, and the first of each are listed. Agents with a deadline are asked in threads of their
+own, for which nobody has to wait: not the run, and not the end of the program.
+"""
 
 from __future__ import annotations
 
 import logging
 import threading
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import Any
+from queue import SimpleQueue
+from typing import Any, Literal, get_args
 
-from vico.agents.base import Action, Agent, AgentState, by_group
-from vico.runner.answers import MalformedError, plain_action
-from vico.runner.faults import Failure, FaultKind
-from vico.runner.given import own_info, own_observation
-from vico.runner.isolated import AgentProcessError, EndedError, IsolatedAgent
-from vico.runner.threads import AgentThread
-from vico.runner.watch import UnfairError
+from vico.agents.base import Action, Agent, AgentState, split_groups
+from vico.rules import ActionStatus, ReasonCode, code_name
+from vico.runner.audit import UnfairError
+from vico.runner.foreign import AgentProcessError, EndedError, IsolatedAgent
+from vico.runner.messages import MalformedError, copy_info, copy_observation, plain_action
 from vico.sim.actions import AgentFault
 
-log = logging.getLogger(__name__)
+#: ``late``: no action in time. ``crashed``: it raised an error. ``ended``: its process ended. ``malformed``: what it
+#: answered is no action, or names agents or places that nobody knows. ``state``: it could not say what it remembers.
+#: ``unfair``: in a process of its own, it reached for what it is not given (see `vico.runner.audit`).
+#: ``model``: it went on without the language model that it plans with.
+FaultKind = Literal["late", "crashed", "ended", "malformed", "state", "unfair", "model"]
+FAULT_KINDS: tuple[FaultKind, ...] = get_args(FaultKind)
 
+#: So many faults are told one by one; more are only counted.
+FAULTS_LISTED = 20
 _LONGEST = 300
+
+# Refusals that no situation excuses: the action has not the form that its space says.
+_MALFORMED_CODES = frozenset(
+    code_name(code)
+    for code in (
+        ReasonCode.NOT_AN_ACTION,
+        ReasonCode.UNKNOWN_TYPE,
+        ReasonCode.UNKNOWN_FIELD,
+        ReasonCode.MISSING_FIELD,
+        ReasonCode.BAD_VALUE,
+        ReasonCode.WRONG_SIZE,
+        ReasonCode.FOR_ROBOTS_ONLY,
+        ReasonCode.FOR_PEOPLE_ONLY,
+        ReasonCode.UNKNOWN_AGENT,
+        ReasonCode.UNKNOWN_PLACE,
+    )
+)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why an agent has no action in a step."""
+
+    kind: FaultKind
+    reason: str
+
+    @property
+    def outcome(self) -> AgentFault:
+        """What the simulation is told of it."""
+        return (ActionStatus.LATE if self.kind == "late" else ActionStatus.FAILED), self.reason
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something an agent did wrong; it waited instead.
+
+    Attributes
+    ----------
+    step
+        In which step, from 1.
+    kind
+        One of `FAULT_KINDS`.
+    """
+
+    step: int
+    agent: str
+    kind: str
+    reason: str
+
+
+class FaultLog:
+    """Counts faults by agent and kind, and keeps the first of each agent and kind, and the first of all."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self.first: list[Fault] = []
+
+    @property
+    def count(self) -> int:
+        """How many there were."""
+        return self.counts.total()
+
+    def add(self, step: int, agent: str, kind: FaultKind, reason: str) -> None:
+        """Note a fault."""
+        new = not self.counts[agent, kind]
+        self.counts[agent, kind] += 1
+        if new or len(self.first) < FAULTS_LISTED:
+            self.first.append(Fault(step, agent, kind, _shorten(reason)))
+
+    def by_kind(self) -> dict[str, int]:
+        """Return how many there were of each kind there was."""
+        found = {kind: sum(n for (_, k), n in self.counts.items() if k == kind) for kind in FAULT_KINDS}
+        return {kind: number for kind, number in found.items() if number}
+
+    def by_agent(self) -> dict[str, dict[str, int]]:
+        """Return how many there were of each kind, by agent."""
+        found: dict[str, dict[str, int]] = {}
+        for (agent, kind), number in sorted(self.counts.items()):
+            found.setdefault(agent, {})[kind] = number
+        return found
+
+    def record(self) -> dict[str, Any]:
+        """Return what goes into ``run.json``, and into a checkpoint: counts, and the first ones."""
+        return {"count": self.count, "by_agent": self.by_agent(), "first": [asdict(fault) for fault in self.first]}
+
+    @classmethod
+    def of(cls, record: Mapping[str, Any]) -> FaultLog:
+        """Go on from what `record` returned."""
+        log = cls()
+        for agent, kinds in record["by_agent"].items():
+            for kind, number in kinds.items():
+                log.counts[agent, kind] = number
+        log.first = [Fault(**fault) for fault in record["first"]]
+        return log
+
+
+def is_malformed(code: str) -> bool:
+    """Whether a refusal (``action_code`` of an observation) says that the action had no form that could be right."""
+    return code in _MALFORMED_CODES
+
+
+def _shorten(reason: str) -> str:
+    return reason if len(reason) <= _LONGEST else reason[: _LONGEST - 3] + "..."
+
+
+_Task = tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]
+
+
+class AgentThread:
+    """Does one task after the other in a daemon thread, which starts with the first.
+
+    Unlike a pool of the standard library, it does not keep the program from ending while a task never returns.
+
+    Parameters
+    ----------
+    name
+        Of the agent, for debuggers.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._tasks: SimpleQueue[_Task | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=f"agent {name}", daemon=True)
+
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Do a task after those before it; return what it will come to."""
+        future: Future[Any] = Future()
+        self._tasks.put((future, task, arguments))
+        if not self._thread.ident:
+            self._thread.start()
+        return future
+
+    def close(self) -> None:
+        """Let the thread end after the task it is at."""
+        self._tasks.put(None)
+
+    def _work(self) -> None:
+        while (wanted := self._tasks.get()) is not None:
+            future, task, arguments = wanted
+            try:
+                future.set_result(task(*arguments))
+            except BaseException as error:
+                future.set_exception(error)
+
+
+log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -69,7 +225,7 @@ class Gatherer:
         self.deadline = deadline
         self.trusted = [name for name in self.agents if name in trusted]
         self.others = [name for name in self.agents if name not in trusted]
-        self._groups, self._alone = by_group({name: self.agents[name] for name in self.trusted})
+        self._groups, self._alone = split_groups({name: self.agents[name] for name in self.trusted})
         side_by_side = deadline is None and workers > 1 and len(self.others) > 1
         self._shared = ThreadPoolExecutor(workers, "agents") if side_by_side else None
         self._threads: dict[str, AgentThread] = {}
@@ -84,15 +240,15 @@ class Gatherer:
             if self.is_busy(name):
                 gathered.failures[name] = Failure("late", "still busy with an earlier step")
             elif (pool := self._pool_of(name)) is not None:
-                given = own_observation(observations[name]), own_info(infos[name])
-                asked[name] = self._busy[name] = pool.submit(_answer, self.agents[name], *given)
+                given = copy_observation(observations[name]), copy_info(infos[name])
+                asked[name] = self._busy[name] = pool.submit(_ask_agent, self.agents[name], *given)
         self._ask_trusted(observations, infos, gathered)
         wait(asked.values(), timeout=self.deadline)
         for name in others:
             if name not in asked:
                 if name not in gathered.failures:
-                    given = own_observation(observations[name]), own_info(infos[name])
-                    self._take(name, gathered, partial(_answer, self.agents[name], *given))
+                    given = copy_observation(observations[name]), copy_info(infos[name])
+                    self._take(name, gathered, partial(_ask_agent, self.agents[name], *given))
             elif asked[name].done():
                 self._take(name, gathered, asked[name].result)
             else:
@@ -206,6 +362,6 @@ def failure_of(error: BaseException) -> Failure:
     return Failure(kind, ": ".join(words if own and words else [type(error).__name__, *words]))
 
 
-def _answer(agent: Agent, observation: dict[str, Any], info: dict[str, Any]) -> Action:
+def _ask_agent(agent: Agent, observation: dict[str, Any], info: dict[str, Any]) -> Action:
     """Ask one agent; in its own thread, for looking into what it answers may take long as well."""
     return plain_action(agent.act(observation, info))

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from vico.agents.base import Agent
-from vico.agents.wrappers import as_agent
+from vico.agents.base import Agent, as_agent
 from vico.errors import InputError, MissingFileError, line_of, sentence_of
 from vico.world.public import PublicMap
 
@@ -119,7 +118,7 @@ def make_agent(thing: Any, seat: AgentSeat, public_map: Callable[[], PublicMap])
     ----------
     thing
         A class, made with those of ``name``, ``seed``, ``instructions``, ``number``, ``of`` and ``public_map`` that its
-        constructor has as arguments; or a function or object, see `vico.agents.wrappers.as_agent`.
+        constructor has as arguments; or a function or object, see `vico.agents.base.as_agent`.
     public_map
         Called for the map if it is asked for.
 

@@ -457,9 +457,9 @@ def observe(
         (`vico.sim.traffic.signals.SignalsShown`); ``events`` of the city that it knows of, where a run has any
         (`vico.sim.people.hearing`); for residents ``in_view``, what is in view by sight lines
         (`vico.sim.perception.InView`), the same with and without pictures, and ``rest``, the nearest free seat
-        (``sit``) and bed (``lie``) of the place, or None: its ``entity``, where to ``stand`` before it, and the ``door`` (a
-        room's id) to go through where it is in another room. Each is made when it is first asked for, of the state as
-        it is now, and waits for its pictures; those of ``without_pictures`` have and await none.
+        (``sit``) and bed (``lie``) of the place, or None: its ``entity``, where to ``stand`` before it, and the
+        ``door`` (a room's id) to go through where it is in another room. Each is made when it is first asked for, of
+        the state as it is now, and waits for its pictures; those of ``without_pictures`` have and await none.
     """
     names = state.names
     chosen = range(len(names)) if who is None else who

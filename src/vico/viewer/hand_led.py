@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.base import Action, Observation
-from vico.agents.human import PERIOD, Held
+from vico.agents.human import PERIOD, HeldInput
 from vico.assets.robots import MobileManipulator, RobotModel
 from vico.kinematics.arm import Chain, hand_pose, solve
 from vico.sim.robots.manipulator import FINGER_SPEED, JOINT_SPEED
@@ -42,7 +42,7 @@ class HandLed:
         self._angles = np.zeros(len(controller.low))
         self._fingers = 0.0
 
-    def __call__(self, held: Held, observation: Observation) -> Action:
+    def __call__(self, held: HeldInput, observation: Observation) -> Action:
         """Return targets of the joints and speeds of the base."""
         measured = np.asarray(observation["sensors"]["joint_position"], np.float64)
         n = len(self._angles)
@@ -63,7 +63,7 @@ class HandLed:
         hand_pose(self._chain, angles, np.empty((n, 3)), np.empty((n, 3)), pose)
         return pose
 
-    def _lead(self, held: Held, measured: Array) -> None:
+    def _lead(self, held: HeldInput, measured: Array) -> None:
         """Move the goal by what is held down, and the joints towards it; a goal out of reach is given up."""
         assert self._goal is not None
         step = HAND_SPEED * PERIOD

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from vico.agents.base import plan_record
 from vico.errors import InputError
-from vico.runner.control import Control, waited
+from vico.runner.control import Control, wait_for
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.sim.recording.recorder import Recorder
@@ -150,7 +150,7 @@ class LiveViewer(Hook):
         def render(runner: Runner) -> tuple[int, Seen]:
             return runner.sim.metrics.steps, seen_by(runner.sim, agent)
 
-        at, found = waited(self.control.ask(render), _PICTURE_WITHIN)
+        at, found = wait_for(self.control.ask(render), _PICTURE_WITHIN)
         self._seen = agent, at, found
         return picture_of(found, output)
 
@@ -176,7 +176,7 @@ class LiveViewer(Hook):
         if self.control.told()["status"] == "ended":
             return {}
         try:
-            return waited(self.control.ask(ask), _PLAN_WITHIN)
+            return wait_for(self.control.ask(ask), _PLAN_WITHIN)
         except InputError:
             # The run makes a first picture, or ends: how somebody is can be told without their plans.
             return {}

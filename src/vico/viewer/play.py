@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from vico.agents.human import AXES, KEYS, Held, HumanAgent
+from vico.agents.human import AXES, KEYS, HeldInput, HumanAgent
 from vico.errors import InputError
 from vico.rules import ActionStatus, code_name
 from vico.sim.bodies.state_arrays import Posture, Vehicle
@@ -120,7 +120,7 @@ class PlayedAgent:
         return told
 
 
-def held_of(message: Mapping[str, Any]) -> Held:
+def held_of(message: Mapping[str, Any]) -> HeldInput:
     """Return what a message ``keys`` says.
 
     Raises
@@ -137,7 +137,7 @@ def held_of(message: Mapping[str, Any]) -> Held:
         raise ValueError(f"axes has to hold some of {', '.join(AXES)}")
     sticks = {name: min(max(_finite(value, name) or 0.0, -1.0), 1.0) for name, value in axes.items()}
     yaw, pitch = (_finite(message.get(name), name) for name in ("yaw", "pitch"))
-    return Held(seq, frozenset(down), yaw, pitch, sticks)
+    return HeldInput(seq, frozenset(down), yaw, pitch, sticks)
 
 
 def _finite(value: Any, name: str) -> float | None:

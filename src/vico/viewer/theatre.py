@@ -10,10 +10,8 @@ from typing import Any
 
 from vico.agents.base import Agent
 from vico.agents.human import PERIOD, HumanAgent, Mailbox
-from vico.challenges.assistant.challenge import AssistantChallenge
-from vico.challenges.assistant.theatre import HUMAN, PlayedByHand
-from vico.challenges.records import EpisodeRecord, Job, Progress
-from vico.challenges.registry import parts_of
+from vico.challenges.assistant.challenge import HUMAN, AssistantChallenge, PlayedByHand
+from vico.challenges.records import EpisodeRecord, Job, Progress, parts_of
 from vico.errors import InputError
 from vico.runner.control import Control
 from vico.runner.gather import Gatherer
@@ -78,7 +76,7 @@ class BrowserTheatre:
     def perform(
         self, recorder: Recorder, agents: Gatherer, task: Callable[[float], Mapping[str, Any]]
     ) -> Iterator[BrowserPerformance]:
-        """Open the page for an episode; see `vico.challenges.assistant.theatre.Theatre`."""
+        """Open the page for an episode; see `vico.challenges.assistant.challenge.Theatre`."""
         assert self._human is not None
         name, human = self._human
         world = recorder.sim.world
@@ -199,5 +197,5 @@ class HumanChallenge(AssistantChallenge):
 
 AT_THE_PAGE = BrowserTheatre()
 ASSISTANT = HumanChallenge(AT_THE_PAGE)
-#: As `vico.challenges.registry.load_challenge` takes it.
+#: As `vico.challenges.records.load_challenge` takes it.
 CHALLENGE = "vico.viewer.theatre:ASSISTANT"

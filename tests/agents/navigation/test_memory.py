@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vico.agents.navigation.memory import SeenMemory
-from vico.agents.perception import points_from_depth, sightings
+from vico.agents.perception import SightingMemory, points_from_depth, sightings
 from vico.assets.shapes import box
 from vico.io.plain_data import decode, encode
 from vico.render import Cameras, Scene, render
@@ -36,12 +35,12 @@ def parcel(x: float = 4.0, y: float = 0.5):
     return box((0.4, 0.4, 0.4), (x, y, 0.2)).of_entity(7)
 
 
-def take_in(memory: SeenMemory, picture: dict) -> list[str]:
+def take_in(memory: SightingMemory, picture: dict) -> list[str]:
     return [thing.name for thing in memory.notice(picture, sightings(picture, KINDS))]
 
 
 def test_a_thing_is_known_where_it_was_seen_even_behind_something_or_ones_back() -> None:
-    memory = SeenMemory()
+    memory = SightingMemory()
     take_in(memory, view(parcel()))
     screen = box((0.1, 3.0, 2.5), (2.0, 0.0, 1.25)).of_entity(3)
     for picture in (view(parcel(), yaw=np.pi, time=1.0), view(parcel(), screen, time=2.0)):
@@ -55,14 +54,14 @@ def test_a_thing_is_known_where_it_was_seen_even_behind_something_or_ones_back()
 
 
 def test_a_thing_that_is_not_there_when_one_looks_again_is_forgotten() -> None:
-    memory = SeenMemory()
+    memory = SightingMemory()
     take_in(memory, view(parcel()))
     assert take_in(memory, view(time=5.0)) == ["red parcel"]
     assert memory.last_seen("red parcel") is None
 
 
 def test_another_rooms_things_are_not_missed_from_here_and_what_is_held_is_not_lying_about() -> None:
-    memory = SeenMemory()
+    memory = SightingMemory()
     take_in(memory, view(parcel()))
     assert take_in(memory, view(room="kitchen", time=1.0)) == []
     assert memory.last_seen("red parcel") is not None
@@ -70,7 +69,7 @@ def test_another_rooms_things_are_not_missed_from_here_and_what_is_held_is_not_l
 
 
 def test_confidence_grows_with_pixels_and_fades_for_people() -> None:
-    memory = SeenMemory()
+    memory = SightingMemory()
     take_in(memory, view(parcel(), box((0.4, 0.4, 1.7), (4.0, -1.0, 0.85)).of_entity(8)))
     thing, person = memory.last_seen("red parcel"), memory.last_seen("Ann")
     assert thing is not None
@@ -81,7 +80,7 @@ def test_confidence_grows_with_pixels_and_fades_for_people() -> None:
 
 
 def test_rooms_are_looked_at_direction_by_direction_and_state_keeps_all() -> None:
-    memory = SeenMemory()
+    memory = SightingMemory()
     shares = []
     for turn in range(4):
         take_in(memory, view(parcel(), yaw=turn * np.pi / 2, time=float(turn)))
@@ -89,7 +88,7 @@ def test_rooms_are_looked_at_direction_by_direction_and_state_keeps_all() -> Non
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     assert memory.looked_at("loft") == 0.0
-    other = SeenMemory()
+    other = SightingMemory()
     other.restore(decode(encode(memory.state())))
     assert other.looked_at("hall") == 1.0
     mine, its = memory.last_seen("red parcel"), other.last_seen("red parcel")

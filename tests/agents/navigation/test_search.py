@@ -6,9 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from vico.agents.navigation.keeping import PathKeeper
-from vico.agents.navigation.search import LAYERS, Target, furthest_straight, search, search_memory
-from vico.agents.navigation.voxel_kernels import FREE_COST
+from vico.agents.navigation.path_planning import (
+    LAYERS,
+    PathKeeper,
+    Target,
+    furthest_straight_cell,
+    search_memory,
+    search_path,
+)
+from vico.agents.navigation.voxels import FREE_COST
 from vico.seeds import rng
 
 # Ways lead at most half a grid from their start: what is asked about is a quarter of it.
@@ -60,7 +66,7 @@ def test_a_way_is_as_cheap_as_any_into_a_box_or_disc(seed: int) -> None:
     costs, target = random_grid(chance, 0.3), random_target(chance)
     costs[5, 5] = FREE_COST
     masks = np.zeros((N, N), np.uint64)
-    cells, reached = search((costs, masks), search_memory(N), np.array([5, 5, 0.0]), target.values(0.0), False)
+    cells, reached = search_path((costs, masks), search_memory(N), np.array([5, 5, 0.0]), target.values(0.0), False)
     least = least_costs(costs, (5, 5))
     inside = [
         least[j, i]
@@ -89,7 +95,7 @@ def test_keeping_a_way_costs_what_searching_anew_at_every_step_does(seed: int) -
     for _ in range(40):
         start = (*at, 0.0)
         kept = keeper.way(costs, masks, start, target.values(0.0))
-        fresh, reached = search((costs, masks), memory, np.array(start), target.values(0.0), False)
+        fresh, reached = search_path((costs, masks), memory, np.array(start), target.values(0.0), False)
         assert keeper.reached == reached
         if reached:
             assert kept[-1, 2] - kept[0, 2] == fresh[-1, 2]
@@ -143,7 +149,7 @@ def test_a_kept_way_goes_on_from_its_state() -> None:
 def test_a_start_that_touches_something_may_be_left() -> None:
     costs = np.full((N, N), FREE_COST, np.uint8)
     costs[20:30, 20:30] = 0
-    cells, reached = search(
+    cells, reached = search_path(
         (costs, np.zeros((N, N), np.uint64)), search_memory(N), np.array([22, 25, 0.0]),
         Target(4.0, 2.55, near=0.1).values(0.0), False,
     )  # fmt: skip
@@ -173,13 +179,13 @@ def test_stairs_are_climbed_around_the_wall_between_their_flights(seen: bool) ->
     if not seen:
         masks[20:, :] = 0  # the upper flight and the wall's far side were not in view yet
     door = Target(1.1, 2.55, near=0.3, z=3.4)
-    cells, reached = search(
+    cells, reached = search_path(
         (costs, masks), search_memory(N, layers=LAYERS), np.array([12, 15, 2.0]), door.values(0.0), True
     )
     assert reached
     assert cells[:, 0].max() >= 42  # by the landing at the far end
     below_it = Target(1.1, 1.55, near=0.3, z=3.4).values(0.0)
-    assert not search((costs, masks), search_memory(N, layers=LAYERS), np.array([12, 15, 2.0]), below_it, True)[1]
+    assert not search_path((costs, masks), search_memory(N, layers=LAYERS), np.array([12, 15, 2.0]), below_it, True)[1]
 
 
 def test_straight_pieces_go_through_nothing_dearer_than_the_way() -> None:
@@ -188,8 +194,8 @@ def test_straight_pieces_go_through_nothing_dearer_than_the_way() -> None:
     costs[20:40, 30] = 0
     target = Target(5.0, 3.05, near=0.05).values(0.0)
     masks = np.zeros((N, N), np.uint64)
-    cells, _ = search((costs, masks), search_memory(N), np.array([15, 30, 0.0]), target, False)
-    which, limit = furthest_straight(costs, cells, 15.5, 30.5, 80.0)
+    cells, _ = search_path((costs, masks), search_memory(N), np.array([15, 30, 0.0]), target, False)
+    which, limit = furthest_straight_cell(costs, cells, 15.5, 30.5, 80.0)
     assert 0 < which < len(cells) - 1
     assert limit == FREE_COST
     for share in np.linspace(0, 1, 100):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vico.agents.navigation.voxel_kernels import FADES, SIDE
-from vico.agents.navigation.voxels import VoxelMap
+from vico.agents.navigation.voxels import FADES, SIDE, VoxelMap
 from vico.assets.shapes import box
 from vico.render import Cameras, Scene, render
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from robot_field import drawn_field
+from vico.agents.robot.arm_interface import ArmStage
+from vico.agents.robot.arm_skills import ArmWorker
 from vico.agents.robot.body import Stance
-from vico.agents.robot.stages import Stage
-from vico.agents.robot.worker import ArmWorker
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
-from vico.challenges.robot.bodies import arm_body
+from vico.challenges.robot_tasks import arm_body
 from vico.errors import InputError
 from vico.io.plain_data import decode, encode
 from vico.quaternions import matrix_of
@@ -56,7 +56,7 @@ class Trial:
         self.worker = ArmWorker(BODY, period=PERIOD)
         self.observations: dict[str, Any] = dict(self.sim.step({"robot_0": {"type": "wait"}}).observations)
 
-    def until_done(self, seconds: float = 60.0, stage: Stage | None = None) -> None:
+    def until_done(self, seconds: float = 60.0, stage: ArmStage | None = None) -> None:
         """Let the worker work, to its end or to a stage."""
         for _ in range(round(seconds / PERIOD)):
             action = self.worker.act(self.observations["robot_0"])
@@ -121,7 +121,7 @@ def test_from_a_table_onto_a_deck_that_it_sees() -> None:
 def test_a_restored_worker_does_what_it_would_have_done() -> None:
     trial = Trial((0.12, 0.2, 0.1), (1.4, 0.2, 0.0))
     trial.worker.pick(trial.thing, np.array([1.4, 0.2, 0.0]))
-    for stage in (Stage.LOOK, Stage.OVER, Stage.GRIP, Stage.CARRY):
+    for stage in (ArmStage.LOOK, ArmStage.OVER, ArmStage.GRIP, ArmStage.CARRY):
         trial.until_done(stage=stage)
         again = ArmWorker(BODY, period=PERIOD)
         again.restore(decode(encode(trial.worker.state())))
@@ -150,7 +150,7 @@ def test_what_cannot_be_picked_is_said(size: Triple | None, why: str) -> None:
 def test_what_is_taken_away_is_no_grip() -> None:
     trial = Trial((0.12, 0.2, 0.1), (1.4, 0.2, 0.0))
     trial.worker.pick(trial.thing, np.array([1.4, 0.2, 0.0]))
-    trial.until_done(stage=Stage.THERE)
+    trial.until_done(stage=ArmStage.THERE)
     trial.sim.state.objects.position[0] = (1.4, 8.0, 0.0)
     trial.until_done()
     assert trial.worker.outcome == "failed"
@@ -170,7 +170,7 @@ def test_what_is_held_out_is_let_go_of_once_a_person_takes_it() -> None:
     assert trial.worker.outcome == "picked"
     person = np.array([0.6, 2.6, 0.0])
     trial.worker.offer(person)
-    trial.until_done(stage=Stage.GRIP)
+    trial.until_done(stage=ArmStage.GRIP)
     for _ in range(60):
         action = trial.worker.act(trial.observations["robot_0"])
         trial.observations = dict(trial.sim.step({"robot_0": action}).observations)

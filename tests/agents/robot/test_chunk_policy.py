@@ -19,15 +19,14 @@ from felt_arm import sensors
 from vico.agents.robot.chunk_policy import (
     ChunkActor,
     ChunkPolicy,
+    downscale_picture,
     new_network,
     relative_chunk,
-    shrunk,
-    word_numbers,
+    word_ids,
 )
-from vico.agents.robot.chunk_shape import ChunkShape
-from vico.agents.robot.increments import arm_state
+from vico.agents.robot.increments import ChunkShape, arm_state
 from vico.challenges.pick_place.episode import play
-from vico.challenges.pick_place.task import draw_task
+from vico.challenges.pick_place.tasks import draw_task
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
 from vico.io.files import read_json, sha256_of
 from vico.io.plain_data import decode, encode
@@ -80,20 +79,20 @@ def test_a_chunk_counts_from_where_its_first_frame_is() -> None:
 
 
 def test_words_have_the_same_number_in_every_process() -> None:
-    numbers = word_numbers("Pick up the red toolbox, and put it on the table.", ChunkShape())
+    numbers = word_ids("Pick up the red toolbox, and put it on the table.", ChunkShape())
     assert numbers[:4].tolist() == [412, 113, 487, 400]  # 1 + zlib.crc32 of pick, up, the, red, modulo 512
     assert (numbers > 0).sum() == 11
-    assert len(word_numbers("a " * 100, SMALL)) == SMALL.words
+    assert len(word_ids("a " * 100, SMALL)) == SMALL.words
 
 
 def test_pictures_get_smaller_and_never_larger() -> None:
     picture = np.zeros((64, 64, 3), np.uint8)
     picture[::2] = 200
-    assert shrunk(picture, 32).shape == (32, 32, 3)
-    assert np.unique(shrunk(picture, 32)).tolist() == [100]
+    assert downscale_picture(picture, 32).shape == (32, 32, 3)
+    assert np.unique(downscale_picture(picture, 32)).tolist() == [100]
     for bad, side in ((picture, 128), (picture[:32], 32)):
         with pytest.raises(InputError, match="give a square one"):
-            shrunk(bad, side)
+            downscale_picture(bad, side)
 
 
 def test_a_chunk_is_followed_wherever_the_joints_are_meanwhile() -> None:

@@ -10,20 +10,16 @@ import pytest
 
 from felt_arm import sensors
 from robot_field import drawn_field
-from vico.agents.robot.body import Stance
-from vico.agents.robot.following import go_along, turned_aside
-from vico.agents.robot.grasps import grasps_of
-from vico.agents.robot.held import held_thing
-from vico.agents.robot.learned import LearnedArm
-from vico.agents.robot.policy_clock import PolicyClock
-from vico.agents.robot.reaching import Reach, reach_spot, reach_thing, room_around
-from vico.agents.robot.skill import Errand, Ready
-from vico.agents.robot.stages import PolicyStage
-from vico.agents.robot.thing_watch import ThingPose, ThingWatch, pose_of_box
+from vico.agents.robot.arm_interface import PolicyErrand, PolicyStage, ReadyPose
+from vico.agents.robot.body import Stance, follow_joint_path, rotate_aside
+from vico.agents.robot.grasps import ObjectPose, ObjectTracker, candidate_grasps, object_in_jaw, pose_of_box
+from vico.agents.robot.increments import PolicyClock
+from vico.agents.robot.learned_arm import LearnedArm
+from vico.agents.robot.reaching import ReachPlan, plan_grasp, plan_placement, room_around
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
-from vico.challenges.learning.manipulation.draws import OPENING, ready_angles
-from vico.challenges.robot.bodies import arm_body
+from vico.challenges.learning.manipulation.scene import OPENING, ready_angles
+from vico.challenges.robot_tasks import arm_body
 from vico.errors import InputError
 from vico.io.plain_data import decode, encode
 from vico.quaternions import matrix_of, upright
@@ -43,30 +39,30 @@ class Planned:
     seconds = 20.0
 
     def __init__(self, *, ready: bool = True, gives: float | None = None) -> None:
-        self.ready = Ready(np.array(ready_angles()), OPENING) if ready else None
+        self.ready = ReadyPose(np.array(ready_angles()), OPENING) if ready else None
         self.gives = gives
-        self.errands: list[Errand] = []
+        self.errands: list[PolicyErrand] = []
         self.servos = np.zeros(9)
         self.ways: list[tuple[np.ndarray, float]] = []
         self.waits = 0
 
-    def begin(self, errand: Errand, servos: np.ndarray) -> None:
+    def begin(self, errand: PolicyErrand, servos: np.ndarray) -> None:
         self.errands.append(errand)
         self.servos = servos.copy()
         room = room_around(BODY, EMPTY)
         if errand.goal is None:
             thing = errand.thing.as_box()
-            found: Reach | None = reach_thing(BODY, (room, room), servos[:7], grasps_of(thing, BODY))
+            found: ReachPlan | None = plan_grasp(BODY, (room, room), servos[:7], candidate_grasps(thing, BODY))
             assert found is not None
             self.ways = [(found.over, found.opening), (found.there, found.opening), (found.away, 0.0)]
         else:
-            held = held_thing(BODY, servos[:7], errand.thing.as_box(), float(servos[7]))
+            held = object_in_jaw(BODY, servos[:7], errand.thing.as_box(), float(servos[7]))
             spot = errand.goal - np.array([0.0, 0.0, float(errand.thing.middle[2]) - errand.thing.low - 0.01])
-            found = reach_spot(BODY, room, servos[:7], spot, held)
+            found = plan_placement(BODY, room, servos[:7], spot, held)
             assert found is not None
             self.ways = [(found.over, 0.0), (found.there, 0.0), (found.away, 0.14)]
 
-    def act(self, observation: Mapping[str, Any], thing: ThingPose) -> np.ndarray:
+    def act(self, observation: Mapping[str, Any], thing: ObjectPose) -> np.ndarray:
         if self.gives is not None:
             raise InputError(f"policy: its action holds {self.gives}")
         most = BODY.fastest * PERIOD * 0.5
@@ -75,7 +71,7 @@ class Planned:
             self.servos[7:] += np.clip(opening - self.servos[7:], -most[7:], most[7:])
             self.waits += 1
             if len(self.ways) > 1 or self.waits > 30:  # fingers first
-                reached = go_along(way, 0, self.servos[:7], most[:7])
+                reached = follow_joint_path(way, 0, self.servos[:7], most[:7])
                 rest = way[reached:]
                 self.ways[0] = rest, opening
                 felt = np.asarray(observation["sensors"]["joint_position"])[:7]
@@ -115,12 +111,12 @@ class Trial:
         self.arm = LearnedArm(BODY, policy, period=PERIOD, truth=self.truth if oracle else None)
         self.observation = dict(self.sim.step({"robot_0": {"type": "wait"}}).observations)["robot_0"]
 
-    def truth(self, entity: int) -> ThingPose | None:
+    def truth(self, entity: int) -> ObjectPose | None:
         objects = self.sim.state.objects
         rotation = matrix_of(objects.orientation[0])
         half = np.array(SIZE) / 2
         return (
-            ThingPose(objects.position[0] + rotation[:, 2] * half[2], rotation, half) if entity == self.thing else None
+            ObjectPose(objects.position[0] + rotation[:, 2] * half[2], rotation, half) if entity == self.thing else None
         )
 
     def until_done(self, *, seconds: float = 60.0, stage: PolicyStage | None = None) -> None:
@@ -227,14 +223,14 @@ def observed(*, pixels: int, pressed: float, angle: float = 0.0) -> dict[str, An
 
 
 def test_what_goes_out_of_view_is_where_it_was_or_goes_with_the_hand_that_presses_on_it() -> None:
-    watch = ThingWatch(BODY)
+    watch = ObjectTracker(BODY)
     assert watch.where(observed(pixels=0, pressed=0.0), 7) is None
     seen = watch.where(observed(pixels=6, pressed=0.0), 7)
     assert seen is not None
     hidden = watch.where(observed(pixels=0, pressed=0.0, angle=0.3), 7)
     assert hidden is not None
     np.testing.assert_allclose(hidden.middle, seen.middle, atol=1e-9)
-    again = ThingWatch(BODY)
+    again = ObjectTracker(BODY)
     again.restore(decode(encode(watch.state())))
     held = again.where(observed(pixels=0, pressed=5.0, angle=0.6), 7)
     assert held is not None
@@ -247,7 +243,7 @@ def test_what_goes_out_of_view_is_where_it_was_or_goes_with_the_hand_that_presse
 
 def test_boxes_and_poses_go_back_and_forth_and_axes_are_right_handed() -> None:
     for yaw in np.linspace(-1.5, 1.5, 7):
-        pose = ThingPose(np.array([0.6, 0.1, 0.2]), matrix_of(upright(float(yaw))), np.array([0.1, 0.05, 0.2]))
+        pose = ObjectPose(np.array([0.6, 0.1, 0.2]), matrix_of(upright(float(yaw))), np.array([0.1, 0.05, 0.2]))
         found = pose_of_box(pose.as_box())
         assert np.linalg.det(found.rotation) == pytest.approx(1.0)
         assert found.middle == pytest.approx(pose.middle)
@@ -275,7 +271,7 @@ def test_a_period_that_is_no_hundredth_is_refused() -> None:
 def test_spots_aside_are_as_far_from_the_base() -> None:
     spot = np.array([0.6, 0.1, -0.1])
     for away in (0.22, -0.22):
-        found = turned_aside(spot, away)
+        found = rotate_aside(spot, away)
         assert float(np.hypot(*found[:2])) == pytest.approx(float(np.hypot(*spot[:2])))
         assert float(np.linalg.norm(found - spot)) == pytest.approx(0.22)
         assert np.sign(found[1] - spot[1]) == np.sign(away)

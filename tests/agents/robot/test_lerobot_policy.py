@@ -15,7 +15,7 @@ from tiny_act import saved_act
 from vico.agents.robot.increments import INCREMENTS, arm_state
 from vico.agents.robot.lerobot_policy import CAMERA, LeRobotActor
 from vico.challenges.pick_place.episode import play
-from vico.challenges.pick_place.task import draw_task
+from vico.challenges.pick_place.tasks import draw_task
 from vico.errors import MissingExtraError, MissingFileError, SchemaError
 
 HAS_LEROBOT = importlib.util.find_spec("lerobot") is not None

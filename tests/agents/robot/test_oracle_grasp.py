@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from robot_field import drawn_field
-from vico.agents.robot.stages import Stage
-from vico.agents.robot.worker import ArmWorker
+from vico.agents.robot.arm_interface import ArmStage
+from vico.agents.robot.arm_skills import ArmWorker
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
-from vico.challenges.robot.bodies import arm_body
+from vico.challenges.robot_tasks import arm_body
 from vico.errors import SchemaError
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
@@ -44,7 +44,7 @@ class Trial:
         self.worker.pick(self.thing, AT)
         self.seen: dict[str, Any] = dict(self.sim.step({ROBOT: {"type": "wait"}}).observations)[ROBOT]
 
-    def work(self, stage: Stage | None = None) -> None:
+    def work(self, stage: ArmStage | None = None) -> None:
         """Let the worker work, to its end or to a stage."""
         for _ in range(round(60.0 / PERIOD)):
             action = self.worker.act(self.seen)
@@ -86,7 +86,7 @@ def test_by_oracle_what_is_too_heavy_for_friction_is_lifted_kept_and_put_down(he
 
 def test_what_is_held_by_oracle_is_saved(heavy: None) -> None:
     trial = Trial(oracle=True)
-    trial.work(Stage.CARRY)
+    trial.work(ArmStage.CARRY)
     saved = trial.sim.snapshot()
     vector = {"type": "control", "vector": [*trial.seen["sensors"]["joint_position"].tolist(), 0.2, 0.0]}
     for _ in range(10):
@@ -106,7 +106,7 @@ def test_what_is_held_by_oracle_is_saved(heavy: None) -> None:
 
 def test_without_it_no_weld_no_attachment_and_no_written_pose_holds_a_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     trial = Trial(oracle=False)
-    trial.work(Stage.GRIP)
+    trial.work(ArmStage.GRIP)
     written: list[str] = []
     for name in ("place_object", "remove_object"):
         monkeypatch.setattr(MujocoEngine, name, lambda *rest, name=name: written.append(name))

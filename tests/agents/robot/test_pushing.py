@@ -11,7 +11,7 @@ from robot_field import drawn_field
 from vico.agents.robot.pushing import FARTHEST, Pusher, PushStage
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
-from vico.challenges.robot.bodies import arm_body
+from vico.challenges.robot_tasks import arm_body
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation

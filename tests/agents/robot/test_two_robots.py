@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vico.agents.requester import Depositor
 from vico.agents.robot import METHODS, make_robots
-from vico.agents.robot.depositor import Depositor
-from vico.agents.robot.driving import Drive
-from vico.agents.robot.held import Held
+from vico.agents.robot.arm_interface import ErrandStage
+from vico.agents.robot.body import Drive
+from vico.agents.robot.carrier import Scout, call_message, parse_call, parse_position, parse_sighting, sighting_message
+from vico.agents.robot.grasps import HeldObject
 from vico.agents.robot.heuristic import Manipulator
-from vico.agents.robot.scout import Scout
-from vico.agents.robot.stages import ErrandStage
-from vico.agents.robot.team import says_come, says_seen, told_come, told_seen, told_where
 from vico.assets.robots import robot_model
-from vico.challenges.robot.bodies import team_of
+from vico.challenges.robot_tasks import team_of
 from vico.io.plain_data import decode, encode
 
 PERIOD, THING = 0.1, 77
@@ -73,22 +72,22 @@ def kept(agent: Any, fresh: Any) -> Any:
 
 
 def test_what_they_say_is_understood() -> None:
-    assert told_seen(says_seen(np.array([1.25, -3.0, 0.1]))) == pytest.approx([1.25, -3.0, 0.1])
-    assert told_come(says_come(1.25, -3.0)) == (1.25, -3.0)
-    for hears in (told_seen, told_come, told_where):
+    assert parse_sighting(sighting_message(np.array([1.25, -3.0, 0.1]))) == pytest.approx([1.25, -3.0, 0.1])
+    assert parse_call(call_message(1.25, -3.0)) == (1.25, -3.0)
+    for hears in (parse_sighting, parse_call, parse_position):
         assert hears("I see it at the corner.") is None
 
 
 def test_a_scout_says_where_it_sees_the_thing_and_the_arm_goes_there() -> None:
     scout = Scout(told(), "robot_0")
     said = [scout.act(observation((15.0, 2.0), sees=True), info(sees=True)) for _ in range(8)]
-    where = told_seen(next(action["text"] for action in said if action["type"] == "communicate"))
+    where = parse_sighting(next(action["text"] for action in said if action["type"] == "communicate"))
     assert where is not None
     assert where[:2] == pytest.approx([18.0, 2.0], abs=0.1)
     assert sum(action["type"] == "communicate" for action in said) == 1  # not twice in a second
     arm = Manipulator(told(), TEAM, carrier="robot_1", uses_deck=False)
     arm.act(observation(), info(sees=False))
-    action = arm.act(observation(heard=says_seen(np.array([24.0, 5.0, 0.0])), who="robot_1"), info(sees=False))
+    action = arm.act(observation(heard=sighting_message(np.array([24.0, 5.0, 0.0])), who="robot_1"), info(sees=False))
     assert action["type"] == "go_to"
     assert action["target"][:2] == [24.0, 5.0]
     again = kept(arm, Manipulator(told(), TEAM, carrier="robot_1", uses_deck=False))
@@ -110,7 +109,7 @@ def test_a_scout_stands_once_the_thing_is_held_and_goes_with_a_person() -> None:
 def test_what_slips_out_of_the_jaw_is_looked_for_where_that_was() -> None:
     arm = Manipulator(told(), TEAM, carrier="robot_1", uses_deck=False)
     arm.stage = ErrandStage.BRING
-    arm.worker.held = Held(np.zeros((1, 3)), 0.1, 0.1, 0.05, np.eye(3), np.zeros(2), np.full(2, 0.05), 0.0)
+    arm.worker.held = HeldObject(np.zeros((1, 3)), 0.1, 0.1, 0.05, np.eye(3), np.zeros(2), np.full(2, 0.05), 0.0)
     for _ in range(10):
         arm.act(observation((40.0, 0.0), grip=30.0), info(sees=False))
     assert arm.stage is ErrandStage.BRING

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from resident_talk import Body, View, knowing, moment
-from vico.agents.conversation import Conversation, Errand
-from vico.agents.talk.acquaintance import Acquaintance
-from vico.agents.talk.address import address_of, is_called, names_of, surname
-from vico.agents.talk.talker import Talker
+from vico.agents.talk.acquaintance import Acquaintance, address_of, is_called, names_of, surname
+from vico.agents.talk.answers import Talker
+from vico.agents.talk.conversation import Conversation, Errand
 
 READS = Errand("reading", leaves=False)
 GOES = Errand("on my way home", leaves=True)

@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from resident_talk import CAFE, NINE, SHOP, TEN, Body, View, ada, ask, knowing, moment
-from vico.agents.talk.sentences import read_sentences
-from vico.agents.talk.understanding import claims_in
+from vico.agents.talk.sentences import claims_in, read_sentences
 
 
 def test_somebody_never_met_nor_heard_of_is_not_known_though_they_exist() -> None:
@@ -108,7 +107,7 @@ def test_ways_and_places() -> None:
 
 
 def test_places_far_away_are_known_to_those_who_go_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vico.agents.talk.facts.NEAR", 2.0)
+    monkeypatch.setattr("vico.agents.talk.answers.KNOWN_WITHIN", 2.0)
     knows = knowing()
     assert ask(knows, "where", "Hat Shop").startswith("You find Hat Shop")
     assert ask(knows, "where", "Corner Café") == read_sentences().say("unknown_place")

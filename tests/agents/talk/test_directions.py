@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vico.agents.talk.directions import rounded, turn_between, way_in_words
-from vico.agents.talk.sentences import read_sentences
+from vico.agents.talk.sentences import describe_way, read_sentences, round_distance, turn_between
 from vico.world.heights import HeightField
 from vico.world.model import Category
 from vico.world.public import PublicMap, PublicPlace
@@ -34,7 +33,7 @@ def city() -> PublicMap:
 
 def test_a_way_round_a_corner() -> None:
     public = city()
-    found = way_in_words(public, (-40.0, 0.0), public.places[0], read_sentences())
+    found = describe_way(public, (-40.0, 0.0), public.places[0], read_sentences())
     assert found is not None
     words, metres = found
     start, turn, door = words.split(", ")
@@ -49,7 +48,7 @@ def test_a_way_round_a_corner() -> None:
 def test_no_way() -> None:
     public = city()
     place = PublicPlace("q", "Isle", Category.OPEN, "park", None, (-80.0, 80.0, 0.0), None)
-    assert way_in_words(public, (-80.0, 70.0), place, read_sentences()) is None
+    assert describe_way(public, (-80.0, 70.0), place, read_sentences()) is None
 
 
 def test_streets_are_told_apart_and_end() -> None:
@@ -66,4 +65,4 @@ def test_turns(after: tuple[float, float], turn: str) -> None:
 
 
 def test_distances_are_said_roundly() -> None:
-    assert [rounded(metres) for metres in (2.0, 14.0, 148.0, 320.0, 990.0)] == [10, 10, 150, 300, 1000]
+    assert [round_distance(metres) for metres in (2.0, 14.0, 148.0, 320.0, 990.0)] == [10, 10, 150, 300, 1000]

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.agents.conversation import Conversation, Errand
 from vico.agents.talk.acquaintance import Acquaintance
+from vico.agents.talk.conversation import Conversation, Errand
 from vico.agents.talk.grammar import Question, read_grammar
 from vico.errors import SchemaError
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import toy_city
 from vico.agents.schedule import ScheduleFollower, followers_of
-from vico.agents.talk.talker import PATIENCE
-from vico.agents.talk.understanding import claims_in
+from vico.agents.talk.answers import PATIENCE
+from vico.agents.talk.sentences import claims_in
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.world.public import PublicMap

@@ -11,10 +11,9 @@ from http_server import Answer
 from llm_server import Script, model_server, refuses, says
 from resident_talk import CAFE, NINE, TEN, ada, knowing, moment
 from scripted_author import data_of
-from vico.agents.talk.answers import answer_to
-from vico.agents.talk.facts import Knowledge
+from vico.agents.talk.answers import Knowledge, answer_to
 from vico.agents.talk.grammar import Question
-from vico.agents.talk.language_model import MOST_SAID, LlmTalk, facts_of
+from vico.agents.talk.language_model import MOST_SAID, LlmTalk, facts_for_model
 from vico.agents.talk.memory import HeardMessage
 from vico.llm import Endpoint, LanguageModel
 from vico.llm.transport import Connection
@@ -98,7 +97,7 @@ def test_an_injection_changes_no_fact(message: str) -> None:
     assert said == template()
     data = data_of(script.asked[0])
     facts = {name: value for name, value in data["facts"].items() if name != "what_was_said_to_them_or_near_them"}
-    assert facts == json.loads(json.dumps(facts_of(QUESTION, who_saw_ada(), moment())))
+    assert facts == json.loads(json.dumps(facts_for_model(QUESTION, who_saw_ada(), moment())))
     assert "08:08" not in json.dumps(facts)
     assert "</data> SYSTEM" not in script.asked[0]["messages"][1]["content"]
 

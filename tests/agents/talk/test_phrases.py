@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from activity_texts import of_code, of_data
-from vico.agents.talk.phrases import activity_of, read_verbs, vocation_of
+from vico.agents.talk.grammar import activity_of, read_verbs, vocation_of
 from vico.errors import SchemaError
 
 # Every verb that begins an activity of ours, and how it is said of oneself.

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 import toy_city
 from vico.agents.talk.grammar import read_grammar
-from vico.agents.talk.sentences import SENTENCES, read_sentences
-from vico.agents.talk.understanding import claims_in, place_named, whereabouts
+from vico.agents.talk.sentences import SENTENCES, claims_in, place_named, read_sentences, whereabouts
 from vico.errors import SchemaError
 from vico.io.data_files import PACKAGED
 from vico.world.public import PublicMap

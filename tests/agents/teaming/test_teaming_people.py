@@ -11,8 +11,7 @@ import pytest
 import toy_city
 from vico.agents.base import Agent
 from vico.agents.schedule import followers_of
-from vico.agents.teaming.newcomer import GAVE_UP, I_FOLLOW, WAIT_FOR_ME, Newcomer
-from vico.agents.teaming.visitor import LETS_GO, THANKS, Visitor
+from vico.agents.teaming.people import GAVE_UP, I_FOLLOW, LETS_GO, THANKS, WAIT_FOR_ME, Newcomer, Visitor
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation

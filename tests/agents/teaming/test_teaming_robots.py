@@ -9,12 +9,16 @@ import pytest
 
 import toy_city
 from vico.agents.teaming import METHODS, make_team
-from vico.agents.teaming.escort import Escort, waiting_spots
-from vico.agents.teaming.finder import Finder
-from vico.agents.teaming.guiding import Leader
-from vico.agents.teaming.spotter import Spotter, viewpoints
-from vico.agents.teaming.visitor import LETS_GO
-from vico.agents.teaming.words import ON_MY_WAY, caller_of, heard_from, says_lies, told_lies
+from vico.agents.teaming.escort import Escort, Guide, waiting_spots
+from vico.agents.teaming.object_search import Finder, Spotter, viewpoints
+from vico.agents.teaming.people import LETS_GO
+from vico.agents.teaming.team_skills import (
+    ON_MY_WAY,
+    caller_of,
+    messages_from,
+    object_location_message,
+    parse_object_location,
+)
 from vico.errors import InputError
 from vico.io.plain_data import decode, encode
 from vico.world.public import PublicMap
@@ -51,12 +55,12 @@ def felt(x: float, y: float, z: float = 0.3, *, yaw: float = 0.0, heard: Any = (
 
 
 def test_where_a_thing_lies_is_said_and_understood() -> None:
-    text = says_lies("red toolbox", np.array([-3.254, 41.0]))
-    at = told_lies(text, "red toolbox")
+    text = object_location_message("red toolbox", np.array([-3.254, 41.0]))
+    at = parse_object_location(text, "red toolbox")
     assert at is not None
     assert np.allclose(at, [-3.25, 41.0])
-    assert told_lies(text, "blue toolbox") is None
-    assert told_lies("The red toolbox lies somewhere.", "red toolbox") is None
+    assert parse_object_location(text, "blue toolbox") is None
+    assert parse_object_location("The red toolbox lies somewhere.", "red toolbox") is None
 
 
 def test_a_call_is_one_by_name_from_a_robot_near_by() -> None:
@@ -65,7 +69,7 @@ def test_a_call_is_one_by_name_from_a_robot_near_by() -> None:
     assert caller_of(felt(1, 1, heard=[("robot_1", "Ada, come!", here)]), "Cleo Ek") == ""
     assert caller_of(felt(30, 1, heard=[("robot_1", "Cleo, come!", here)]), "Cleo Ek") == ""
     assert caller_of(felt(1, 1, heard=[("resident_1", "Cleo, come!", here)]), "Cleo Ek") == ""
-    assert [text for text, _ in heard_from(felt(0, 0, heard=[("robot_1", "Yes.", here)]), "robot_1")] == ["Yes."]
+    assert [text for text, _ in messages_from(felt(0, 0, heard=[("robot_1", "Yes.", here)]), "robot_1")] == ["Yes."]
 
 
 def test_one_waits_beside_a_door_on_free_ground_and_out_of_the_way(public_map: PublicMap) -> None:
@@ -98,7 +102,7 @@ def test_an_escort_meets_calls_follows_and_leaves_the_person_before_the_door(pub
 
 
 def test_a_leader_goes_leg_by_leg_and_turns_round_when_it_is_called(public_map: PublicMap) -> None:
-    leader = Leader(told("guide", destination=AREA | {"centre": [25.0, -9.0, 0.0]}), public_map)
+    leader = Guide(told("guide", destination=AREA | {"centre": [25.0, -9.0, 0.0]}), public_map)
     leader.act(felt(0.0, -9.0), {})
     leads = leader.act(felt(0.0, -9.0, heard=[("resident_2", "I follow you.", (0.0, -8.0, 0.0))]), {})
     assert leads["type"] == "go_to"
@@ -106,7 +110,7 @@ def test_a_leader_goes_leg_by_leg_and_turns_round_when_it_is_called(public_map: 
     looks = leader.act(felt(3.0, -9.0, heard=[("resident_2", "Please wait for me.", (-4.0, -9.0, 0.0))]), {})
     assert looks["type"] == "control"
     assert abs(looks["vector"][2]) == pytest.approx(0.9)
-    straight = Leader(told("guide", destination=AREA | {"centre": [25.0, -9.0, 0.0]}), public_map, looks_back=False)
+    straight = Guide(told("guide", destination=AREA | {"centre": [25.0, -9.0, 0.0]}), public_map, looks_back=False)
     straight.act(felt(0.0, -9.0), {})
     goes = straight.act(felt(0.0, -9.0, heard=[("resident_2", "I follow you.", (0.0, -8.0, 0.0))]), {})
     assert goes["target"][:2] == [25.0, -9.0]
@@ -116,7 +120,8 @@ def test_a_finder_goes_where_it_is_told_and_stands_beside_the_thing() -> None:
     finder = Finder(told("spot"), spotter="robot_0")
     assert finder.act(felt(0.0, 0.0), {}) == {"type": "wait"}
     says = finder.act(
-        felt(0.0, 0.0, heard=[("robot_0", says_lies("red toolbox", np.array([10.0, 0.0])), (0, 0, 9))]), {}
+        felt(0.0, 0.0, heard=[("robot_0", object_location_message("red toolbox", np.array([10.0, 0.0])), (0, 0, 9))]),
+        {},
     )
     assert says == {"type": "communicate", "text": ON_MY_WAY}
     goes = finder.act(felt(0.0, 0.0), {})

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vico.challenges.pick_place.demonstrations import demonstrate
-from vico.challenges.pick_place.demonstrator import Demonstrator
-from vico.challenges.pick_place.episode import PERIOD, ROBOT, Verdict, _judged, play, simulation_of
-from vico.challenges.pick_place.field import TABLE
-from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, draw_task, fitting_kinds
+from vico.agents.robot.increments import PERIOD
+from vico.challenges.pick_place.episode import ROBOT, Demonstrator, Verdict, _judge, demonstrate, play, simulation_of
+from vico.challenges.pick_place.tasks import NEXT_TO, TABLE, PickPlaceTask, draw_task, fitting_kinds
 from vico.errors import EmptyInputError, InputError
 from vico.world.walkable import BLOCKED
 from vico.world.world import World
@@ -136,15 +134,15 @@ def test_being_near_is_not_enough() -> None:
     seen = observations[ROBOT]
     where = sim.state.objects.position
     where[0] = (*task.spot[:2], 0.0)
-    assert _judged(sim, task, seen, lifted=True)[0] == Verdict.DONE
-    assert _judged(sim, task, seen, lifted=False)[0] == Verdict.NOT_TAKEN
+    assert _judge(sim, task, seen, lifted=True)[0] == Verdict.DONE
+    assert _judge(sim, task, seen, lifted=False)[0] == Verdict.NOT_TAKEN
     where[0] = (*task.spot[:2], 0.3)
-    assert _judged(sim, task, seen, lifted=True)[0] == Verdict.NOT_PLACED
+    assert _judge(sim, task, seen, lifted=True)[0] == Verdict.NOT_PLACED
     where[0] = (task.spot[0] + 2.0, task.spot[1], 0.0)
-    assert _judged(sim, task, seen, lifted=True)[0] == Verdict.NOT_PLACED
+    assert _judge(sim, task, seen, lifted=True)[0] == Verdict.NOT_PLACED
     where[0] = (*task.spot[:2], 0.0)
     seen["sensors"]["contacts"] = np.array([5.0, 5.0])
-    assert _judged(sim, task, seen, lifted=True)[0] == Verdict.HELD
+    assert _judge(sim, task, seen, lifted=True)[0] == Verdict.HELD
 
 
 def test_who_has_no_room_says_so(helsinki: World) -> None:

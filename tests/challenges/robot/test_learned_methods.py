@@ -13,23 +13,27 @@ import pytest
 
 from command_line import vico
 from robot_field import drawn_field
+from vico.agents.robot.arm_interface import PolicyErrand, PolicyStage
 from vico.agents.robot.chunk_policy import ChunkPolicy, new_network
-from vico.agents.robot.chunk_shape import ChunkShape
-from vico.agents.robot.learned import LearnedArm
-from vico.agents.robot.skill import Errand
-from vico.agents.robot.stages import PolicyStage
-from vico.agents.robot.thing_watch import ThingPose
+from vico.agents.robot.grasps import ObjectPose
+from vico.agents.robot.increments import ChunkShape
+from vico.agents.robot.learned_arm import LearnedArm
 from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.challenges.episodes import Outcome
 from vico.challenges.learning.manipulation import ArrayPolicy, make_manipulation
-from vico.challenges.learning.manipulation.policy import write_policy
-from vico.challenges.records import Job
-from vico.challenges.registry import load_challenge
-from vico.challenges.robot import episode
-from vico.challenges.robot.arm_policies import ImitatingArm, ReinforcedArm
-from vico.challenges.robot.bodies import arm_body
-from vico.challenges.robot.policy_files import _controller, policy_setting, policy_settings, read_arm_policy
+from vico.challenges.learning.manipulation.policies import write_policy
+from vico.challenges.records import Job, load_challenge
+from vico.challenges.robot import challenge
+from vico.challenges.robot.arm_policies import (
+    ImitatingArm,
+    ReinforcedArm,
+    _controller,
+    policy_setting,
+    policy_settings,
+    read_arm_policy,
+)
+from vico.challenges.robot_tasks import arm_body
 from vico.challenges.tables.summary import summarise
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
 from vico.io.files import sha256_of, write_json
@@ -56,7 +60,7 @@ def written(path: Path, policy: ArrayPolicy | None = None) -> Path:
     return path
 
 
-def felt(env: Any) -> tuple[dict[str, Any], ThingPose, np.ndarray]:
+def felt(env: Any) -> tuple[dict[str, Any], ObjectPose, np.ndarray]:
     """What a robot in a city would feel and see in the state of an environment, and where the goal is."""
     r, state, scene = env.readings, env.copies.state[0], env.copies.scene
     stand = np.array([0.0, 0.0, scene.stand])
@@ -66,7 +70,7 @@ def felt(env: Any) -> tuple[dict[str, Any], ThingPose, np.ndarray]:
         "joint_velocity": rates[scene.joint_rates],
         "contacts": r.pressure[0],
     }
-    return {"sensors": sensors}, ThingPose(r.thing[0] - stand, r.thing_rotation[0], r.half[0]), r.goal[0] - stand
+    return {"sensors": sensors}, ObjectPose(r.thing[0] - stand, r.thing_rotation[0], r.half[0]), r.goal[0] - stand
 
 
 @pytest.mark.parametrize("observation", ["full", "paper"])
@@ -77,7 +81,7 @@ def test_a_policy_does_in_a_city_what_it_does_where_it_was_trained(observation: 
     arm = ReinforcedArm(_controller(path, "place"), _controller(path, "place"), lifts=True, period=0.05)
     seen, _ = env.reset(seed=4)
     told, thing, goal = felt(env)
-    arm.begin(Errand(7, thing, goal), np.append(env.readings.targets[0], env.readings.targets[0, 7]))
+    arm.begin(PolicyErrand(7, thing, goal), np.append(env.readings.targets[0], env.readings.targets[0, 7]))
     for _ in range(15):
         told, thing, _ = felt(env)
         again = ReinforcedArm(_controller(path, "place"), _controller(path, "place"), lifts=True, period=0.05)
@@ -91,11 +95,11 @@ def test_a_policy_does_in_a_city_what_it_does_where_it_was_trained(observation: 
 
 def test_goals_of_picking_are_those_of_training(tmp_path: Path) -> None:
     path = written(tmp_path / "policy.npz")
-    thing = ThingPose(np.array([0.6, 0.05, -0.05]), np.eye(3), np.array([0.05, 0.1, 0.05]))
+    thing = ObjectPose(np.array([0.6, 0.05, -0.05]), np.eye(3), np.array([0.05, 0.1, 0.05]))
     goals = []
     for lifts in (True, False):
         arm = ReinforcedArm(_controller(path, "lift"), _controller(path, "place"), lifts=lifts, period=0.05)
-        arm.begin(Errand(7, thing, None), np.zeros(9))
+        arm.begin(PolicyErrand(7, thing, None), np.zeros(9))
         goals.append(np.array(arm.state()["goal"]))
     assert goals[0] - thing.middle == pytest.approx([0.0, 0.0, 0.2])
     assert goals[1][2] == pytest.approx(thing.middle[2])
@@ -108,9 +112,9 @@ def test_another_period_of_the_robot_makes_no_other_speed_of_the_arm(period: flo
     policy.biases[-1][:] = [0.5, 0, 0, 0, 0, 0, 0, 0]
     path = written(tmp_path / "policy.npz", policy)
     arm = ReinforcedArm(_controller(path, "lift"), _controller(path, "place"), lifts=True, period=period)
-    thing = ThingPose(np.array([0.6, 0.0, -0.05]), np.eye(3), np.full(3, 0.05))
+    thing = ObjectPose(np.array([0.6, 0.0, -0.05]), np.eye(3), np.full(3, 0.05))
     servos = np.array([0.1, 0.3, 0.0, -1.0, 0.0, 0.8, 0.0, 0.08, 0.08])
-    arm.begin(Errand(7, thing, None), servos)
+    arm.begin(PolicyErrand(7, thing, None), servos)
     told: dict[str, Any] = {"joint_velocity": np.zeros(9), "contacts": np.zeros(2)}
     at, steps = servos, round(0.2 / period)
     for _ in range(steps):  # joints that follow at once
@@ -139,15 +143,15 @@ def test_who_was_shown_is_told_in_the_words_of_training_and_asked_at_its_rate() 
     arm = ImitatingArm(
         actor, thing="red toolbox", destination="Cafe", by_deck=True, stand=BODY.stand, period=0.1
     )  # fmt: skip
-    thing = ThingPose(np.array([0.6, 0.0, 0.05 - BODY.stand]), np.eye(3), np.full(3, 0.05))
-    arm.begin(Errand(7, thing, None), np.zeros(9))
+    thing = ObjectPose(np.array([0.6, 0.0, 0.05 - BODY.stand]), np.eye(3), np.full(3, 0.05))
+    arm.begin(PolicyErrand(7, thing, None), np.zeros(9))
     vector = arm.act({}, thing)
     assert actor.asked == 2
     assert vector == pytest.approx([0.02] * 9 + [0.15, 0.0])
     assert actor.instructions[-1] == "Pick up the red toolbox and put it on the table."
-    arm.begin(Errand(7, thing, thing.middle), np.zeros(9))
+    arm.begin(PolicyErrand(7, thing, thing.middle), np.zeros(9))
     assert arm.instruction == "Pick up the red toolbox and put it down next to the Cafe."
-    arm.begin(Errand(7, thing, thing.middle + np.array([0.0, 0.0, 0.4])), np.zeros(9))
+    arm.begin(PolicyErrand(7, thing, thing.middle + np.array([0.0, 0.0, 0.4])), np.zeros(9))
     assert arm.instruction == "Pick up the red toolbox and put it on the table."
     with pytest.raises(InputError, match="no run can be saved"):
         arm.state()
@@ -162,8 +166,8 @@ def test_numbers_that_are_none_are_said(tmp_path: Path) -> None:
     policy.weights[1][:, ::2], policy.weights[1][:, 1::2] = 3e38, -3e38
     path = written(tmp_path / "policy.npz", policy)
     arm = ReinforcedArm(_controller(path, "lift"), _controller(path, "place"), lifts=True, period=0.05)
-    thing = ThingPose(np.array([0.6, 0.0, -0.05]), np.eye(3), np.full(3, 0.05))
-    arm.begin(Errand(7, thing, None), np.zeros(9))
+    thing = ObjectPose(np.array([0.6, 0.0, -0.05]), np.eye(3), np.full(3, 0.05))
+    arm.begin(PolicyErrand(7, thing, None), np.zeros(9))
     sensors = {"joint_position": np.ones(9), "joint_velocity": np.ones(9), "contacts": np.zeros(2)}
     with np.errstate(all="ignore"), pytest.raises(InputError, match="holds NaN or infinity"):
         arm.act({"sensors": sensors}, thing)
@@ -320,14 +324,14 @@ def test_an_arm_that_cannot_act_any_more_ends_the_episode_with_its_cause(
     helsinki_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     setting = policy_setting("rl", str(written(tmp_path / "policy.npz")))
-    made = episode._learned_arm
+    made = challenge._learned_arm
 
     def broken(*given: Any) -> Any:
         arm = made(*given)
         arm.broken = "policy: its action holds NaN or infinity"
         return arm
 
-    monkeypatch.setattr(episode, "_learned_arm", broken)
+    monkeypatch.setattr(challenge, "_learned_arm", broken)
     record = load_challenge("robot").play(job(helsinki_path, "rl", **setting))
     assert record.parts[0].cause == "unusable action"
     assert (record.metrics["SR"], record.metrics["Ts"], record.steps) == (0.0, 4.0, 0)

@@ -11,12 +11,12 @@ import pytest
 
 from tiny_act import saved_act
 from vico.agents.robot.lerobot_policy import LeRobotActor
-from vico.challenges.assistant.model import Start
-from vico.challenges.robot.episode import play_robot_task
+from vico.challenges.assistant.tasks import Start
+from vico.challenges.robot.arm_policies import policy_setting
+from vico.challenges.robot.challenge import play_robot_task
 from vico.challenges.robot.generate import generate_robot_task
-from vico.challenges.robot.policy_files import policy_setting
-from vico.challenges.robot.thresholds import RESIDENTS
-from vico.challenges.staging import world_and_people
+from vico.challenges.robot.tasks import RESIDENTS
+from vico.challenges.robot_episodes import world_and_people
 
 pytestmark = [
     pytest.mark.slow,

@@ -14,8 +14,8 @@ from pettingzoo.test import parallel_api_test
 
 import vico.envs  # noqa: F401  (registers the ids)
 from vico.challenges.learning.make import make_robot_deliver
-from vico.challenges.learning.robot_stage import GOAL
-from vico.challenges.robot.thresholds import DESTINATION_RADIUS
+from vico.challenges.learning.robot import GOAL
+from vico.challenges.robot.tasks import DESTINATION_RADIUS
 from vico.errors import InputError
 
 SMALL = {"tasks": 1, "image": 48, "seconds": 4, "period": 0.1, "cars": 0, "pedestrians": 2}

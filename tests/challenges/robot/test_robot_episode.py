@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from vico.challenges.records import Job
-from vico.challenges.registry import load_challenge
-from vico.challenges.robot.judge import CAUSES
+from vico.challenges.records import Job, load_challenge
+from vico.challenges.robot.evaluate import CAUSES
 from vico.errors import InputError
 from vico.sim.recording import read_run
 

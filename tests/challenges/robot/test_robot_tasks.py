@@ -11,22 +11,22 @@ import pytest
 
 from vico.assets.models.movable import movable_kinds
 from vico.assets.robots import robot_model
-from vico.challenges.assistant.rules import entrance_of
-from vico.challenges.robot.bodies import arm_body
+from vico.challenges.assistant.evaluate import entrance_of
+from vico.challenges.robot.evaluate import CAUSES, RobotJudge
 from vico.challenges.robot.generate import generate_robot_task, portable_kinds
-from vico.challenges.robot.judge import CAUSES, RobotJudge
-from vico.challenges.robot.model import CATEGORIES, RobotTask, read_robot_task
-from vico.challenges.robot.thresholds import (
+from vico.challenges.robot.tasks import (
     APART,
     CARRIER_COMES,
     CARRY_REACH,
+    CATEGORIES,
     DESTINATION_RADIUS,
     GOAL_COMES,
     RESIDENTS,
+    RobotTask,
+    read_robot_task,
 )
-from vico.challenges.staging import world_and_people
-from vico.challenges.task_files import write_task_file
-from vico.challenges.ways import Ways
+from vico.challenges.robot_episodes import world_and_people
+from vico.challenges.robot_tasks import RobotReachability, arm_body, write_task_file
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
 from vico.world.world import World
@@ -68,7 +68,7 @@ def test_both_robots_have_ways_to_the_thing_and_to_its_destination(
     category: str, tasks: dict[str, RobotTask], helsinki: World
 ) -> None:
     task, arm, husky = tasks[category], robot_model("manipulator"), robot_model("husky")
-    ways = Ways(helsinki)
+    ways = RobotReachability(helsinki)
     door = entrance_of(task.destination, helsinki) if category == "carry" else np.array(task.destination.centre)
     for model, start, near in ((arm, task.manipulator, GOAL_COMES), (husky, task.carrier, CARRIER_COMES)):
         points = [(np.array(task.thing.position), near), (door, near)]

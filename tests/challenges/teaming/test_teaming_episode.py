@@ -9,10 +9,9 @@ from typing import Any
 
 import pytest
 
-from vico.challenges.records import Job
-from vico.challenges.registry import load_challenge
-from vico.challenges.teaming.judge import CAUSES
-from vico.challenges.teaming.model import CATEGORIES
+from vico.challenges.records import Job, load_challenge
+from vico.challenges.teaming.evaluate import CAUSES
+from vico.challenges.teaming.tasks import CATEGORIES
 from vico.errors import InputError
 from vico.sim.recording import read_run
 
@@ -36,7 +35,7 @@ PLAY = """
 import sys
 from pathlib import Path
 from vico.challenges.records import Job
-from vico.challenges.registry import load_challenge
+from vico.challenges.records import load_challenge
 for category in sys.argv[2:]:
     job = Job("teaming", category, "heuristic", {"steps": 6, "period": 0.5}, Path(sys.argv[1]), 3)
     print(load_challenge("teaming").play(job).state_hash)

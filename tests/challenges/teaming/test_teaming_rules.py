@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vico.agents.teaming.newcomer import GAVE_UP, I_FOLLOW
-from vico.agents.teaming.visitor import LETS_GO
-from vico.challenges.assistant.rules import entrance_of
-from vico.challenges.staging import world_and_people
+from vico.agents.teaming.people import GAVE_UP, I_FOLLOW, LETS_GO
+from vico.challenges.assistant.evaluate import entrance_of
+from vico.challenges.robot_episodes import world_and_people
 from vico.challenges.teaming import accompany, guide, spot
-from vico.challenges.teaming import thresholds as t
-from vico.challenges.teaming.generate import generate_teaming_task
-from vico.challenges.teaming.judge import TeamingJudge
-from vico.challenges.teaming.looking import Look
-from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask
+from vico.challenges.teaming import tasks as t
+from vico.challenges.teaming.category import JudgeSample
+from vico.challenges.teaming.challenge import generate_teaming_task
+from vico.challenges.teaming.evaluate import TeamingJudge
+from vico.challenges.teaming.tasks import CATEGORIES, Category, TeamingTask
 from vico.world.world import World
 
 FAR = np.array([500.0, 500.0, 0.0])
@@ -36,7 +35,7 @@ class Film:
 
     def __init__(self, rules: Any, robots: int = 1) -> None:
         self.rules = rules
-        self.now = Look(0.0, np.tile(FAR, (robots, 1)), (True,) * robots, FAR.copy(), "", outdoors=True)
+        self.now = JudgeSample(0.0, np.tile(FAR, (robots, 1)), (True,) * robots, FAR.copy(), "", outdoors=True)
 
     def show(self, seconds: int = 1, **changes: Any) -> str:
         """Let seconds pass with things as they stand; return the cause by then."""

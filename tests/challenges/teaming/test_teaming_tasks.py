@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.challenges.assistant.thresholds import CANDIDATES
-from vico.challenges.staging import world_and_people
-from vico.challenges.task_files import write_task_file
-from vico.challenges.teaming import thresholds as t
-from vico.challenges.teaming.drawing import visible_kinds
-from vico.challenges.teaming.generate import generate_teaming_task
-from vico.challenges.teaming.model import CATEGORIES, Category, TeamingTask, read_teaming_task
+from vico.challenges.assistant.tasks import CANDIDATES
+from vico.challenges.robot_episodes import world_and_people
+from vico.challenges.robot_tasks import write_task_file
+from vico.challenges.teaming import tasks as t
+from vico.challenges.teaming.category import visible_kinds
+from vico.challenges.teaming.challenge import generate_teaming_task
+from vico.challenges.teaming.tasks import CATEGORIES, Category, TeamingTask, read_teaming_task
 from vico.errors import SchemaError
 from vico.io.files import write_json
 from vico.world.world import World

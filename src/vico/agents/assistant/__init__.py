@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from vico.agents.assistant.choosing import ChoicePlanner
-from vico.agents.assistant.heuristic import HeuristicPlanner
+from vico.agents.assistant.baselines import HeuristicPlanner, RandomPlanner
+from vico.agents.assistant.errands import ChoicePlanner
 from vico.agents.assistant.llm_planner import LlmPlanner
-from vico.agents.assistant.mcts import MctsPlanner
 from vico.agents.assistant.ours import OurPlanner
-from vico.agents.assistant.random_planner import RandomPlanner
+from vico.agents.assistant.task_planning import MctsPlanner
 from vico.agents.base import Agent
 from vico.errors import InputError
 from vico.world.public import PublicMap

@@ -1,19 +1,24 @@
-"""What planners reckon with: how long ways, searches and hand-overs take, and how likely a search finds something.
+"""What planners reckon with: durations of ways, searches and hand-overs, chances of finds, and habits of people.
 
 Times are guesses of ours from the public map and from what such things take on average; with `distance` off every way
-takes the same (the ablation of the paper's appendix on distance modelling).
+takes the same (the ablation of the paper's appendix on distance modelling). Habits say how often people are at the
+places of their day, by kind of place and hour. Their shares are measured on communities of cities that no task of a
+table takes place in (``scripts/measure_habits.py``).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from vico.agents.assistant.skills import WALK
+from vico.errors import SchemaError
+from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.public import PublicMap
 from vico.world.walkable import WalkableMap
 
@@ -30,7 +35,7 @@ _OUTDOORS = 0.35
 # Hours of meals, and how many times as likely somebody is at a place for them then, and less so else.
 _MEALS, _AT_MEALS = ((7.0, 9.0), (11.5, 13.75), (18.0, 20.0)), 2.0
 # Chance that a look finds what is there.
-FINDS = 0.85
+FIND_CHANCE = 0.85
 
 
 class Estimates:
@@ -79,12 +84,12 @@ class Estimates:
         key = (round(float(goal[0]), 2), round(float(goal[1]), 2))
         if key not in self._fields:
             self._fields[key] = self._map.router.distance_field(np.array(key))
-        metres = _at(self._fields[key], start, self._map.walkable)
+        metres = _field_value(self._fields[key], start, self._map.walkable)
         straight = math.dist((float(start[0]), float(start[1])), key)
         return metres if math.isfinite(metres) else 1.4 * straight
 
 
-def _at(field: NDArray[np.float32], point: Sequence[float], walkable: WalkableMap) -> float:
+def _field_value(field: NDArray[np.float32], point: Sequence[float], walkable: WalkableMap) -> float:
     ix, iy = np.clip(walkable.cell_of(np.asarray(point, np.float64)[:2]), 0, walkable.n - 1)
     value = float(field[iy, ix])
     if math.isfinite(value):
@@ -92,3 +97,45 @@ def _at(field: NDArray[np.float32], point: Sequence[float], walkable: WalkableMa
     around = field[max(iy - 8, 0) : iy + 9, max(ix - 8, 0) : ix + 9]
     finite = around[np.isfinite(around)]
     return float(finite.min()) if len(finite) else math.inf
+
+
+GUIDE = "docs/challenges.md"
+#: How the file calls spots outdoors, and the category that stands for those that it does not name.
+OUTDOORS, OTHER = "outdoors", "entertainment"
+_HOURS = 24
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Habits(DataRecord):
+    """Shares of people who are at a place of their day, by the place's category and the hour.
+
+    Attributes
+    ----------
+    places
+        24 shares for each category of places with rooms, and for ``outdoors``.
+    """
+
+    about: Annotated[str, Field(min_length=1)]
+    places: dict[str, Annotated[list[Share], Field(min_length=_HOURS, max_length=_HOURS)]]
+
+    def share(self, category: str, hour: float) -> float:
+        """Return how likely somebody is at a place of their day, at an hour of the day."""
+        return self.places[category if category in self.places else OTHER][int(hour) % _HOURS]
+
+
+@cached_data
+def read_habits() -> Habits:
+    """Return what is known of habits.
+
+    Raises
+    ------
+    SchemaError
+        If the file is not as it should be.
+    """
+    path = data_files("assistant", "habits")[-1]
+    habits = read_record(path, Habits, guide=GUIDE)
+    missing = {OTHER, OUTDOORS} - set(habits.places)
+    if missing:
+        raise SchemaError(f"{path}: places: {', '.join(sorted(missing))} must be there")
+    return habits

@@ -18,17 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from vico.agents.assistant.asking import Enquiries, region_of
-from vico.agents.assistant.beliefs import Beliefs
-from vico.agents.assistant.choosing import ChoicePlanner
-from vico.agents.assistant.errands import Choice
-from vico.agents.assistant.habits import read_habits
-from vico.agents.assistant.ordering import best_plan
-from vico.agents.assistant.outlook import Model
-from vico.agents.assistant.rollouts import choose, worth
-from vico.agents.assistant.situations import Situations
+from vico.agents.assistant.errands import Choice, ChoicePlanner
+from vico.agents.assistant.estimates import read_habits
+from vico.agents.assistant.people import Enquiries, region_of_place
+from vico.agents.assistant.rollouts import Beliefs, SituationBuilder, best_first_choice, expected_worth
 from vico.agents.assistant.skills import Action, ObservationView
-from vico.agents.state import AgentState
+from vico.agents.assistant.task_planning import TaskModel, best_plan
+from vico.agents.base import AgentState
 from vico.seeds import rng
 
 # Stages of an errand that something new may interrupt.
@@ -48,7 +44,7 @@ class OurPlanner(ChoicePlanner):
         self._known: list[int] = []
         self._enquiries = Enquiries(self.skills.map)
         self._beliefs = Beliefs(self.book, self.skills.map, read_habits())
-        self._situations = Situations(self.book, self.estimates, self._beliefs)
+        self._situations = SituationBuilder(self.book, self.estimates, self._beliefs)
 
     def state(self) -> AgentState:
         """Return what is under way, and all that is known."""
@@ -66,7 +62,7 @@ class OurPlanner(ChoicePlanner):
         places = self.skills.map.place_by_id
         for k, told in self.book.instructions.items():
             for place in self._enquiries.places.get(told["person"]["name"], []):
-                self.book.add_source(k, region_of(places[place]))
+                self.book.add_source(k, region_of_place(places[place]))
         super().restore(state)
         self._beliefs.restore(state["beliefs"])
         self._share = None if state["share"] is None else [int(k) for k in state["share"]]
@@ -94,7 +90,7 @@ class OurPlanner(ChoicePlanner):
         if not wanted:
             return None
         for k, place, how in self._enquiries.listen(view, wanted):
-            self.book.add_source(k, region_of(place))
+            self.book.add_source(k, region_of_place(place))
             self._beliefs.hear(k, place.id, float(view.state["time"]), how)
         if self.errand is None or self.errand.stage not in _MAY_TURN or view.state["vehicle"]:
             return None
@@ -120,11 +116,11 @@ class OurPlanner(ChoicePlanner):
         if not any(self.book.is_open(k) for k in subtasks):
             return None
         if not self._is_uncertain(subtasks):
-            plan = best_plan(Model(self.book, self.estimates, subtasks, view, self.seen(view)), left)
+            plan = best_plan(TaskModel(self.book, self.estimates, subtasks, view, self.seen(view)), left)
             return plan.choices[0] if plan.choices else None
         situation, choices = self._situations.now(subtasks, view, self.seen(view), left)
         chance = rng(self.seed, "ours", self.number, round(float(view.state["time"])))
-        chosen = choose(situation, chance, worlds=_WORLDS)
+        chosen = best_first_choice(situation, chance, worlds=_WORLDS)
         return None if chosen < 0 else choices[chosen]
 
     def _is_uncertain(self, subtasks: list[int]) -> bool:
@@ -163,8 +159,8 @@ class OurPlanner(ChoicePlanner):
         """Return what one assistant gets done of some subtasks, and the seconds it takes where that is known."""
         if self._is_uncertain(part):
             situation, _ = self._situations.from_point(part, middle, view, left)
-            return worth(situation, rng(self.seed, "ours", "shares"), worlds=_WORLDS_TO_SHARE), 0.0
-        model = Model(self.book, self.estimates, part, view, {})
+            return expected_worth(situation, rng(self.seed, "ours", "shares"), worlds=_WORLDS_TO_SHARE), 0.0
+        model = TaskModel(self.book, self.estimates, part, view, {})
         model.start = replace(model.start, at=middle, time=0.0)
         plan = best_plan(model, left)
         return plan.worth, plan.time

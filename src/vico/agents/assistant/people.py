@@ -1,4 +1,7 @@
-"""Options about people and about showing what was found: meet somebody, follow them home, show a thing, report."""
+"""Options about people: meet somebody, follow them home, show a thing to them, report, and ask passers-by.
+
+`Enquiries` asks whoever is about for the people that are looked for, and takes in what they answer.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,12 @@ from numpy.typing import NDArray
 
 from vico.agents.assistant.options import Pursuit
 from vico.agents.assistant.skills import WALK, Action, AssistantSkills, ObservationView
+from vico.agents.base import AgentState
 from vico.agents.perception import Sighting
 from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, PACE_HOME
-from vico.agents.state import AgentState
+from vico.agents.talk.sentences import place_named, whereabouts
 from vico.english import split_name
+from vico.world.public import PublicMap, PublicPlace
 
 Region = Mapping[str, Any]
 
@@ -22,14 +27,14 @@ PERSON = "resident"
 _OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
 # One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
 # somebody who is out of view for so long, or hands nothing over, steps.
-_SPEAK, _STAND, _AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
+_SPEAK, _STAND, _ASK_AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
 # Who follows keeps behind by so much, runs where it is more than the second, metres, else walks as they do; no longer
 # than for so many steps.
 _BEHIND, _RUN_BEYOND = 1.7, 2.2
 _ESCORT = 700
 # In a room, who has moved less than so much a step, metres, for so many steps is let pass: one goes out, makes room for
 # so many steps, and waits so long for them to come out.
-_STANDS, _LETS_PASS, _ROOM, _COMES_OUT = 0.15, 5, 3, 40
+_STANDS, _LETS_PASS, _ROOM_STEPS, _COMES_OUT = 0.15, 5, 3, 40
 # ... goes to where the person was last seen for so many steps, then home by the map.
 _TO_LAST_SEEN = 8
 # So many pixels are shown where 20 are asked for, from these distances, metres, of which the first is tried first.
@@ -50,7 +55,7 @@ class Meet:
         self._skills, self._person, self._count = skills, person, count
         self._pursuit = Pursuit(skills, where)
         self._unseen = self._steps = 0
-        self._spoke_at = -_AGAIN
+        self._spoke_at = -_ASK_AGAIN
         self._before: int | None = None
 
     def state(self) -> AgentState:
@@ -89,7 +94,7 @@ class Meet:
 
     def _go_up(self, view: ObservationView) -> Action:
         away = self._pursuit.away(view)
-        if self._unseen == 0 and away <= _SPEAK and self._steps - self._spoke_at >= _AGAIN:
+        if self._unseen == 0 and away <= _SPEAK and self._steps - self._spoke_at >= _ASK_AGAIN:
             self._spoke_at = self._steps
             return {"type": "communicate", "text": _OFFER.format(split_name(self._person)[1])}
         self._skills.pace = WALK if away > _SPEAK else PACE_HOME
@@ -132,7 +137,7 @@ class Escort:
         if in_view or self._still > _COMES_OUT:
             self._ahead, self._still = False, 0
             return {"type": "wait"}
-        if self._still <= _ROOM:
+        if self._still <= _ROOM_STEPS:
             return {"type": "move_forward", "distance": 1.0}
         return {"type": "turn_left", "degrees": 88.0}
 
@@ -268,3 +273,88 @@ class AwaitPerson:
             self.outcome = "did not come"
             return None
         return {"type": "turn_left", "degrees": 88.0}
+
+
+# Who is nearer than this is asked, metres; so many questions each, so many steps between two questions.
+_ASK_DISTANCE, _MAX_QUESTIONS, _QUESTION_PAUSE = 4.5, 3, 2
+_QUESTION = "Excuse me, have you seen {}?"
+
+
+class Enquiries:
+    """Whom one has asked for whom, and what was answered.
+
+    Parameters
+    ----------
+    public_map
+        Knows the places that answers name.
+    """
+
+    def __init__(self, public_map: PublicMap) -> None:
+        self._map = public_map
+        self._asked: dict[str, list[str]] = {}
+        self._last = -_QUESTION_PAUSE
+        self._step = 0
+        #: By person's name, ids of the places where somebody said that they are, were or usually are.
+        self.places: dict[str, list[str]] = {}
+
+    def state(self) -> AgentState:
+        """Return all of it."""
+        return {
+            "asked": {who: list(names) for who, names in self._asked.items()},
+            "last": self._last,
+            "step": self._step,
+            "places": {who: list(places) for who, places in self.places.items()},
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Know what `state` returned."""
+        self._asked = {who: list(names) for who, names in state["asked"].items()}
+        self._last, self._step = state["last"], state["step"]
+        self.places = {who: list(places) for who, places in state["places"].items()}
+
+    def listen(self, view: ObservationView, wanted: Mapping[int, str]) -> list[tuple[int, PublicPlace, str]]:
+        """Take in what was said; return by subtask where people may be that nobody had said before, and what was said.
+
+        Parameters
+        ----------
+        wanted
+            Names of those who are looked for, by subtask.
+        """
+        self._step += 1
+        found: list[tuple[int, PublicPlace, str]] = []
+        for message in view.observation["events"]:
+            for k, name in wanted.items():
+                # Where somebody lives is known.
+                claims = [one for one in whereabouts(str(message["text"]), name) if one.kind != "lives"]
+                for claim in claims[:1]:
+                    place = place_named(self._map, claim.place) if claim.place else None
+                    if place is not None and place.id not in self.places.setdefault(name, []):
+                        self.places[name].append(place.id)
+                        found.append((k, place, claim.kind))
+        return found
+
+    def question(self, view: ObservationView, wanted: Mapping[int, str]) -> Action | None:
+        """Return a question for whoever is near, for somebody they were not asked for; None if there is none."""
+        if self._step - self._last < _QUESTION_PAUSE:
+            return None
+        near = next((seen for seen in view.things if self._may_be_asked(seen, view)), None)
+        if near is None:
+            return None
+        asked = self._asked.setdefault(near.name, [])
+        name = next(
+            (name for name in wanted.values() if name not in asked and person_in_view(view, name) is None), None
+        )
+        if name is None or len(asked) >= _MAX_QUESTIONS:
+            return None
+        asked.append(name)
+        self._last = self._step
+        return {"type": "communicate", "text": _QUESTION.format(name)}
+
+    def _may_be_asked(self, seen: Any, view: ObservationView) -> bool:
+        return seen.kind == PERSON and view.away(seen.position) <= _ASK_DISTANCE
+
+
+def region_of_place(place: PublicPlace) -> dict[str, Any]:
+    """Return the region that a place is, as instructions have it."""
+    centre = [float(x) for x in place.position]
+    return {"kind": "place", "name": place.name, "place": place.id, "centre": centre, "radius": 0.0, "surface": None}

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from vico.agents.base import Agent
+from vico.agents.commute.commuter import Commuter, WalkPlanner
 from vico.agents.commute.llm import LlmPlanner
 from vico.agents.commute.mcts import MctsPlanner
 from vico.agents.commute.ours import DayPlanner
-from vico.agents.commute.question import Commuter
-from vico.agents.commute.rule import WalkPlanner
 from vico.errors import InputError
 from vico.io.data_files import PACKAGED
 from vico.world.public import PublicMap
@@ -36,11 +35,11 @@ def _ours(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent
     return Commuter(DayPlanner(instructions, public_map), public_map, seed=seed)
 
 
-def _learned(name: str) -> Callable[[Instructions, PublicMap, int], Agent]:
+def _learned_agent_maker(name: str) -> Callable[[Instructions, PublicMap, int], Agent]:
     """Return the maker of the agent that acts by a packaged policy."""
 
     def made(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
-        from vico.agents.commute.learning.policy import Network, PolicyCommuter  # compiled code, slow to import
+        from vico.agents.commute.learning import Network, PolicyCommuter  # compiled code, slow to import
 
         return PolicyCommuter(Network.read(_POLICIES / f"{name}.npz"), public_map, seed=seed)
 
@@ -51,8 +50,8 @@ METHODS: dict[str, Callable[[Instructions, PublicMap, int], Agent]] = {
     "rule": _rule,
     "mcts": _mcts,
     "llm": _llm,
-    "ppo": _learned("ppo"),
-    "a2c": _learned("a2c"),
+    "ppo": _learned_agent_maker("ppo"),
+    "a2c": _learned_agent_maker("a2c"),
     "ours": _ours,
 }
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.commute.stops import nearest
 from vico.rules import BIKE_SPEED, BUS_FARE, WALK_SPEED, ride_price
 from vico.world.model import Point2
 from vico.world.public import PublicMap
@@ -18,8 +17,15 @@ from vico.world.trips.model import DISMOUNT, MOUNT, Leg, Trip
 from vico.world.trips.network import TripNetwork
 from vico.world.trips.ways import Way, find_way
 
+
+def nearest_point(here: Point2, points: Mapping[str, Point2], without: Collection[object] = ()) -> str | None:
+    """Return the name of the nearest point as the crow flies; None if there is none."""
+    names = [name for name in points if name not in without]
+    return min(names, key=lambda name: (math.dist(here, points[name]), name), default=None)
+
+
 # Ways that are kept; more are found anew.
-_MOST_KEPT = 5_000
+_CACHED_WAYS = 5_000
 
 
 class LegMaker:
@@ -52,7 +58,7 @@ class LegMaker:
         """Return the way on the ground between two points; infinitely long if there is none."""
         key = (start, goal)
         if key not in self._ways:
-            if len(self._ways) >= _MOST_KEPT:
+            if len(self._ways) >= _CACHED_WAYS:
                 self._ways.clear()
             self._ways[key] = find_way(self._router, start, goal) if start != goal else Way(_polyline([start]), 0.0)
         return self._ways[key]
@@ -121,7 +127,7 @@ class LegMaker:
 
     def brought_back(self, here: Point2, goal: Point2, now: float, closed: Collection[object] = ()) -> Trip | None:
         """Return the trip of who rides a bicycle to the nearest station, and from there on foot; None without one."""
-        station = nearest(here, {name: self.point_of(name) for name in self.stations}, closed)
+        station = nearest_point(here, {name: self.point_of(name) for name in self.stations}, closed)
         ride = self.ride_on(here, station, goal, now) if station is not None else None
         walk = self.walk(ride.end, goal, ride.arrive) if ride is not None else None
         return Trip(now, (ride, walk)) if ride is not None and walk is not None else None

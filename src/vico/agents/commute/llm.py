@@ -17,8 +17,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from vico.agents.commute.commuter import CommuteQuery
 from vico.agents.commute.legs import LegMaker
-from vico.agents.commute.question import Question
 from vico.clock import DAY, clock_of
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError
 from vico.llm import LanguageModel
@@ -105,7 +105,7 @@ class LlmPlanner:
             log.warning("commute: no language model, so the agent walks: %s", error)
             return None
 
-    def __call__(self, question: Question) -> Trip | None:
+    def __call__(self, question: CommuteQuery) -> Trip | None:
         """Return the trip that the model plans; the walk if it plans none that can be made."""
         if question.vehicle == "bike":
             return self._legs.brought_back(question.here, question.goal, question.now, question.closed)
@@ -113,7 +113,7 @@ class LlmPlanner:
         trip = None if plan is None else self.trip_of(plan, question)
         return trip if trip is not None else self._walk(question)
 
-    def _asked(self, question: Question) -> CommutePlan | None:
+    def _asked(self, question: CommuteQuery) -> CommutePlan | None:
         if self._model is None:
             self.fallbacks["unset"] += 1
             return None
@@ -147,7 +147,7 @@ class LlmPlanner:
 
     # -- what the model is told --------------------------------------------------------------------------------------
 
-    def inputs(self, question: Question) -> dict[str, Any]:
+    def inputs(self, question: CommuteQuery) -> dict[str, Any]:
         """Return what goes into the prompt."""
         day = [
             {"place": a["name"], "kind": a["kind"], "start": clock_of(a["start"]), "end": clock_of(a["end"])}
@@ -192,7 +192,7 @@ class LlmPlanner:
 
     # -- what becomes of its answer ----------------------------------------------------------------------------------
 
-    def findings(self, question: Question, plan: CommutePlan) -> list[str]:
+    def findings(self, question: CommuteQuery, plan: CommutePlan) -> list[str]:
         """Return what is wrong with a plan, a sentence each; an empty list if it can be carried out."""
         known = self._points()
         here, found = "", []
@@ -213,7 +213,7 @@ class LlmPlanner:
         stops = self._legs.stops
         return origin in stops and destination in stops and destination in self._legs.reached_from(origin)
 
-    def trip_of(self, plan: CommutePlan, question: Question) -> Trip | None:
+    def trip_of(self, plan: CommutePlan, question: CommuteQuery) -> Trip | None:
         """Return a plan as a trip; None (and counted) if it cannot be carried out now."""
         legs: list[Leg] = []
         at = _Standing(question.here, "", question.now)
@@ -227,7 +227,7 @@ class LlmPlanner:
             at = _Standing(leg.end, step.goal_place, leg.arrive)
         return Trip(question.now, tuple(legs)) if legs else None
 
-    def _leg(self, step: CommuteStep, at: _Standing, question: Question) -> Leg | None:
+    def _leg(self, step: CommuteStep, at: _Standing, question: CommuteQuery) -> Leg | None:
         to = step.goal_place
         if step.transit_type == "bus":
             ids = [name for name in question.closed if isinstance(name, str)]
@@ -239,7 +239,7 @@ class LlmPlanner:
         end = question.goal if to == _GOAL else self._points()[to]
         return self._legs.walk(at.point, end, at.time)
 
-    def _walk(self, question: Question) -> Trip | None:
+    def _walk(self, question: CommuteQuery) -> Trip | None:
         leg = self._legs.walk(question.here, question.goal, question.now)
         return None if leg is None else Trip(question.now, (leg,))
 

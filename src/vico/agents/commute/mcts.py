@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vico.agents.commute.legs import LegMaker
-from vico.agents.commute.question import Question
-from vico.agents.commute.stops import nearest
+from vico.agents.commute.commuter import CommuteQuery
+from vico.agents.commute.legs import LegMaker, nearest_point
 from vico.rules import BIKE_SPEED, WALK_SPEED
 from vico.seeds import rng
 from vico.world.model import Point2
@@ -115,14 +114,14 @@ class MctsPlanner:
         self._reached = {stop: self._legs.reached_from(stop) for stop in self._legs.stops}
         self._calls = 0
 
-    def __call__(self, question: Question) -> Trip | None:
+    def __call__(self, question: CommuteQuery) -> Trip | None:
         """Return the trip that the search finds; on a bicycle, that brings it back first."""
         self._calls += 1
         if question.vehicle == "bike":
             return self._legs.brought_back(question.here, question.goal, question.now, question.closed)
         return self._carried_out(self.search(question), question)
 
-    def search(self, question: Question) -> list[Move]:
+    def search(self, question: CommuteQuery) -> list[Move]:
         """Return the decisions of the best node found."""
         chance = rng(self._seed, "mcts", self._calls)
         root = Node(question.here, 0.0)
@@ -135,7 +134,7 @@ class MctsPlanner:
             low = min(low, value)
             if value > best_reward:
                 best, best_reward = node, value
-            _backed_up(node, value)
+            _back_up(node, value)
         moves: list[Move] = []
         walker: Node | None = best
         while walker is not None and walker.move is not None:
@@ -143,10 +142,10 @@ class MctsPlanner:
             walker = walker.parent
         return moves[::-1]
 
-    def _reward(self, node: Node, question: Question) -> float:
+    def _reward(self, node: Node, question: CommuteQuery) -> float:
         return -node.seconds - self._settings.alpha * math.dist(node.point, question.goal)
 
-    def _selected(self, node: Node, question: Question, scale: float) -> Node:
+    def _selected(self, node: Node, question: CommuteQuery, scale: float) -> Node:
         """Go down to a node that has moves left to try, by UCB1."""
         while True:
             if node.untried is None:
@@ -162,7 +161,7 @@ class MctsPlanner:
                 ),
             )
 
-    def _expanded(self, node: Node, question: Question, chance: np.random.Generator) -> Node:
+    def _expanded(self, node: Node, question: CommuteQuery, chance: np.random.Generator) -> Node:
         if not node.untried:
             return node
         move = node.untried.pop(int(chance.integers(len(node.untried))))
@@ -180,15 +179,15 @@ class MctsPlanner:
         seconds += math.dist(point, move.end) / SPEEDS[move.mode]
         return Node(move.end, seconds, move, node, node.depth + 1)
 
-    def _moves(self, node: Node, question: Question) -> list[Move]:
+    def _moves(self, node: Node, question: CommuteQuery) -> list[Move]:
         """Return what one may decide at a node: 1 + bus stops + bicycle stations at most."""
         if node.depth >= self._settings.depth or math.dist(node.point, question.goal) <= 1.0:
             return []
-        moves = [Move("walk", _towards(node.point, question.goal, self._settings.stride))]
-        stop = nearest(node.point, self._legs.stops, question.closed)
+        moves = [Move("walk", _point_towards(node.point, question.goal, self._settings.stride))]
+        stop = nearest_point(node.point, self._legs.stops, question.closed)
         if stop is not None:
             moves += [Move("bus", self._legs.stops[to], stop, to) for to in self._reached[stop]]
-        station = nearest(node.point, {name: self._point(name) for name in self._legs.stations}, question.closed)
+        station = nearest_point(node.point, {name: self._point(name) for name in self._legs.stations}, question.closed)
         if station is not None:
             moves += [Move("bike", self._point(to), station, to) for to in self._legs.stations if to != station]
         return moves
@@ -198,7 +197,7 @@ class MctsPlanner:
 
     # -- decisions into trips ----------------------------------------------------------------------------------------
 
-    def _carried_out(self, moves: list[Move], question: Question) -> Trip | None:
+    def _carried_out(self, moves: list[Move], question: CommuteQuery) -> Trip | None:
         """Return the trip that the decisions come to: walks joined, rides that nobody offers left out."""
         legs: list[Leg] = []
         here, now = question.here, question.now
@@ -222,7 +221,7 @@ class MctsPlanner:
         return Trip(question.now, tuple(legs)) if legs else None
 
 
-def _backed_up(node: Node, value: float) -> None:
+def _back_up(node: Node, value: float) -> None:
     """Note a reward at a node and all above it."""
     while True:
         node.visits += 1
@@ -232,7 +231,7 @@ def _backed_up(node: Node, value: float) -> None:
         node = node.parent
 
 
-def _towards(point: Point2, goal: Point2, stride: float) -> Point2:
+def _point_towards(point: Point2, goal: Point2, stride: float) -> Point2:
     away = math.dist(point, goal)
     if away <= stride:
         return goal

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from vico.agents.commute.commuter import CommuteQuery
 from vico.agents.commute.legs import LegMaker
-from vico.agents.commute.question import Question
-from vico.agents.narrow_places import leads_out
+from vico.agents.travel import can_ride_out
 from vico.rules import BIKE_RATE
 from vico.world.model import Point2
 from vico.world.public import PublicMap
@@ -102,10 +102,10 @@ class DayPlanner:
         # Where one is at an appointment with a bicycle, by its point.
         self._spots: dict[Point2, Point2 | None] = {}
         self._useless = {
-            name for name in self._legs.stations if not leads_out(self._walkable, self._legs.point_of(name))
+            name for name in self._legs.stations if not can_ride_out(self._walkable, self._legs.point_of(name))
         }
 
-    def __call__(self, question: Question) -> Trip | None:
+    def __call__(self, question: CommuteQuery) -> Trip | None:
         """Return the trip with the least cost of the rest of the day."""
         useless = self._useless | {name for name in question.closed if name in self._legs.stations}
         if useless != self._useless:
@@ -132,7 +132,7 @@ class DayPlanner:
             return math.inf if keeps else 0.0
         if (index, keeps) not in self._rest:
             here, there = self._day[index], self._day[index + 1]
-            question = Question(
+            question = CommuteQuery(
                 here=_point(here),
                 goal=_point(there),
                 now=float(here["end"]),
@@ -151,7 +151,7 @@ class DayPlanner:
 
     # -- options -----------------------------------------------------------------------------------------------------
 
-    def _on_foot(self, question: Question) -> Iterator[Option]:
+    def _on_foot(self, question: CommuteQuery) -> Iterator[Option]:
         """Yield the trips of who has no bicycle."""
         q = question
         cash = None if math.isinf(q.cash) else q.cash
@@ -168,7 +168,7 @@ class DayPlanner:
             if walk is not None and ride is not None:
                 yield self._option(Trip(q.now, (walk, ride)), q, keeps=True)
 
-    def _with_bicycle(self, question: Question) -> Iterator[Option]:
+    def _with_bicycle(self, question: CommuteQuery) -> Iterator[Option]:
         """Yield the trips of who rides a bicycle."""
         q = question
         spot = self._spot_for_bicycle(q.goal)
@@ -197,7 +197,7 @@ class DayPlanner:
 
     # -- what they cost ----------------------------------------------------------------------------------------------
 
-    def _option(self, trip: Trip, question: Question, *, keeps: bool) -> Option:
+    def _option(self, trip: Trip, question: CommuteQuery, *, keeps: bool) -> Option:
         weights = self._weights
         delay, variance = self._uncertainty(trip.legs)
         travel = trip.seconds + delay - self._spare(trip)

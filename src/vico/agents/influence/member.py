@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from vico.agents.base import Action, Info, Observation
+from vico.agents.base import Action, AgentState, Info, Observation
 from vico.agents.residents import Residents
 from vico.agents.schedule import ScheduleFollower
-from vico.agents.state import AgentState
-from vico.agents.strides import Stride
+from vico.agents.wayfinding import Stride
 from vico.world.walkable import WalkableMap
 
 # One stays for so long after what was said last, seconds, and is heard so far, metres.

@@ -1,15 +1,130 @@
-"""What a main agent knows when it decides: public profiles, everybody's day, its own conversations, nothing else."""
+"""What a main agent knows when it decides: public profiles, everybody's day, its own conversations and visits.
+
+It knows nothing else. A day says where somebody is to be found, and when they are on the way. A visit says what became
+of going to somebody: talked, or why not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from vico.agents.influence.days import DayPlan
-from vico.agents.influence.profiles import Profile
+from vico.agents.day_plan import ScheduleItem
+from vico.clock import DAY, seconds_of_day
+from vico.english import split_name
+
+#: The big five, in the order of `Profile.five`.
+BIG_FIVE = ("openness", "conscientiousness", "extraversion", "agreeableness", "neuroticism")
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Somebody one knows: the other's id, what ties the two, and how strongly, 0..1."""
+
+    other: str
+    kind: str
+    strength: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What is known of a resident.
+
+    Attributes
+    ----------
+    id
+        Name of the agent.
+    values
+        What matters most to them, the first most.
+    five
+        The big five, 0..1, in the order of `FIVE`.
+    groups
+        Names of the groups they belong to.
+    ties
+        Whom they know.
+    """
+
+    id: str
+    name: str
+    age: int
+    occupation: str
+    values: tuple[str, ...]
+    five: tuple[float, float, float, float, float]
+    traits: tuple[str, ...]
+    hobbies: tuple[str, ...]
+    groups: tuple[str, ...]
+    ties: tuple[Tie, ...]
+    lifestyle: str = ""
+    biography: str = ""
+
+    @property
+    def first_name(self) -> str:
+        """What one calls them."""
+        return split_name(self.name)[1]
+
+    def trait(self, name: str) -> float:
+        """Return one of the big five, 0..1."""
+        return self.five[BIG_FIVE.index(name)]
+
+    def tie_to(self, other: str) -> float:
+        """Return how strongly they are tied to somebody, 0 for strangers."""
+        return max((tie.strength for tie in self.ties if tie.other == other), default=0.0)
+
+
+def forms_of_address(profiles: Sequence[Profile]) -> dict[str, str]:
+    """Return by id what tells each person from the others when they are spoken to: the first name, or the whole one."""
+    firsts = [profile.first_name.lower() for profile in profiles]
+    return {
+        profile.id: profile.first_name if firsts.count(profile.first_name.lower()) == 1 else profile.name
+        for profile in profiles
+    }
+
+
+@dataclass(frozen=True)
+class PlannedStay:
+    """A stretch of a day: at a place, or on the way where `place` is None; seconds of the day."""
+
+    start: float
+    end: float
+    place: str | None
+    type: str
+    activity: str
+
+    @property
+    def can_talk(self) -> bool:
+        """Whether one can be spoken to: somewhere, and awake."""
+        return self.place is not None and self.type != "sleep"
+
+
+@dataclass(frozen=True)
+class DayPlan:
+    """All stays of a day, in order."""
+
+    stays: tuple[PlannedStay, ...]
+
+    def at(self, time: float) -> PlannedStay:
+        """Return what somebody does at a time, seconds."""
+        of_day = time % DAY
+        return next((stay for stay in reversed(self.stays) if stay.start <= of_day), self.stays[0])
+
+    def chances(self, now: float, until: float) -> Iterable[PlannedStay]:
+        """Yield the stays between two times of the day in which one can be spoken to."""
+        return (stay for stay in self.stays if stay.can_talk and stay.end > now and stay.start < until)
+
+
+def day_plan_of(schedule: Iterable[ScheduleItem]) -> DayPlan:
+    """Return a schedule as a plan; the last item lasts until midnight."""
+    items = list(schedule)
+    stays = []
+    for item in items:
+        end = DAY if item is items[-1] else seconds_of_day(item.end)
+        place = None if str(item.type) == "commute" else item.place
+        stays.append(PlannedStay(seconds_of_day(item.start), end, place, str(item.type), item.activity))
+    return DayPlan(tuple(stays))
+
 
 #: Messages of a conversation, and how near one talks, metres.
 ROUNDS = 3
@@ -106,3 +221,45 @@ class Dialogue(Protocol):
 
     def say(self, situation: Situation, talk: Talk, chance: np.random.Generator) -> str | None:
         """Return the next message of a conversation; None to end it."""
+
+
+#: How a visit ends. All but ``talked`` say why no conversation came of it:
+#: ``not reached``: there was no way, it took too long, or the place let nobody in;
+#: ``not found``: the place was searched, or waited at, and they were not there;
+#: ``on the way``: they said that they were on their way somewhere;
+#: ``no answer``: they had walked off, or did not answer;
+#: ``nothing to say``: the strategy had nothing to say to them;
+#: ``day over``: the day of talk ended before.
+Ending = Literal["talked", "not reached", "not found", "on the way", "no answer", "nothing to say", "day over"]
+#: Those of a visit that was for nothing, in the order in which a visit goes.
+FAILURES: tuple[Ending, ...] = ("not reached", "not found", "on the way", "no answer", "nothing to say", "day over")
+
+
+@dataclass
+class Visit:
+    """Going to see somebody.
+
+    Attributes
+    ----------
+    place
+        Id of the place where they were to be met.
+    began, ended
+        Seconds of the day.
+    ending
+        What became of it; ``day over`` until something did.
+    """
+
+    target: str
+    place: str
+    began: float
+    ended: float
+    ending: Ending = "day over"
+
+    def record(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+def visit_from_record(record: Mapping[str, Any]) -> Visit:
+    """Return a visit that `Visit.record` told."""
+    return Visit(**record)

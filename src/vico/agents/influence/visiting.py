@@ -1,21 +1,62 @@
-"""Going to somebody: to where their day says they are, through the door, from room to room until they are in view."""
+"""Going to somebody: to where their day says they are, through the door, from room to room until they are in view.
+
+`room_viewpoints` says from where to look about in a room, so that nobody behind a shelf is overlooked.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vico.agents.base import Action, Info, Observation
+from vico.agents.base import Action, AgentState, Info, Observation
 from vico.agents.indoor_walk import IndoorWalker
-from vico.agents.influence.lookouts import left_over, lookouts
-from vico.agents.influence.visits import Ending
-from vico.agents.state import AgentState
+from vico.agents.influence.situation import Ending
 from vico.agents.wayfinding import Walker
 from vico.rules import WALK_SPEED
 from vico.world.public import PublicMap, PublicPlace
+
+Point = tuple[float, float]
+
+# Spots are so far apart, and none is wanted nearer than this to where one has looked from, metres.
+_VIEWPOINT_SPACING, _VIEWPOINT_DISTANCE = 6.0, 2.5
+
+
+def room_viewpoints(room: NDArray[np.float64], here: Point) -> list[Point]:
+    """Return the spots of a room that are worth going to after one has looked about `here`, ENU metres, nearest first.
+
+    Parameters
+    ----------
+    room
+        Its floor as `vico.sim.perception.InView.room` has it, shape ``(5,)``; an endless one has no spots.
+    """
+    x, y, yaw, half_length, half_width = room.tolist()
+    if not (math.isfinite(half_length) and math.isfinite(half_width)):
+        return []
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    spots = [
+        (x + cos * a - sin * b, y + sin * a + cos * b)
+        for a in _part_middles(half_length)
+        for b in _part_middles(half_width)
+    ]
+    return remaining_viewpoints(spots, here)
+
+
+def remaining_viewpoints(spots: Iterable[Point], here: Point) -> list[Point]:
+    """Return those spots that one has not looked from yet, now that one has `here`, nearest first."""
+    return sorted(
+        (spot for spot in spots if math.dist(spot, here) > _VIEWPOINT_DISTANCE), key=lambda spot: math.dist(spot, here)
+    )
+
+
+def _part_middles(half: float) -> list[float]:
+    """Return the middles of the parts that a length, twice `half`, is cut into."""
+    parts = max(1, round(2.0 * half / _VIEWPOINT_SPACING))
+    return [half * ((2 * k + 1) / parts - 1.0) for k in range(parts)]
+
 
 OUTSIDE = "outside"
 # One stops this near to somebody to talk, metres, and looks about in quarter turns.
@@ -91,7 +132,7 @@ class Visitor:
             return {"type": "wake" if state["posture"] == "lying" else "stand"}
         if state["room"]:
             self._indoors.notice(observation, info)
-        seen = seen_body(info, self._target)
+        seen = body_in_view(info, self._target)
         if seen is not None:
             return self._approach(seen, observation, info)
         if state["room"]:
@@ -217,14 +258,14 @@ class Visitor:
         in_view = info.get("in_view")
         if room != self._searched:
             self._searched, self._steps = room, 0
-            self._lookouts = [] if in_view is None else lookouts(in_view.room, here)
+            self._lookouts = [] if in_view is None else room_viewpoints(in_view.room, here)
         if not self._lookouts:
             return None
         step = self._towards_indoors(observation, self._lookouts[0], near=0.8)
         self._steps += 1
         if step is not None and self._steps <= _STEPS_A_SPOT:
             return step
-        self._lookouts, self._steps, self._turns = left_over(self._lookouts[1:], here), 0, 1
+        self._lookouts, self._steps, self._turns = remaining_viewpoints(self._lookouts[1:], here), 0, 1
         return {"type": "turn_left", "degrees": _TURN}
 
     def _through(self, door: dict[str, object], observation: Observation) -> Action:
@@ -279,7 +320,7 @@ class Visitor:
         return math.hypot(x - point[0], y - point[1])
 
 
-def seen_body(info: Info, agent: str) -> tuple[float, float, float] | None:
+def body_in_view(info: Info, agent: str) -> tuple[float, float, float] | None:
     """Return where an agent that is in view stands, ENU metres, and how far away; None if it is not in view."""
     for body in info.get("in_view", ()):
         if body.agent == agent:

@@ -1,5 +1,5 @@
-"""From pictures to ways: what is in view, what is in the way, what was seen where, and how to get to it.
+"""From pictures to paths: what is in the way, how to get to a target, and the actions that lead there.
 
-`pixels` finds what a picture shows; `voxels` keeps what stands where; `search` and `keeping` find ways; `memory` knows
-what was seen; `navigator` turns all that into actions. `docs/navigation.md` is the page about it.
+`vico.agents.perception` finds what a picture shows, and remembers what was seen. `voxels` keeps what stands where;
+`path_planning` finds paths on it; `navigator` turns all that into actions. `docs/navigation.md` is the page about it.
 """

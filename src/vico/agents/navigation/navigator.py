@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import Action, Info, Observation, heading, wrapped
-from vico.agents.navigation.keeping import PathKeeper
-from vico.agents.navigation.search import Target, furthest_straight
-from vico.agents.navigation.voxel_kernels import BESIDE_COST, SIDE, VOXEL
-from vico.agents.navigation.voxels import VoxelMap
-from vico.agents.state import AgentState
+from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.navigation.path_planning import PathKeeper, Target, furthest_straight_cell
+from vico.agents.navigation.voxels import BESIDE_COST, SIDE, VOXEL, VoxelMap
 from vico.agents.wayfinding import Walker
 from vico.exact import dot
 from vico.rules import ReasonCode, code_name
@@ -207,10 +204,10 @@ class Navigator:
     def _step(self, observation: Observation, cells: NDArray[np.int64]) -> Action:
         x, y = (float(value) for value in observation["pose"][:2])
         most = _AHEAD_ON_STAIRS if self._map.climbs else _AHEAD
-        which, limit = furthest_straight(self._map.cost, cells, x / VOXEL, y / VOXEL, most)
+        which, limit = furthest_straight_cell(self._map.cost, cells, x / VOXEL, y / VOXEL, most)
         east, north = ((float(cells[which, k]) + 0.5) * VOXEL - here for k, here in ((0, x), (1, y)))
         away = math.hypot(east, north)
-        turn = wrapped(math.atan2(north, east) - heading(observation))
+        turn = wrap_angle(math.atan2(north, east) - heading(observation))
         stride = min(away, _STRIDE)
         drift = _DRIFT if limit <= BESIDE_COST else _NARROW_DRIFT
         if math.cos(turn) <= 0.0 or stride * abs(math.sin(turn)) > drift:

@@ -1,37 +1,364 @@
-"""What stands where, as depth pictures showed it: 0.1 m voxels around the agent, and the room they leave to walk in."""
+"""Voxels of what depth pictures showed around the agent, 0.1 m each, and the room they leave to walk in.
+
+The compiled loops add what is seen, clear what is seen through, and count the room around columns.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.navigation.voxel_kernels import (
-    BUMP_LASTS,
-    CHANGED,
-    CHUNK,
-    CHUNKS,
-    FADES,
-    FLOOR,
-    IGNORED,
-    MOVES,
-    SIDE,
-    THERE,
-    TIMED,
-    UNKNOWN,
-    VOXEL,
-    Camera,
-    add_points,
-    clear_seen_through,
-    count_changes,
-    empty_voxels,
-    take_chunk,
-)
-from vico.agents.state import AgentState
+from vico.agents.base import AgentState
 from vico.exact import dot
+from vico.io.compiled import compiled
+
+#: Side of a voxel, metres, and how many make a metre.
+VOXEL, PER_METRE = 0.1, 10
+#: Columns along the side of a chunk, and chunks along the side of what is kept: powers of 2, for both wrap around.
+CHUNK, CHUNKS = 32, 16
+SIDE = CHUNK * CHUNKS
+#: Levels of a column, and which is the floor where a floor is known: its middle lies there.
+LEVELS, FLOOR = 64, 1
+#: In the way is what lies between so many levels above the floor: 0.15 to 1.85 m.
+HEAD = 18
+#: Of a chunk without a known floor.
+UNKNOWN = -1
+
+#: What moves is taken to be where it was seen for so many seconds, and what one bumped into for so many.
+FADES, BUMP_LASTS = 4, 900
+#: Squared distances, in voxels, up to which a column counts as touching, as near, and as beside.
+TOUCHING, NEAR, BESIDE = 4, 8, 20
+_REACH = 4  # the root of the last one, rounded down
+#: What a step onto a cell costs: free, not seen yet, beside something, near something; 0 is blocked.
+FREE_COST, UNSEEN_COST, BESIDE_COST, NEAR_COST = 10, 11, 16, 40
+
+_PUSH = 0.03  # metres along the ray: a surface on the border of two columns counts for the one behind it
+_EDGE = 0.15  # metres behind a voxel that a pixel must be to have been seen through it
+_RADIUS = 0.09  # of a voxel, metres
+_NEAREST = 0.3  # metres before the eye within which nothing is cleared
+
+MOVES, IGNORED = 1, 2
+
+
+class Voxels(NamedTuple):
+    """What is kept of some 51 m around; indices wrap around.
+
+    Attributes
+    ----------
+    mask
+        Which levels of a column hold something, one bit each, uint64, shape ``(SIDE, SIDE)``, ``[iy, ix]``.
+    until
+        Second up to which a column counts as taken by what moves or stopped a step, int64, shape ``(SIDE, SIDE)``.
+    ground
+        Level of the floor in a column, `UNKNOWN` where it is to be found from the column, int8, shape ``(SIDE, SIDE)``.
+    solid
+        Whether a column is in the way, uint8, shape ``(SIDE, SIDE)``: as it was counted.
+    counts
+        How many columns in the way touch a column, are near, are beside it; uint8, shape ``(SIDE, SIDE, 3)``.
+    cost
+        Of a step onto a column, 0 where it is blocked, uint8, shape ``(SIDE, SIDE)``.
+    key
+        Column and row of the chunk that lies in a place, int64, shape ``(CHUNKS, CHUNKS, 2)``.
+    base
+        Height of a chunk's lowest level's lower side, metres, float64, shape ``(CHUNKS, CHUNKS)``.
+    flags
+        Whether a chunk is there, changed, and has columns with a time to look at; bool, shape ``(CHUNKS, CHUNKS, 3)``.
+    """
+
+    mask: NDArray[np.uint64]
+    until: NDArray[np.int64]
+    ground: NDArray[np.int8]
+    solid: NDArray[np.uint8]
+    counts: NDArray[np.uint8]
+    cost: NDArray[np.uint8]
+    key: NDArray[np.int64]
+    base: NDArray[np.float64]
+    flags: NDArray[np.bool_]
+
+
+THERE, CHANGED, TIMED = 0, 1, 2
+
+
+def empty_voxels() -> Voxels:
+    """Return voxels that know nothing."""
+    whole = (SIDE, SIDE)
+    return Voxels(
+        np.zeros(whole, np.uint64),
+        np.zeros(whole, np.int64),
+        np.full(whole, UNKNOWN, np.int8),
+        np.zeros(whole, np.uint8),
+        np.zeros((*whole, 3), np.uint8),
+        np.full(whole, UNSEEN_COST, np.uint8),
+        np.zeros((CHUNKS, CHUNKS, 2), np.int64),
+        np.zeros((CHUNKS, CHUNKS)),
+        np.zeros((CHUNKS, CHUNKS, 3), np.bool_),
+    )
+
+
+class Camera(NamedTuple):
+    """A picture's lens and place.
+
+    Attributes
+    ----------
+    lens
+        Focal lengths and centre, ``fx, fy, cx, cy``, pixels.
+    rotation, shift
+        World to camera, shapes ``(3, 3)`` and ``(3,)``.
+    """
+
+    lens: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+
+@compiled
+def add_points(voxels, depth, segmentation, camera, special, limits):  # type: ignore[no-untyped-def]
+    """Enter every `limits[0]`-th pixel's point up to `limits[1]` metres off; what moves until `limits[2]`.
+
+    Where the ground is unknown, what lies above `limits[3]`, the eye, is left out: nobody sees a floor from below.
+    `special`: entities, ascending, and whether each `MOVES` or is `IGNORED`, int64, shape ``(k, 2)``.
+    """
+    step, reach, until, eye = int(limits[0]), limits[1], np.int64(limits[2]), limits[3]
+    height, width = depth.shape
+    fx, fy, cx, cy = camera.lens
+    rotation, shift = camera.rotation, camera.shift
+    before, what = -1, 0
+    for row in range(0, height, step):
+        for column in range(0, width, step):
+            z = np.float64(depth[row, column])
+            if z <= 0.0 or z > reach:
+                continue
+            entity = segmentation[row, column]
+            if entity != before:
+                before, what = entity, _kind_of(entity, special)
+            if what == IGNORED:
+                continue
+            z += _PUSH
+            x = (column + 0.5 - cx) / fx * z - shift[0]
+            y = (row + 0.5 - cy) / fy * z - shift[1]
+            z -= shift[2]
+            i = math.floor((rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z) * PER_METRE)
+            j = math.floor((rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z) * PER_METRE)
+            up = rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z
+            _enter_column(voxels, i, j, (up, eye), what == MOVES, until)
+
+
+@compiled(inline="always")
+def _kind_of(entity, special):  # type: ignore[no-untyped-def]
+    for k in range(len(special)):
+        if special[k, 0] == entity:
+            return special[k, 1]
+    return 0
+
+
+@compiled(inline="always")
+def _enter_column(voxels, i, j, heights, moves, until):  # type: ignore[no-untyped-def]
+    a, b = (i >> 5) & (CHUNKS - 1), (j >> 5) & (CHUNKS - 1)
+    if not voxels.flags[b, a, THERE] or voxels.key[b, a, 0] != i >> 5 or voxels.key[b, a, 1] != j >> 5:
+        return
+    up, eye = heights
+    level = math.floor((up - voxels.base[b, a]) * PER_METRE)
+    if level < 0 or level >= LEVELS:
+        return
+    i, j = i & (SIDE - 1), j & (SIDE - 1)
+    ground = voxels.ground[j, i]
+    if (ground == UNKNOWN and up > eye) or (ground != UNKNOWN and level > ground + HEAD):
+        return
+    if moves:
+        if level > ground + 1:
+            voxels.until[j, i] = until
+            voxels.flags[b, a, TIMED] = True
+        return
+    bit = np.uint64(1) << np.uint64(level)
+    if not voxels.mask[j, i] & bit:
+        voxels.mask[j, i] |= bit
+        voxels.flags[b, a, CHANGED] = True
+
+
+@compiled
+def clear_seen_through(voxels, depth, camera, eye, limits):  # type: ignore[no-untyped-def]
+    """Clear voxels through which a picture shows what lies behind; and what moved on, up to `limits[1]` metres off.
+
+    `limits[2]`: the second up to which what was seen now counts; what is to last longer (bumps) stays.
+    """
+    reach, until = limits[1], np.int64(limits[2])
+    for b in range(CHUNKS):
+        for a in range(CHUNKS):
+            if not voxels.flags[b, a, THERE]:
+                continue
+            corner_x = voxels.key[b, a, 0] * CHUNK * VOXEL
+            corner_y = voxels.key[b, a, 1] * CHUNK * VOXEL
+            half = CHUNK * VOXEL / 2
+            away = math.hypot(corner_x + half - eye[0], corner_y + half - eye[1])
+            if away > reach + 1.5 * half:
+                continue
+            for jj in range(CHUNK):
+                for ii in range(CHUNK):
+                    j, i = b * CHUNK + jj, a * CHUNK + ii
+                    if voxels.mask[j, i] == 0 and voxels.until[j, i] == 0:
+                        continue
+                    x, y = corner_x + (ii + 0.5) * VOXEL, corner_y + (jj + 0.5) * VOXEL
+                    if _clear_column(voxels, (j, i, b, a), (x, y), depth, camera, reach, until):
+                        voxels.flags[b, a, CHANGED] = True
+
+
+@compiled(inline="always")
+def _clear_column(voxels, place, point, depth, camera, reach, until):  # type: ignore[no-untyped-def]
+    j, i, b, a = place
+    rotation, shift = camera.rotation, camera.shift
+    ground = voxels.ground[j, i]
+    low, high = (0, LEVELS) if ground == UNKNOWN else (ground + 2, ground + HEAD + 1)
+    base = voxels.base[b, a]
+    # Where the column meets level 0's middle, in the camera's frame; a level up is `VOXEL` of the camera's up.
+    up = base + VOXEL / 2
+    x = rotation[0, 0] * point[0] + rotation[0, 1] * point[1] + rotation[0, 2] * up + shift[0]
+    y = rotation[1, 0] * point[0] + rotation[1, 1] * point[1] + rotation[1, 2] * up + shift[1]
+    z = rotation[2, 0] * point[0] + rotation[2, 1] * point[1] + rotation[2, 2] * up + shift[2]
+    top = z + rotation[2, 2] * VOXEL * high
+    if max(z, top) < _NEAREST or min(z, top) > reach:
+        return False
+    changed = False
+    for level in range(low, high):
+        bit = np.uint64(1) << np.uint64(level)
+        if voxels.mask[j, i] & bit:
+            rise = level * VOXEL
+            if _is_seen_through(
+                x + rotation[0, 2] * rise, y + rotation[1, 2] * rise, z + rotation[2, 2] * rise, depth, camera.lens
+            ):
+                voxels.mask[j, i] &= ~bit
+                changed = True
+    if 0 < voxels.until[j, i] <= until:
+        rise = (max(ground, 0) + 10) * VOXEL
+        if _is_seen_through(
+            x + rotation[0, 2] * rise, y + rotation[1, 2] * rise, z + rotation[2, 2] * rise, depth, camera.lens
+        ):
+            voxels.until[j, i] = 0
+            changed = True
+    return changed
+
+
+@compiled(inline="always")
+def _is_seen_through(x, y, z, depth, lens):  # type: ignore[no-untyped-def]
+    """Tell whether all of a voxel, given in the camera's frame, lies before what a picture shows there."""
+    if z < _NEAREST:
+        return False
+    u, v = lens[0] * x / z + lens[2], lens[1] * y / z + lens[3]
+    size = lens[0] * _RADIUS / z
+    u0, v0, u1, v1 = int(u - size), int(v - size), int(u + size), int(v + size)
+    if u - size < 0.0 or v - size < 0.0 or u1 >= depth.shape[1] or v1 >= depth.shape[0]:
+        return False
+    behind = z + _EDGE
+    if 0.0 < depth[int(v), int(u)] < behind:
+        return False
+    for row in (v0, v1):
+        for column in (u0, u1):
+            if 0.0 < depth[row, column] < behind:
+                return False
+    return True
+
+
+@compiled
+def count_changes(voxels, now, least):  # type: ignore[no-untyped-def]
+    """Count anew around the columns that came to be in the way, or ceased to be; `least`: voxels that make it so."""
+    for b in range(CHUNKS):
+        for a in range(CHUNKS):
+            if not (voxels.flags[b, a, CHANGED] or voxels.flags[b, a, TIMED]):
+                continue
+            timed = False
+            for jj in range(CHUNK):
+                for ii in range(CHUNK):
+                    j, i = b * CHUNK + jj, a * CHUNK + ii
+                    if 0 < voxels.until[j, i] <= now:
+                        voxels.until[j, i] = 0
+                    taken = voxels.until[j, i] > 0
+                    timed |= taken
+                    solid = taken or _is_solid(voxels.mask[j, i], voxels.ground[j, i], least)
+                    if solid != voxels.solid[j, i]:
+                        voxels.solid[j, i] = solid
+                        _count_around(voxels, j, i, 1 if solid else -1)
+                    elif voxels.counts[j, i, 2] == 0:
+                        voxels.cost[j, i] = _cost_of(voxels, j, i)
+            voxels.flags[b, a, CHANGED] = False
+            voxels.flags[b, a, TIMED] = timed
+
+
+@compiled
+def assign_chunk(voxels, place, key, base, ground):  # type: ignore[no-untyped-def]
+    """Give a place, row and column of a chunk, to another chunk, of which nothing is known but its floor."""
+    b, a = place
+    for jj in range(CHUNK):
+        for ii in range(CHUNK):
+            j, i = b * CHUNK + jj, a * CHUNK + ii
+            voxels.mask[j, i] = 0
+            voxels.until[j, i] = 0
+            voxels.ground[j, i] = ground[jj, ii]
+            if voxels.solid[j, i]:
+                voxels.solid[j, i] = False
+                _count_around(voxels, j, i, -1)
+            elif voxels.counts[j, i, 2] == 0:
+                voxels.cost[j, i] = UNSEEN_COST
+    voxels.key[b, a, 0], voxels.key[b, a, 1] = key
+    voxels.base[b, a] = base
+    voxels.flags[b, a, THERE] = True
+    voxels.flags[b, a, CHANGED] = voxels.flags[b, a, TIMED] = False
+
+
+@compiled(inline="always")
+def _is_solid(mask, ground, least):  # type: ignore[no-untyped-def]
+    """Tell whether a column holds at least so many voxels between ankle and head above its floor."""
+    if mask == 0:
+        return False
+    low, high = ground + 2, ground + HEAD + 1
+    if ground == UNKNOWN:
+        floor = lowest_level(mask)
+        # A tread has the riser behind it in its column, too.
+        low, high = floor + 4, min(floor + HEAD, LEVELS)
+    found = 0
+    for level in range(low, high):
+        if mask & (np.uint64(1) << np.uint64(level)):
+            found += 1
+    return found >= least
+
+
+@compiled(inline="always")
+def lowest_level(mask):  # type: ignore[no-untyped-def]
+    """Return the lowest level that holds something; of a mask that is not 0."""
+    level = 0
+    while not mask & (np.uint64(1) << np.uint64(level)):
+        level += 1
+    return level
+
+
+@compiled(inline="always")
+def _count_around(voxels, j, i, change):  # type: ignore[no-untyped-def]
+    for dy in range(-_REACH, _REACH + 1):
+        for dx in range(-_REACH, _REACH + 1):
+            square = dx * dx + dy * dy
+            if square > BESIDE:
+                continue
+            y, x = (j + dy) & (SIDE - 1), (i + dx) & (SIDE - 1)
+            voxels.counts[y, x, 2] += change
+            if square <= NEAR:
+                voxels.counts[y, x, 1] += change
+            if square <= TOUCHING:
+                voxels.counts[y, x, 0] += change
+            voxels.cost[y, x] = _cost_of(voxels, y, x)
+
+
+@compiled(inline="always")
+def _cost_of(voxels, y, x):  # type: ignore[no-untyped-def]
+    if voxels.counts[y, x, 0] > 0:
+        return np.uint8(0)
+    if voxels.counts[y, x, 1] > 0:
+        return np.uint8(NEAR_COST)
+    if voxels.counts[y, x, 2] > 0:
+        return np.uint8(BESIDE_COST)
+    return np.uint8(FREE_COST if voxels.mask[y, x] else UNSEEN_COST)
+
 
 #: Kinds of entities that do not stay where they are seen, and those that are in nobody's way.
 MOVING = ("resident", "assistant", "robot", "pedestrian", "car", "bus", "bicycle", "tram", "train", "cyclist")
@@ -110,7 +437,7 @@ class VoxelMap:
         height = -float(dot(camera.rotation[:, 2], camera.shift))
         limits = np.array([STEP, REACH, now + FADES, height])
         clear_seen_through(self.voxels, depth, camera, eye, limits)
-        add_points(self.voxels, depth, segmentation, camera, _special(entities, ignore), limits)
+        add_points(self.voxels, depth, segmentation, camera, _entity_kinds(entities, ignore), limits)
         self.refresh(now)
 
     def refresh(self, now: int) -> None:
@@ -211,7 +538,7 @@ class VoxelMap:
             levels = np.floor((heights - bases[:, None, None]) / VOXEL + 1e-6).astype(np.int8)
         for (column, row), base, level in zip(chunks, bases.tolist(), levels, strict=True):
             whole = level.repeat(CHUNK // len(level), 0).repeat(CHUNK // len(level), 1)
-            take_chunk(self.voxels, (row % CHUNKS, column % CHUNKS), (column, row), base, whole)
+            assign_chunk(self.voxels, (row % CHUNKS, column % CHUNKS), (column, row), base, whole)
 
     # Plain data.
 
@@ -240,7 +567,7 @@ class VoxelMap:
         self.refresh(0)
 
 
-def _special(entities: Mapping[int, Mapping[str, str]], ignore: ArrayLike) -> NDArray[np.int64]:
+def _entity_kinds(entities: Mapping[int, Mapping[str, str]], ignore: ArrayLike) -> NDArray[np.int64]:
     """Return entities that are no lasting obstacles, and why not."""
     found = {int(entity): IGNORED for entity in np.asarray(ignore, np.int64).tolist()}
     for entity, about in entities.items():

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from vico.agents.base import Agent
-from vico.agents.robot.carrier import Carrier
+from vico.agents.robot.carrier import Carrier, Scout, Team
 from vico.agents.robot.heuristic import Manipulator
-from vico.agents.robot.scout import Scout
-from vico.agents.robot.team import Team
 from vico.errors import InputError
 from vico.world.public import PublicMap
 

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from vico.agents.robot.chunk_shape import ChunkShape
+from vico.agents.robot.increments import ChunkShape
 
 
 class _Residual(nn.Module):  # type: ignore[misc]
@@ -32,7 +32,7 @@ class _Residual(nn.Module):  # type: ignore[misc]
         return torch.relu(x + self.layers(x))
 
 
-def _halved(before: int, after: int, size: int = 3) -> list[Any]:
+def _halving_layers(before: int, after: int, size: int = 3) -> list[Any]:
     return [nn.Conv2d(before, after, size, stride=2, padding=size // 2), nn.GroupNorm(8, after), nn.ReLU()]
 
 
@@ -50,12 +50,12 @@ class ChunkNetwork(nn.Module):  # type: ignore[misc]
         width = shape.width
         self.shape = shape
         self.eyes = nn.Sequential(
-            *_halved(3, 32, 5),
-            *_halved(32, 64),
+            *_halving_layers(3, 32, 5),
+            *_halving_layers(32, 64),
             _Residual(64),
-            *_halved(64, 128),
+            *_halving_layers(64, 128),
             _Residual(128),
-            *_halved(128, width),
+            *_halving_layers(128, width),
         )
         cells = -(-shape.side // 16)
         self.cell_place = nn.Parameter(torch.randn(cells * cells, width) * 0.02)

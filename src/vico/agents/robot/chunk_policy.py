@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from vico.agents.robot.chunk_shape import ChunkShape
-from vico.agents.robot.increments import BASE, INCREMENTS, JOINTS, STATE, arm_state, control_of
-from vico.agents.state import AgentState
+from vico.agents.base import AgentState
+from vico.agents.robot.increments import BASE, INCREMENTS, JOINTS, STATE, ChunkShape, arm_state, control_of
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
 from vico.exact import apply_matrix, each
 from vico.io.npz import read_npz
@@ -36,7 +35,7 @@ SCALES = ("state_mean", "state_std", "action_mean", "action_std")
 _ARM = len(JOINTS)
 
 
-def word_numbers(instruction: str, shape: ChunkShape) -> NDArray[np.int64]:
+def word_ids(instruction: str, shape: ChunkShape) -> NDArray[np.int64]:
     """Return the numbers of an instruction's words, 1 and up, then zeros; int64, shape ``(words,)``.
 
     A word's number is its CRC-32, so that none has to be known before.
@@ -47,7 +46,7 @@ def word_numbers(instruction: str, shape: ChunkShape) -> NDArray[np.int64]:
     return numbers
 
 
-def shrunk(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
+def downscale_picture(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
     """Return a square picture at a smaller side, pixels: colours averaged.
 
     Raises
@@ -154,9 +153,9 @@ class ChunkPolicy:
         scaled = (state - self.scales["state_mean"]) / self.scales["state_std"]
         with torch.inference_mode():
             found = self.network(
-                torch.from_numpy(np.array(shrunk(picture, self.shape.side)))[None],
+                torch.from_numpy(np.array(downscale_picture(picture, self.shape.side)))[None],
                 torch.from_numpy(scaled.astype(np.float32))[None],
-                torch.from_numpy(word_numbers(instruction, self.shape))[None],
+                torch.from_numpy(word_ids(instruction, self.shape))[None],
             )[0].numpy()
         return np.asarray(found * self.scales["action_std"] + self.scales["action_mean"], np.float32)
 

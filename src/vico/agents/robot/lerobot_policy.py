@@ -55,7 +55,7 @@ class LeRobotActor:
 
     def __init__(self, policy: Any, preprocess: Any, postprocess: Any, *, seed: int = 0) -> None:
         self._policy, self._preprocess, self._postprocess, self._seed = policy, preprocess, postprocess, seed
-        self.cameras = _checked(policy.config, "policy")
+        self.cameras = _camera_sizes(policy.config, "policy")
         self.reset()
 
     @classmethod
@@ -88,7 +88,7 @@ class LeRobotActor:
             raise SchemaError(
                 f"{folder / _CONFIG}: not the config of a LeRobot policy ({sentence_of(error)})"
             ) from None
-        _checked(config, str(folder))
+        _camera_sizes(config, str(folder))
         config.device = device
         # Weights of the whole network are in the folder; those that a backbone began with would come from a hub.
         if getattr(config, "pretrained_backbone_weights", None) is not None:
@@ -139,7 +139,7 @@ class LeRobotActor:
             "robot_type": "manipulator",
         }
         for name, size in self.cameras.items():
-            picture = torch.from_numpy(resized(observation["rgb"], size)).permute(2, 0, 1).contiguous()
+            picture = torch.from_numpy(resize_picture(observation["rgb"], size)).permute(2, 0, 1).contiguous()
             batch[name] = picture[None].float() / 255.0
         chance = rng(self._seed, "lerobot policy", self._step)
         self._step += 1
@@ -153,7 +153,7 @@ class LeRobotActor:
             raise InputError(f"LeRobot policy: {error}") from None
 
 
-def resized(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
     """Return a picture in another height and width, pixels."""
     if picture.shape[:2] == size:
         return np.array(picture)
@@ -190,7 +190,7 @@ def _lerobot() -> tuple[Any, Any]:
     return factory, configs
 
 
-def _checked(config: Any, where: str) -> dict[str, tuple[int, int]]:
+def _camera_sizes(config: Any, where: str) -> dict[str, tuple[int, int]]:
     """Return height and width of the pictures that a policy looks at, by name.
 
     Raises

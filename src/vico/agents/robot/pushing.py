@@ -10,13 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.body import ArmBody, Stance
-from vico.agents.robot.driving import Drive
-from vico.agents.robot.following import go_along
-from vico.agents.robot.grasps import thing_box
+from vico.agents.base import AgentState
+from vico.agents.robot.body import ArmBody, Drive, Stance, follow_joint_path, view_points
+from vico.agents.robot.grasps import object_box
 from vico.agents.robot.reaching import room_around
-from vico.agents.robot.sight import look
-from vico.agents.state import AgentState
 from vico.exact import dot
 from vico.geometry import distance
 from vico.kinematics.inverse import free_reach
@@ -146,7 +143,7 @@ class Pusher:
             return self._give_up(observation, f"no end of {self.stage}")
         if self.wants_picture and "depth" not in observation:
             return self._hold()
-        return _STAGES[self.stage](self, observation, angles)
+        return _PUSH_STAGES[self.stage](self, observation, angles)
 
     def _longest(self) -> float:
         way = distance(self._goal, self.thing)
@@ -181,8 +178,8 @@ class Pusher:
 
     def _look(self, observation: Mapping[str, Any], angles: Array) -> Action:
         """See how wide the thing is, and plan the arm's way down before it."""
-        seen = look(observation)
-        box = thing_box(seen.of(self._entity))
+        seen = view_points(observation)
+        box = object_box(seen.of(self._entity))
         if box is None:
             return self._end("not seen")
         self.thing = Stance.of(observation).outside(np.array([*box.centre, 0.0]))[:2]
@@ -214,7 +211,7 @@ class Pusher:
         """Drive on, towards where the thing is to be."""
         if self._looked >= _LOOKS and "depth" in observation:
             self._looked = 0.0
-            box = thing_box(look(observation).of(self._entity))
+            box = object_box(view_points(observation).of(self._entity))
             if box is not None:
                 self.thing = Stance.of(observation).outside(np.array([*box.centre, 0.0]))[:2]
         stance = Stance.of(observation)
@@ -280,7 +277,7 @@ class Pusher:
     def _follow(self, angles: Array) -> bool:
         assert self._way is not None
         most = self.body.fastest[:7] * self.period * _SHARE
-        self._point = go_along(self._way, self._point, self.servos[:7], most)
+        self._point = follow_joint_path(self._way, self._point, self.servos[:7], most)
         return self._point >= len(self._way) and float(np.abs(self._way[-1] - angles[:7]).max()) < _REACHED
 
     def _fingers(self, goal: float) -> None:
@@ -342,7 +339,7 @@ class Pusher:
         self._lifts, self._lifted = np.array(state["lifts"]).reshape(-1, 7), int(state["lifted"])
 
 
-_STAGES = {
+_PUSH_STAGES = {
     PushStage.IDLE: lambda pusher, observation, angles: pusher._hold(),
     PushStage.COME: Pusher._come,
     PushStage.ALIGN: Pusher._align,

@@ -1,4 +1,7 @@
-"""Ways of an arm to a thing, to where it is put down, and to where it is carried, planned round what was seen."""
+"""Reach planning: paths of an arm to a grasp, to a placement and to where objects are carried, around what was seen.
+
+A held object is turned so that it lies on what holds it up where it is put down, and does not jut out.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.body import ArmBody
-from vico.agents.robot.grasps import Grasp
-from vico.agents.robot.held import Held
+from vico.agents.robot.body import ArmBody, Stance, surface_height
+from vico.agents.robot.grasps import Grasp, HeldObject
+from vico.exact import apply_matrix
+from vico.geometry import distances
 from vico.kinematics.inverse import free_reach
 from vico.kinematics.planning import Arm, free_way, is_free, way_is_free
 from vico.kinematics.room import Room, room_of, seen_nothing
@@ -25,16 +29,16 @@ LIFT, GAP = 0.16, 0.02
 # Metres above a spot from which a thing comes down to it: as high as the arm reaches.
 _LIFTS = (LIFT, 0.09, 0.04)
 # Where hands come near things on purpose, the grid of what was seen is coarser than the room there is.
-_CLOSE = -0.03
-_NEARER = (0.0, -0.01, -0.02, _CLOSE)
+_END_GAP = -0.03
+_START_GAPS = (0.0, -0.01, -0.02, _END_GAP)
 # Where things are carried: hand in the base's frame, the first that can be reached.
-_CARRY = ((0.46, -0.17, 0.78), (0.50, 0.0, 0.70), (0.42, -0.25, 0.70))
-_OVER = 0.10  # metres above what it is put on that a thing is brought near
+_CARRY_POINTS = ((0.46, -0.17, 0.78), (0.50, 0.0, 0.70), (0.42, -0.25, 0.70))
+_HEIGHT_OVER_SURFACE = 0.10  # metres above what it is put on that a thing is brought near
 #: Turns of what is held about the vertical, rad.
 TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))
 
 
-class Reach(NamedTuple):
+class ReachPlan(NamedTuple):
     """Ways of an arm, angles, each shape ``(m, 7)``.
 
     Attributes
@@ -63,9 +67,9 @@ def room_around(body: ArmBody, points: Array) -> Room:
     return room_of(points, body.posts, ground=-body.stand - 0.04)
 
 
-def reach_thing(
+def plan_grasp(
     body: ArmBody, rooms: tuple[Room, Room], now: Array, grasps: Sequence[Grasp], *, skip: Collection[int] = ()
-) -> Reach | None:
+) -> ReachPlan | None:
     """Return ways to the first of some grasps that can be reached, and up with the thing; None without one.
 
     Parameters
@@ -81,7 +85,7 @@ def reach_thing(
         if number in skip:
             continue
         arm = Arm(body.chain, body.limbs(grasp.opening), rooms[0], GAP)
-        there = _there(arm, body, now, grasp.before, grasp.pose, last=rooms[1])
+        there = _approach_paths(arm, body, now, grasp.before, grasp.pose, last=rooms[1])
         if there is None:
             continue
         lifted = grasp.pose.copy()
@@ -89,13 +93,13 @@ def reach_thing(
         away = straight_way(body.chain, there[1][-1], grasp.pose, lifted)
         if away is None:
             away = there[1][::-1]
-        return Reach(*there, away, grasp.opening, number)
+        return ReachPlan(*there, away, grasp.opening, number)
     return None
 
 
-def reach_spot(
-    body: ArmBody, room: Room, now: Array, spot: Array, held: Held, turns: Sequence[float] = TURNS
-) -> Reach | None:
+def plan_placement(
+    body: ArmBody, room: Room, now: Array, spot: Array, held: HeldObject, turns: Sequence[float] = TURNS
+) -> ReachPlan | None:
     """Return ways that bring a held thing's underside to a spot, and the empty hand back up; None without one.
 
     Parameters
@@ -113,13 +117,13 @@ def reach_spot(
             pose = held.pose_over(spot, turn)
             above = pose.copy()
             above[2, 3] += lift
-            there = _there(arm, body, now, above, pose, level=level)
+            there = _approach_paths(arm, body, now, above, pose, level=level)
             if there is not None:
-                return Reach(*there, _retreat(body, there[1], pose, held.above), held.opening, number)
+                return ReachPlan(*there, _retreat_path(body, there[1], pose, held.above), held.opening, number)
     return None
 
 
-def carry_way(body: ArmBody, room: Room, now: Array, held: Held | None, *, opening: float) -> Array | None:
+def plan_carry(body: ArmBody, room: Room, now: Array, held: HeldObject | None, *, opening: float) -> Array | None:
     """Return a way to where things are carried, or folded without one, shape ``(m, 7)``; None if none is free.
 
     Parameters
@@ -130,39 +134,39 @@ def carry_way(body: ArmBody, room: Room, now: Array, held: Held | None, *, openi
     limbs = body.limbs(opening)
     arm = Arm(body.chain, held.on(limbs) if held else limbs, room, GAP)
     if held is None:
-        return _way(arm, now, body.rest)
-    for place in _CARRY:
+        return _free_path(arm, now, body.rest)
+    for place in _CARRY_POINTS:
         for turn in TURNS:
             goal = np.column_stack([held.turned(turn), place])
-            way = _level_way(arm, body, now, goal)
+            way = _level_path(arm, body, now, goal)
             if way is not None:
                 return way
-    for place in _CARRY:
+    for place in _CARRY_POINTS:
         goals = [np.column_stack([held.turned(turn), place]) for turn in TURNS]
         found = free_reach(arm, goals, now, posture=body.rest)
-        way = None if found is None else _way(arm, now, found[0])
+        way = None if found is None else _free_path(arm, now, found[0])
         if way is not None:
             return way
     return None
 
 
-def raise_way(body: ArmBody, now: Array, held: Held, height: float) -> Array | None:
+def plan_raise(body: ArmBody, now: Array, held: HeldObject, height: float) -> Array | None:
     """Return a way straight up, until a held thing's underside is above a height in the base's frame; None if it is.
 
     Where the arm does not reach that far, the way ends lower.
     """
     pose = body.hand(now)
     arm = Arm(body.chain, held.on(body.limbs(held.opening)), seen_nothing(body.posts), 0.0)
-    for up in np.arange(height + held.below + _OVER - float(pose[2, 3]), 0.02, -0.04).tolist():
+    for up in np.arange(height + held.below + _HEIGHT_OVER_SURFACE - float(pose[2, 3]), 0.02, -0.04).tolist():
         goal = pose.copy()
         goal[2, 3] += up
         way = straight_way(body.chain, now, pose, goal)
-        if way is not None and _comes(arm, way):
+        if way is not None and _is_free_at_end(arm, way):
             return way
     return None
 
 
-def _there(
+def _approach_paths(
     arm: Arm, body: ArmBody, now: Array, before: Array, pose: Array, *, last: Room | None = None, level: bool = False
 ) -> tuple[Array, Array] | None:
     """Return a free way to before a pose and the straight one to it; None if either is not free.
@@ -176,44 +180,46 @@ def _there(
     """
     comes = arm if last is None else arm._replace(room=last)
     if level:
-        over = _level_way(arm, body, now, before)
+        over = _level_path(arm, body, now, before)
         straight = None if over is None else straight_way(body.chain, over[-1], before, pose)
-        return (over, straight) if straight is not None and over is not None and _comes(comes, straight) else None
+        return (
+            (over, straight) if straight is not None and over is not None and _is_free_at_end(comes, straight) else None
+        )
     found = free_reach(arm, [before], now, posture=body.rest)
     if found is None:
         return None
     straight = straight_way(body.chain, found[0], before, pose)
-    if straight is None or not _comes(comes, straight):
+    if straight is None or not _is_free_at_end(comes, straight):
         return None
-    over = _way(arm, now, found[0])
+    over = _free_path(arm, now, found[0])
     return None if over is None else (over, straight)
 
 
-def _comes(arm: Arm, straight: Array) -> bool:
+def _is_free_at_end(arm: Arm, straight: Array) -> bool:
     """Return whether a hand may go the last bit to what it is after."""
-    return way_is_free(arm._replace(gap=_CLOSE), straight)
+    return way_is_free(arm._replace(gap=_END_GAP), straight)
 
 
-def _level_way(arm: Arm, body: ArmBody, now: Array, goal: Array) -> Array | None:
+def _level_path(arm: Arm, body: ArmBody, now: Array, goal: Array) -> Array | None:
     """Return a straight way of the hand to a pose, on which a thing hardly tilts; None if it is not free."""
     way = straight_way(body.chain, now, body.hand(now), goal)
     if way is None:
         return None
-    gap = next((gap for gap in (arm.gap, *_NEARER) if is_free(arm._replace(gap=gap), now)), None)
+    gap = next((gap for gap in (arm.gap, *_START_GAPS) if is_free(arm._replace(gap=gap), now)), None)
     return way if gap is not None and way_is_free(arm._replace(gap=gap), np.vstack([now, way])) else None
 
 
-def _way(arm: Arm, now: Array, goal: Array) -> Array | None:
+def _free_path(arm: Arm, now: Array, goal: Array) -> Array | None:
     """Return a free way; from where something is too near, one that keeps off less."""
     start = now
-    for gap in (arm.gap, *_NEARER):
+    for gap in (arm.gap, *_START_GAPS):
         nearer = arm._replace(gap=gap)
         if is_free(nearer, start):
             return free_way(nearer, start, goal)
     return None
 
 
-def _retreat(body: ArmBody, there: Array, pose: Array, tall: float) -> Array:
+def _retreat_path(body: ArmBody, there: Array, pose: Array, tall: float) -> Array:
     """Return angles that bring an empty hand off what it put down: back along itself as far as it stands high."""
     for away in np.arange(max(LIFT, tall), 0.03, -0.02).tolist():
         back = pose.copy()
@@ -222,3 +228,98 @@ def _retreat(body: ArmBody, there: Array, pose: Array, tall: float) -> Array:
         if out is not None:
             return out
     return there[::-1]
+
+
+# Things are let go of so high above what they are put on, metres.
+_ABOVE = 0.01
+# Cells of what is below a thing, metres; what is so much higher or lower than the spot is no ground for it.
+_CELL, _LEVEL_TOLERANCE = 0.03, 0.03
+# So much less of a thing held up than at best is as good; less than that is no sight of what is below it.
+_AS_GOOD, _SEES = 0.08, 0.3
+# Sides that differ by less, as a share, are alike.
+_SQUARE_RATIO = 0.85
+
+
+def plan_supported_placement(
+    body: ArmBody,
+    points: Array,
+    now: Array,
+    stance: Stance,
+    spot: Array,
+    held: HeldObject,
+    *,
+    beside: Array | None = None,
+) -> ReachPlan | None:
+    """Return ways that put a held thing down on what was seen at a spot, turned as it is held up best; None if none.
+
+    Parameters
+    ----------
+    points
+        Of all but the thing, in the base's frame, metres, shape ``(n, 3)``.
+    now
+        Angles of the arm, rad.
+    stance
+        Where the base is.
+    spot
+        For the middle of the thing's underside, ENU metres; its height counts where none is seen.
+    beside
+        Unit vector to the side from which it is reached: the longer side lies across to that; None for any way.
+    """
+    at = stance.inside(spot)
+    at[2] = surface_height(points, at)
+    turns = turns_by_support(held, points, at)
+    if beside is not None:
+        ahead = apply_matrix(beside, stance.rotation[:2, :2].T)
+        turns.insert(0, turns_along_heading(held, math.atan2(float(ahead[1]), float(ahead[0])) + math.pi / 2))
+    at[2] += _ABOVE
+    room = room_around(body, points)
+    found = (plan_placement(body, room, now, at, held, group) for group in turns)
+    return next((reach for reach in found if reach is not None), None)
+
+
+def turns_along_heading(held: HeldObject, along: float) -> list[float]:
+    """Return turns with which the longer side lies along a heading in the base's frame, rad, small ones first."""
+    found = [_wrap_angle(along - held.heading + k * math.pi) for k in (0, 1)]
+    if held.half[0] > _SQUARE_RATIO * held.half[1]:
+        found += [_wrap_angle(turn + math.pi / 2) for turn in found]
+    return sorted(found, key=abs)
+
+
+def turns_by_support(held: HeldObject, points: Array, spot: Array) -> list[list[float]]:
+    """Return turns of a thing about the vertical by how much of it lies on what was seen, in groups, the best first.
+
+    Parameters
+    ----------
+    points
+        Of all but the thing, in the base's frame, metres, shape ``(n, 3)``.
+    spot
+        For the middle of its underside, in that frame, metres, shape ``(3,)``.
+    """
+    # Across to the way there: so it juts out least over the edge of a table.
+    across = turns_along_heading(held, math.atan2(float(spot[1]), float(spot[0])) + math.pi / 2)
+    turns = [*TURNS, *across]
+    near = points[distances(points[:, :2], spot[:2]) < float(np.hypot(*held.half)) + _CELL]
+    shares = [_supported_share(held, near, spot, turn) for turn in turns]
+    best = max(shares)
+    if best < _SEES:
+        return [across, list(TURNS)]
+    good = [turn for turn, share in zip(turns, shares, strict=True) if share >= best - _AS_GOOD]
+    rest = sorted(zip(shares, turns, strict=True), key=lambda one: (-one[0], abs(one[1])))
+    return [good, [turn for _, turn in rest if turn not in good]]
+
+
+def _supported_share(held: HeldObject, points: Array, spot: Array, turn: float) -> float:
+    """Return the share of the cells below a turned thing in which something was seen that is as high as the spot."""
+    c, s = math.cos(held.heading + turn), math.sin(held.heading + turn)
+    inside = apply_matrix(points[:, :2] - spot[:2], np.array([[-s, c], [c, s]]))
+    counts = np.maximum(np.ceil(2.0 * held.half / _CELL).astype(int), 1)
+    cells = np.floor((inside / held.half + 1.0) / 2.0 * counts).astype(int)
+    below = np.all((cells >= 0) & (cells < counts), axis=1)
+    level = below & (np.abs(points[:, 2] - spot[2]) < _LEVEL_TOLERANCE)
+    seen = np.zeros(tuple(counts.tolist()), np.bool_)
+    seen[tuple(cells[level].T)] = True
+    return float(seen.mean())
+
+
+def _wrap_angle(turn: float) -> float:
+    return (turn + math.pi) % (2.0 * math.pi) - math.pi

@@ -8,17 +8,16 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from vico.agents.talk.address import address_of
-from vico.agents.talk.answers import about_person, answer_to
-from vico.agents.talk.facts import Knowledge, Moment
+from vico.agents.talk.acquaintance import address_of
+from vico.agents.talk.answers import Knowledge, Moment, TemplateTalk, about_person, answer_to
 from vico.agents.talk.grammar import Question
 from vico.agents.talk.memory import HeardMessage
-from vico.agents.talk.talker import TemplateTalk
 from vico.clock import DAY, clock_of
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError
 from vico.llm import LanguageModel, Usage
 from vico.llm.prompts import read_prompt
 
+__all__ = ["MOST_SAID", "LlmTalk", "SpokenReply", "facts_for_model", "reply_faults"]
 #: Longest answer, characters.
 MOST_SAID = 300
 # So much of a message is shown, characters; so many people and messages are among the facts.
@@ -74,10 +73,10 @@ class LlmTalk:
         return self._templates.reply(heard, question, knows, moment)
 
     def _asked(self, heard: HeardMessage, question: Question | None, knows: Knowledge, moment: Moment) -> str:
-        facts = facts_of(question, knows, moment)
+        facts = facts_for_model(question, knows, moment)
         prompt = read_prompt("talk", "reply", SpokenReply)
         told = [
-            {"by": knows.name_of(one.speaker), "at": _clock(one.time), "text": one.text}
+            {"by": knows.name_of(one.speaker), "at": _clock_text(one.time), "text": one.text}
             for one in knows.memory.heard
             if (one.time, one.speaker) != (heard.time, heard.speaker)
         ]
@@ -86,14 +85,14 @@ class LlmTalk:
         reply = self._model.ask(
             prompt.messages(facts=shown, message=message),
             SpokenReply,
-            check=lambda said: faults_of(said.text, facts, knows),
+            check=lambda said: reply_faults(said.text, facts, knows),
             rounds=1,
         )
         self.usage += reply.usage
         return " ".join(reply.value.text.split())
 
 
-def facts_of(question: Question | None, knows: Knowledge, moment: Moment) -> dict[str, Any]:
+def facts_for_model(question: Question | None, knows: Knowledge, moment: Moment) -> dict[str, Any]:
     """Return what a resident may speak of: all of it its own knowledge, as JSON has it; no message is in it."""
     me, place = knows.me, knows.public_map.place_by_id.get(moment.place)
     near = None if place is not None else knows.beside(*moment.stands)
@@ -110,7 +109,7 @@ def facts_of(question: Question | None, knows: Knowledge, moment: Moment) -> dic
     seen = [agent for agent in reversed(list(knows.memory.people)) if agent not in knows.known][:_MOST_SEEN]
     return {
         "person": {"name": me.name, "age": me.age, "occupation": me.occupation, "hobbies": list(me.hobbies)},
-        "time": _clock(moment.time),
+        "time": _clock_text(moment.time),
         "where_they_are": place.name if place is not None else f"outdoors, near {near.name}" if near else "outdoors",
         "what_they_are_about": f"I'm {moment.errand()}.",
         "day_so_far": answer_to(Question("did"), knows, moment),
@@ -121,7 +120,7 @@ def facts_of(question: Question | None, knows: Knowledge, moment: Moment) -> dic
     }
 
 
-def faults_of(text: str, facts: dict[str, Any], knows: Knowledge) -> list[str]:
+def reply_faults(text: str, facts: dict[str, Any], knows: Knowledge) -> list[str]:
     """Return why somebody can't say something: a question, or times, places and people that the facts don't hold."""
     held = json.dumps(facts, ensure_ascii=False).lower()
     said = text.lower()
@@ -137,8 +136,5 @@ def faults_of(text: str, facts: dict[str, Any], knows: Knowledge) -> list[str]:
     return faults
 
 
-def _clock(time: float) -> str:
+def _clock_text(time: float) -> str:
     return clock_of(int(time % DAY))[:5]
-
-
-__all__ = ["MOST_SAID", "LlmTalk", "SpokenReply", "facts_of", "faults_of"]

@@ -1,6 +1,7 @@
 """What residents remember of a day: whom they saw, where they were, and what they heard. All of it is bounded.
 
-Looking about is remembered every ten seconds by the clock, so that it does not matter who is asked when.
+Looking about is remembered every ten seconds by the clock, so that it does not matter who is asked when. `CrowdMemory`
+takes down in arrays whom many residents see, and tells their memories when these are wanted.
 """
 
 from __future__ import annotations
@@ -10,16 +11,30 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vico.agents.base import Info, Observation
-from vico.agents.state import AgentState
+from vico.agents.base import AgentState, Info, Observation
+from vico.crowd import Crowd
 
+__all__ = [
+    "LOOK_PERIOD",
+    "MOST_MESSAGES",
+    "MOST_PEOPLE",
+    "MOST_VISITS",
+    "RECOGNITION_DISTANCE",
+    "CrowdMemory",
+    "HeardMessage",
+    "ResidentMemory",
+    "SeenPerson",
+    "Visit",
+    "look_number",
+]
 #: Seconds between two times that one takes note of who is about, and the distance up to which one knows them, metres.
-EVERY, RECOGNISED = 10.0, 20.0
+LOOK_PERIOD, RECOGNITION_DISTANCE = 10.0, 20.0
 #: Most people, messages and visits that are remembered; what is oldest is forgotten first.
 MOST_PEOPLE, MOST_MESSAGES, MOST_VISITS = 64, 32, 48
 # So much of a message is remembered, characters.
-_MOST_TEXT = 300
+_MAX_TEXT = 300
 _PEOPLE = ("resident", "assistant")
 
 
@@ -71,13 +86,13 @@ class Visit:
     until: float | None = None
 
 
-def _nothing() -> None:
+def _no_sightings() -> None:
     """Have nothing to tell."""
 
 
-def tick_of(time: float) -> int:
+def look_number(time: float) -> int:
     """Return the number of the ten seconds that a time lies in."""
-    return int(time // EVERY)
+    return int(time // LOOK_PERIOD)
 
 
 class ResidentMemory:
@@ -93,8 +108,8 @@ class ResidentMemory:
         self.places = places
         #: In which ten seconds one looked about last.
         self.tick = -1
-        #: Tells whom one saw as one of a group, before it is asked for; see `vico.agents.talk.crowd_memory`.
-        self.settle: Callable[[], None] = _nothing
+        #: Tells whom one saw as one of a group, before it is asked for; see `vico.agents.talk.memory`.
+        self.settle: Callable[[], None] = _no_sightings
         # By agent, the one seen longest ago first.
         self._people: dict[str, tuple[float, float, float, str]] = {}
         self._heard: list[HeardMessage] = []
@@ -104,14 +119,14 @@ class ResidentMemory:
         """Take note of who is about, if it is time to."""
         state = observation["state"]
         time = float(state["time"])
-        if (tick := tick_of(time)) == self.tick:
+        if (tick := look_number(time)) == self.tick:
             return
         self.tick = tick
         if "in_view" not in info or state["posture"] == "lying":
             return
         self.settle()
         place = str(state["place"] or "")
-        for body in info["in_view"].within(RECOGNISED):
+        for body in info["in_view"].within(RECOGNITION_DISTANCE):
             if body.agent and body.kind in _PEOPLE:
                 self.see(body.agent, time, float(body.position[0]), float(body.position[1]), place)
 
@@ -125,7 +140,7 @@ class ResidentMemory:
     def listen(self, observation: Observation) -> None:
         """Remember what is said."""
         for message in observation["events"]:
-            heard = HeardMessage(float(message["time"]), str(message["speaker"]), str(message["text"])[:_MOST_TEXT])
+            heard = HeardMessage(float(message["time"]), str(message["speaker"]), str(message["text"])[:_MAX_TEXT])
             self._heard.append(heard)
         del self._heard[:-MOST_MESSAGES]
 
@@ -193,15 +208,73 @@ class ResidentMemory:
         ]
 
 
-__all__ = [
-    "EVERY",
-    "MOST_MESSAGES",
-    "MOST_PEOPLE",
-    "MOST_VISITS",
-    "RECOGNISED",
-    "HeardMessage",
-    "ResidentMemory",
-    "SeenPerson",
-    "Visit",
-    "tick_of",
-]
+_LYING = 2
+# Memories are told at the latest after so many times of looking about.
+_MOST_PENDING = 60
+
+
+class CrowdMemory:
+    """Looks about for members of a group; each remembers what it would by itself (`ResidentMemory.look`).
+
+    Parameters
+    ----------
+    memories
+        Of the members, by number; None for one that has none.
+    """
+
+    def __init__(self, memories: Sequence[ResidentMemory | None]) -> None:
+        self._memories = memories
+        self._tick = -1
+        self._pending: list[tuple[float, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]] = []
+        self._agents: tuple[object, list[str]] = None, []
+        for memory in memories:
+            if memory is not None:
+                memory.settle = self.settle
+
+    def look(self, crowd: Crowd, asked: NDArray[np.int64], number: Callable[[], NDArray[np.int64]]) -> None:
+        """Take down who is about, if it is time to.
+
+        Parameters
+        ----------
+        asked
+            Numbers of the members that are asked now, int64, shape ``(n,)``.
+        number
+            Returns the members' numbers by row of the crowd; -1 for others.
+        """
+        if (tick := look_number(crowd.time)) == self._tick:
+            return
+        self._tick = tick
+        if self._agents[0] is not crowd.index:
+            self.settle()
+            self._agents = crowd.index, sorted(crowd.index, key=lambda name: crowd.index[name])
+        looks = np.zeros(len(self._memories) + 1, bool)  # the last one is for those who are no members
+        for k in asked.tolist():
+            memory = self._memories[k]
+            if memory is not None and memory.tick != tick:
+                memory.tick, looks[k] = tick, True
+        me = number()[crowd.viewer]
+        kept = looks[me] & (crowd.distance <= RECOGNITION_DISTANCE) & (crowd.posture[crowd.viewer] != _LYING)
+        if kept.any():
+            viewer, seen = crowd.viewer[kept], crowd.seen[kept]
+            where = np.column_stack([crowd.pose[seen, :2], crowd.place[viewer]])
+            self._pending.append((float(crowd.time), me[kept], seen, where))
+        if len(self._pending) >= _MOST_PENDING:
+            self.settle()
+
+    def settle(self) -> None:
+        """Tell all memories what was taken down for them."""
+        if not self._pending:
+            return
+        time = np.concatenate([np.full(len(me), when) for when, me, _, _ in self._pending])
+        me, seen, where = (np.concatenate([one[k] for one in self._pending]) for k in (1, 2, 3))
+        self._pending = []
+        pair = me * (int(seen.max()) + 1) + seen
+        # Only the last time counts; in order, so that the same ones are forgotten.
+        _, last = np.unique(pair[::-1], return_index=True)
+        kept = np.sort(len(pair) - 1 - last)
+        agents = self._agents[1]
+        rows = zip(me[kept].tolist(), seen[kept].tolist(), time[kept].tolist(), where[kept].tolist(), strict=True)
+        for k, other, when, (x, y, place) in rows:
+            memory = self._memories[k]
+            assert memory is not None
+            memory.see(agents[other], when, x, y, memory.places[int(place)] if place >= 0 else "")

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from vico.agents.base import Agent
-from vico.agents.teaming.escort import Escort
-from vico.agents.teaming.finder import Finder
-from vico.agents.teaming.guiding import Leader
-from vico.agents.teaming.resting import Resting
-from vico.agents.teaming.spotter import Spotter
+from vico.agents.teaming.escort import Escort, Guide
+from vico.agents.teaming.object_search import Finder, Spotter
+from vico.agents.teaming.team_skills import IdleRobot
 from vico.errors import InputError
 from vico.world.public import PublicMap
 
@@ -38,13 +36,13 @@ def make_team(method: str, told: Mapping[str, Any], public_map: PublicMap, *, se
         case "accompany":
             return {"robot_0": Escort(told, public_map, stays_near=together)}
         case "guide":
-            return {"robot_0": Leader(told, public_map, looks_back=together)}
+            return {"robot_0": Guide(told, public_map, looks_back=together)}
         case "spot" if together:
             return {
                 "robot_0": Spotter(told, public_map, other="robot_1"),
                 "robot_1": Finder(told, spotter="robot_0"),
             }
         case "spot":
-            return {"robot_0": Resting(), "robot_1": Finder(told, spotter="")}
+            return {"robot_0": IdleRobot(), "robot_1": Finder(told, spotter="")}
         case category:
             raise InputError(f"teaming: no category called {category!r}; there are accompany, guide and spot")

@@ -21,8 +21,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from vico.challenges.commute import rules
-from vico.challenges.commute.model import Appointment, Commuter, CommuteTask
+from vico.challenges.commute import tasks
+from vico.challenges.commute.tasks import Appointment, Commuter, CommuteTask
 from vico.community import build_community
 from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError, InputError
@@ -39,7 +39,7 @@ _PUBLIC = (Category.STORE, Category.FOOD, Category.ENTERTAINMENT, Category.OFFIC
 _TRIES = 50
 
 
-def generate_commute(world: World, *, seed: int, hours: float = rules.HOURS) -> CommuteTask:
+def generate_commute(world: World, *, seed: int, hours: float = tasks.HOURS) -> CommuteTask:
     """Make one episode's task; the same world, seed and hours give the same task.
 
     Parameters
@@ -56,8 +56,8 @@ def generate_commute(world: World, *, seed: int, hours: float = rules.HOURS) -> 
     EmptyInputError
         If the world has too few places far enough apart.
     """
-    if not rules.LEAST_HOURS <= hours <= rules.MOST_HOURS:
-        raise InputError(f"commute: {hours:g} hours; give {rules.LEAST_HOURS:g} to {rules.MOST_HOURS:g}")
+    if not tasks.LEAST_HOURS <= hours <= tasks.MOST_HOURS:
+        raise InputError(f"commute: {hours:g} hours; give {tasks.LEAST_HOURS:g} to {tasks.MOST_HOURS:g}")
     chance = rng(seed, "commute", world.digest)
     number = seed // DAYS_A_COMMUNITY
     community = _people(world, number)
@@ -68,8 +68,8 @@ def generate_commute(world: World, *, seed: int, hours: float = rules.HOURS) -> 
         if chosen is not None:
             return _task(world, resident, chosen, chance, seed=seed, community=number, hours=hours)
     raise EmptyInputError(
-        f"commute: {world.manifest.name}: no resident has {rules.LEAST_PLACES} places to go to, each "
-        f"{rules.LEAST_LEG:g} m or more from the next; use a larger world"
+        f"commute: {world.manifest.name}: no resident has {tasks.LEAST_PLACES} places to go to, each "
+        f"{tasks.LEAST_LEG:g} m or more from the next; use a larger world"
     )
 
 
@@ -89,7 +89,7 @@ def _places(world: World, resident: Resident, chance: np.random.Generator) -> li
     known = [reachable[i] for i in places if i in reachable and i != home.id]
     known = [p for p in known if p.category is not Category.TRANSIT]
     public = [p for p in reachable.values() if p.category in _PUBLIC]
-    wanted = int(chance.integers(rules.LEAST_PLACES, rules.MOST_PLACES + 1))
+    wanted = int(chance.integers(tasks.LEAST_PLACES, tasks.MOST_PLACES + 1))
     returns = bool(chance.random() < 0.5)
     day = [(home, [home.id])]
     while len(day) < wanted:
@@ -98,7 +98,7 @@ def _places(world: World, resident: Resident, chance: np.random.Generator) -> li
         options = _far_from(here, known, used) or _far_from(here, public, used)
         if not options:
             return None
-        order = chance.permutation(len(options))[: rules.CANDIDATES]
+        order = chance.permutation(len(options))[: tasks.CANDIDATES]
         candidates = [options[int(k)] for k in order]
         day.append((candidates[int(chance.integers(len(candidates)))], [p.id for p in candidates]))
     return [*day, (home, [home.id])] if returns else day
@@ -106,7 +106,7 @@ def _places(world: World, resident: Resident, chance: np.random.Generator) -> li
 
 def _far_from(here: list[Place], places: list[Place], used: set[str]) -> list[Place]:
     far = [p for p in places if p.id not in used]
-    return [p for p in far if all(_metres(p, place) >= rules.LEAST_LEG for place in here)]
+    return [p for p in far if all(_metres(p, place) >= tasks.LEAST_LEG for place in here)]
 
 
 def _metres(a: Place, b: Place) -> float:
@@ -125,14 +125,14 @@ def _task(
 ) -> CommuteTask:
     """Give the places their times."""
     legs = [_metres(a, b) for (a, _), (b, _) in pairwise(chosen)]
-    slack = [round(leg / WALK_SPEED * (1.0 + float(chance.uniform(*rules.SLACK)))) for leg in legs]
+    slack = [round(leg / WALK_SPEED * (1.0 + float(chance.uniform(*tasks.SLACK)))) for leg in legs]
     between = len(chosen) - 2
-    rest = hours * 3600.0 - sum(slack) - rules.LAST_STAY - between * rules.LEAST_STAY
+    rest = hours * 3600.0 - sum(slack) - tasks.LAST_STAY - between * tasks.LEAST_STAY
     weights = chance.uniform(0.5, 1.5, between)
-    stays = [rules.LEAST_STAY + round(max(0.0, rest) * float(w) / float(weights.sum())) for w in weights]
-    end = rules.MORNING + 60 * int(chance.integers(60))
-    times = [(end - rules.LEAST_STAY, end)]
-    for gap, stay in zip(slack, [*stays, rules.LAST_STAY], strict=True):
+    stays = [tasks.LEAST_STAY + round(max(0.0, rest) * float(w) / float(weights.sum())) for w in weights]
+    end = tasks.MORNING + 60 * int(chance.integers(60))
+    times = [(end - tasks.LEAST_STAY, end)]
+    for gap, stay in zip(slack, [*stays, tasks.LAST_STAY], strict=True):
         start = times[-1][1] + gap
         times.append((start, start + stay))
     return CommuteTask(

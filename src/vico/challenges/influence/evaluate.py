@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from vico.agents.influence.visits import FAILURES, Ending
-from vico.challenges.influence.day import Day
-from vico.challenges.influence.ledger import Ledger
+from vico.agents.influence.situation import FAILURES, Ending
+from vico.challenges.influence.day import Day, Ledger
 from vico.challenges.records import Metric, Part
 
 #: Rankings by language models go by this name beside the opinion model's variants.

@@ -14,7 +14,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from vico.agents.influence.profiles import FIVE
+from vico.agents.influence.situation import BIG_FIVE
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.rules import LONGEST_TEXT
@@ -42,7 +42,7 @@ class Appeal(DataRecord):
     appetite: dict[str, Annotated[float, Field(ge=-1.0, le=1.0)]] = Field(default_factory=dict)
 
 
-class Terms(DataRecord):
+class TermList(DataRecord):
     """Words without a name of their own."""
 
     terms: tuple[str, ...]
@@ -54,9 +54,9 @@ class LexiconFile(DataRecord):
     value: tuple[Theme, ...] = ()
     hobby: tuple[Theme, ...] = ()
     appeal: tuple[Appeal, ...] = ()
-    flattery: Terms = Terms(terms=())
-    pressure: Terms = Terms(terms=())
-    boasting: Terms = Terms(terms=())
+    flattery: TermList = TermList(terms=())
+    pressure: TermList = TermList(terms=())
+    boasting: TermList = TermList(terms=())
 
 
 @dataclass(frozen=True)
@@ -124,10 +124,10 @@ class Lexicon:
             terms.setdefault(Topic("hobby", name), [name])
         for name in sorted(set(groups)):
             terms.setdefault(Topic("group", name), [_circle(name)])
-        self._topics = {topic: _Terms(words) for topic, words in terms.items()}
-        self._appeals = {appeal.name: _Terms(appeal.terms) for appeal in self.appeals.values()}
+        self._topics = {topic: _TermMatcher(words) for topic, words in terms.items()}
+        self._appeals = {appeal.name: _TermMatcher(appeal.terms) for appeal in self.appeals.values()}
         manners = ("flattery", "pressure", "boasting")
-        self._manners = [_Terms([t for file in files for t in getattr(file, name).terms]) for name in manners]
+        self._manners = [_TermMatcher([t for file in files for t in getattr(file, name).terms]) for name in manners]
         self._read = lru_cache(maxsize=4096)(self._reading)
 
     def read(self, text: str) -> Reading:
@@ -148,7 +148,7 @@ class Lexicon:
         )
 
 
-class _Terms:
+class _TermMatcher:
     """Terms of one or more words, each looked for as a whole; a word may end in ``*``."""
 
     def __init__(self, terms: Iterable[str]) -> None:
@@ -192,8 +192,8 @@ def _check(opposed: dict[str, frozenset[str]], appeals: dict[str, Appeal]) -> No
         for other in sorted(others - opposed.keys()):
             raise SchemaError(f"lexicon: value {name!r} is opposed to {other!r}, which is none of them; see {GUIDE}")
     for appeal in appeals.values():
-        for trait in sorted(appeal.appetite.keys() - set(FIVE)):
-            raise SchemaError(f"lexicon: appeal {appeal.name!r}: no trait {trait!r}; use {', '.join(FIVE)}")
+        for trait in sorted(appeal.appetite.keys() - set(BIG_FIVE)):
+            raise SchemaError(f"lexicon: appeal {appeal.name!r}: no trait {trait!r}; use {', '.join(BIG_FIVE)}")
 
 
 @cached_data

@@ -12,19 +12,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from vico.agents.single import answers_of
-from vico.challenges.assistant.episode import CARS, PEDESTRIANS, for_size, residents_of_task, set_up
+from vico.agents.single import action_function
+from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, for_size, residents_of_task, set_up
+from vico.challenges.assistant.evaluate import Judge
 from vico.challenges.assistant.generate import generate_task
-from vico.challenges.assistant.judge import Judge
-from vico.challenges.assistant.model import Category, Subtask, Task
-from vico.challenges.assistant.thresholds import STEPS
-from vico.challenges.learning.env import Moment
+from vico.challenges.assistant.tasks import STEPS, Category, Subtask, Task
+from vico.challenges.learning.env import TaskStep
 from vico.clock import seconds_of_day
 from vico.community.model import Community
 from vico.english import split_name
 from vico.envs import CommunityEnv, StepResult, make
-from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
-from vico.envs.arrays.surroundings import PEOPLE, THINGS, surroundings_of
+from vico.envs.array_observations import DIRECTION, HIGH, LOW, PEOPLE, THINGS, direction, surroundings_of
 from vico.errors import InputError
 from vico.runner.loop import Step
 from vico.world.world import World
@@ -106,7 +104,7 @@ class AssistantTask:
         self._task = task = self._known[seed]
         self.env.arrange(partial(set_up, task=task), start=seconds_of_day(task.start))
         self._result = self.env.begin(task.seed)
-        self._others = answers_of(residents_of_task(task, self._community, self.env.public_map))
+        self._others = action_function(residents_of_task(task, self._community, self.env.public_map))
         self._judge = Judge(task, world, self.env.sim.ground_truth, [AGENT])
         self._judge.watch(0)
         self._steps, self._done = 0, self._count()
@@ -114,7 +112,7 @@ class AssistantTask:
         self._potential = self._value()
         return self._result
 
-    def act(self, action: Mapping[str, Any]) -> Moment:
+    def act(self, action: Mapping[str, Any]) -> TaskStep:
         """Let the residents and the assistant act for a second, and judge."""
         others = self._others(self._result.observations, self._result.infos)
         self._result = self.env.advance({**others, AGENT: action})
@@ -130,7 +128,7 @@ class AssistantTask:
         info: dict[str, Any] = {"done": self._done, "reported": self._reported()}
         if over or cut:
             info["is_success"] = all(self._judge.final())
-        return Moment(self._result, reward, terminated=over, truncated=cut, info=info)
+        return TaskStep(self._result, reward, terminated=over, truncated=cut, info=info)
 
     def allows(self, action: Mapping[str, Any]) -> bool:
         """Everything but reports of what there is not, or was reported."""
@@ -143,7 +141,7 @@ class AssistantTask:
         """Return the subtasks as rows of numbers, and what in view belongs to which.
 
         A row has: whether it was reported; things / 2; the directions of up to three sources, and of the destination
-        (`vico.envs.arrays.observation.DIRECTION`; zeros where there is none). Behind the rows stand, for each thing and
+        (`vico.envs.array_observations.DIRECTION`; zeros where there is none). Behind the rows stand, for each thing and
         then for each person that the observation tells of, in its order, ``(subtask + 1) / 6``, or 0.
         """
         observation = result.observations[AGENT]
@@ -194,7 +192,7 @@ class AssistantTask:
         if destination is None:
             return 0.0
         truth = self.env.sim.ground_truth
-        return sum(_apart(truth.object_position(name), destination.centre) for name in self._judge.things[k])
+        return sum(_ground_distance(truth.object_position(name), destination.centre) for name in self._judge.things[k])
 
     def _value(self) -> float:
         """Return the potential."""
@@ -212,7 +210,7 @@ class AssistantTask:
         here = truth.agent_position(AGENT)
         subtasks = [(k, self._task.subtasks[k]) for k in self._open()]
         held = [
-            _apart(here, s.destination.centre)
+            _ground_distance(here, s.destination.centre)
             for k, s in subtasks
             if s.destination is not None and any(truth.object_holder(n) == AGENT for n in self._judge.things[k])
         ]
@@ -222,9 +220,9 @@ class AssistantTask:
         truth = self.env.sim.ground_truth
         here = truth.agent_position(AGENT)
         if self.category == "carry":
-            return _apart(here, truth.agent_position(subtask.person.agent))
-        return min(_apart(here, truth.object_position(name)) for name in self._judge.things[k])
+            return _ground_distance(here, truth.agent_position(subtask.person.agent))
+        return min(_ground_distance(here, truth.object_position(name)) for name in self._judge.things[k])
 
 
-def _apart(a: Any, b: Any) -> float:
+def _ground_distance(a: Any, b: Any) -> float:
     return math.dist((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))

@@ -1,7 +1,6 @@
 """A task as a Gymnasium environment: one agent learns, the others live their day, a judge gives the reward.
 
-What a task is (whose it is, what is asked, when it is over, what is rewarded) is an object that keeps to
-`LearningTask`; the environment is the same for all.
+The goal is told beside what is observed: in a space of its own, or behind the numbers.
 """
 
 from __future__ import annotations
@@ -15,10 +14,27 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from vico.challenges.learning.goals import with_goal, with_goal_space
 from vico.envs import CommunityEnv, StepResult
-from vico.envs.arrays.form import ArrayForm
+from vico.envs.forms import ArrayForm
 from vico.errors import InputError, VicoError
+
+
+def with_goal_space(space: spaces.Space[Any], goal: spaces.Box[Any]) -> spaces.Space[Any]:
+    """Return the space of observations with a goal: one more entry of a Dict, more numbers of a Box."""
+    if isinstance(space, spaces.Box):
+        low, high = (np.concatenate([a, b.reshape(-1)]) for a, b in ((space.low, goal.low), (space.high, goal.high)))
+        return spaces.Box(low, high, dtype=np.float32)
+    assert isinstance(space, spaces.Dict)
+    return spaces.Dict({**space.spaces, "goal": goal})
+
+
+def with_goal(observation: Any, goal: NDArray[np.float32], space: spaces.Box[Any]) -> Any:
+    """Return an observation with a goal, whose numbers are cut off at the bounds of its space."""
+    told = np.clip(goal, space.low, space.high).astype(np.float32)
+    if isinstance(observation, np.ndarray):
+        return np.concatenate([observation, told.reshape(-1)])
+    return {**observation, "goal": told}
+
 
 #: Numbers of tasks are drawn below this where their number is not limited.
 _MANY = 2**31 - 1
@@ -27,7 +43,7 @@ _TRIES = 20
 
 
 @dataclass(frozen=True)
-class Moment:
+class TaskStep:
     """What came of an action.
 
     Attributes
@@ -75,7 +91,7 @@ class LearningTask(Protocol):
             If the world does not hold what the task needs.
         """
 
-    def act(self, action: Mapping[str, Any]) -> Moment:
+    def act(self, action: Mapping[str, Any]) -> TaskStep:
         """Do what the agent asks for, until it is asked again."""
 
     def allows(self, action: Mapping[str, Any]) -> bool:
@@ -146,7 +162,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             super().reset(seed=seed)
         else:
             super().reset(seed=seed)
-        number, self._last = begun(self.task.begin, seed, tasks=self._tasks, random=self.np_random)
+        number, self._last = begin_episode(self.task.begin, seed, tasks=self._tasks, random=self.np_random)
         self._over = False
         if isinstance(self._form, ArrayForm):
             self._form.allows = self.task.allows
@@ -195,7 +211,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         return with_goal(observation, self.task.goal(result), self.task.goal_space), info
 
 
-def begun(
+def begin_episode(
     begin: Callable[[int], StepResult], seed: int | None, *, tasks: int | None, random: np.random.Generator
 ) -> tuple[int, StepResult]:
     """Start the episode of a seed; of the first number drawn that the world holds, where there is none.

@@ -16,12 +16,11 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from vico.agents.influence.situation import Situation
-from vico.agents.influence.targets import REST, ExpectedGainTarget
+from vico.agents.influence.strategies import REVISIT_PAUSE, ExpectedGainTarget
 from vico.challenges.influence import evaluate
-from vico.challenges.influence.by_schedule import Mover, Walks, movers_of, next_visit, plans_of
+from vico.challenges.influence.challenge import Mover, Walks, movers_of, next_visit, plans_of
 from vico.challenges.influence.day import Day, make_day
-from vico.challenges.influence.generate import community_of, generate_influence
-from vico.challenges.influence.model import RESIDENTS, InfluenceSettings
+from vico.challenges.influence.tasks import RESIDENTS, InfluenceSettings, community_of, generate_influence
 from vico.community.model import Community
 from vico.errors import InputError, VicoError
 from vico.world.world import World
@@ -221,7 +220,7 @@ class InfluenceEnv(gymnasium.Env[NDArray[np.float32], Any]):
         numbers = [
             float(member in reachable),
             reachable.get(member, 1800.0) / 1800.0,
-            float(since <= REST),
+            float(since <= REVISIT_PAUSE),
             len(talks) / 3.0,
             min(since, 4 * 3600.0) / 3600.0,
             *traits,

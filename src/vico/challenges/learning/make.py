@@ -8,23 +8,21 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vico.challenges.assistant.episode import world_and_people
-from vico.challenges.assistant.model import Category
-from vico.challenges.assistant.thresholds import RESIDENTS
-from vico.challenges.commute.rules import LEGAL
+from vico.challenges.assistant.challenge import world_and_people
+from vico.challenges.assistant.tasks import RESIDENTS, Category
+from vico.challenges.commute.tasks import LEGAL
 from vico.challenges.learning.env import TaskEnv
 from vico.challenges.learning.influence import InfluenceEnv
 from vico.challenges.learning.point_goal import KINDS, PointGoal, PointGoalOptions
-from vico.challenges.robot.model import Category as RobotCategory
+from vico.challenges.robot.tasks import Category as RobotCategory
 from vico.community import build_community
 from vico.community.model import Community
-from vico.envs.vector import VectorAgentEnv, makers
+from vico.envs.vector import VectorAgentEnv, env_makers
 from vico.world.folder import kept_world
 from vico.world.world import World
 
 if TYPE_CHECKING:
-    from vico.challenges.learning.robot_team import RobotTeamEnv
-
+    from vico.challenges.learning.robot import RobotTeamEnv
 _OF_ENV = ("tasks", "seed", "render_mode")
 
 
@@ -108,10 +106,12 @@ def make_robot_work(world: World | Path | str, category: RobotCategory, **option
     Parameters
     ----------
     options
-        Those of `vico.challenges.learning.robot_stage.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
+        Those of `vico.challenges.learning.robot.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
     """
-    from vico.challenges.learning.robot import RobotWork  # physics, slow to import
-    from vico.challenges.learning.robot_stage import RobotOptions
+    from vico.challenges.learning.robot import (
+        RobotOptions,
+        RobotWork,  # physics, slow to import
+    )
 
     return _env(partial(RobotWork, *_robot_stage(world), category), RobotOptions, options)
 
@@ -122,11 +122,10 @@ def make_robot_team(world: World | Path | str, category: RobotCategory, **option
     Parameters
     ----------
     options
-        Those of `vico.challenges.learning.robot_stage.RobotOptions`, of `RobotTeamEnv` (`tasks`, `seed`) and of
+        Those of `vico.challenges.learning.robot.RobotOptions`, of `RobotTeamEnv` (`tasks`, `seed`) and of
         `vico.envs.spec.EnvSpec`; ``form`` is rich unless told.
     """
-    from vico.challenges.learning.robot_stage import RobotOptions
-    from vico.challenges.learning.robot_team import RobotTeamEnv
+    from vico.challenges.learning.robot import RobotOptions, RobotTeamEnv
 
     of_task, rest = _split(options, [field.name for field in fields(RobotOptions)])
     return RobotTeamEnv(*_robot_stage(world), category, RobotOptions(**of_task), **rest)
@@ -144,8 +143,8 @@ def make_robot_deliver_team(world: World | Path | str, **options: Any) -> RobotT
 
 def _robot_stage(world: World | Path | str) -> tuple[World, Community]:
     """Return a world, and the people of the community robot challenge."""
-    from vico.challenges.robot.thresholds import RESIDENTS as ROBOT_RESIDENTS
-    from vico.challenges.staging import world_and_people as world_and_residents
+    from vico.challenges.robot.tasks import RESIDENTS as ROBOT_RESIDENTS
+    from vico.challenges.robot_episodes import world_and_people as world_and_residents
 
     if isinstance(world, World):
         return world, build_community(world, residents=ROBOT_RESIDENTS, seed=0)
@@ -178,7 +177,7 @@ def make_task_vec(
     WorkerError
         If an environment cannot be made.
     """
-    made = makers(_made, world, None, num_envs=num_envs, options={"maker": maker, "seed": seed, **options})
+    made = env_makers(_make_by_name, world, None, num_envs=num_envs, options={"maker": maker, "seed": seed, **options})
     return VectorAgentEnv(made)
 
 
@@ -194,7 +193,7 @@ make_robot_deliver_vec = partial(make_task_vec, "make_robot_deliver")
 make_influence_vec = partial(make_task_vec, "make_influence")
 
 
-def _made(world: Path, community: None, *, maker: str, **options: Any) -> Any:
+def _make_by_name(world: Path, community: None, *, maker: str, **options: Any) -> Any:
     return globals()[maker](world, **options)
 
 

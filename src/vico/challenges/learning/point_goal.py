@@ -12,9 +12,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from scipy import sparse
 
-from vico.challenges.learning.env import Moment
+from vico.challenges.learning.env import TaskStep
 from vico.envs import CommunityEnv, Simulation, StepResult, make
-from vico.envs.arrays.observation import DIRECTION, HIGH, LOW, direction
+from vico.envs.array_observations import DIRECTION, HIGH, LOW, direction
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.world.walkable import WalkableMap
@@ -103,7 +103,7 @@ class PointGoal:
         self._away = self._way_from(self._position(result))
         return result
 
-    def act(self, action: Mapping[str, Any]) -> Moment:
+    def act(self, action: Mapping[str, Any]) -> TaskStep:
         """Take a step."""
         result = self.env.advance({self.agent: action})
         position = self._position(result)
@@ -112,7 +112,7 @@ class PointGoal:
         reward = float(arrived)
         if self.options.reward == "shaped":
             reward += (before - self._away) / 10.0 - 0.01
-        return Moment(
+        return TaskStep(
             result,
             reward,
             terminated=arrived,
@@ -125,7 +125,7 @@ class PointGoal:
         return True
 
     def goal(self, result: StepResult) -> NDArray[np.float32]:
-        """Return the direction of the goal; see `vico.envs.arrays.observation.DIRECTION`."""
+        """Return the direction of the goal; see `vico.envs.array_observations.DIRECTION`."""
         pose = np.asarray(result.observations[self.agent]["pose"], np.float64)
         return np.array(direction(self._goal, pose, math.atan2(pose[4], pose[3])), np.float32)
 
@@ -152,7 +152,7 @@ class PointGoal:
                 continue
             if float(np.hypot(*(goal - start))) < options.least:
                 continue
-            self._ways, self._corner = ways_to(walkable, goal, options.most + _MARGIN)
+            self._ways, self._corner = path_lengths_to(walkable, goal, options.most + _MARGIN)
             if math.isfinite(self._way_from(start)):
                 self._goal = goal
                 return start, goal
@@ -177,7 +177,7 @@ class PointGoal:
         return found if math.isfinite(found) else self._away
 
 
-def ways_to(
+def path_lengths_to(
     walkable: WalkableMap, goal: NDArray[np.float64], radius: float
 ) -> tuple[NDArray[np.float64], tuple[int, int]]:
     """Return how long the way to a goal is from each cell around it.

@@ -1,7 +1,12 @@
-"""One episode of pick and place in the real simulation: whoever acts, and what came of it."""
+"""Episodes of pick and place in the real simulation: whoever acts, what came of it, and demonstrations.
+
+The demonstrator drives up to the thing, and picks and places by what the robot sees and feels. A demonstrated episode
+is what policies are taught by: what the robot saw and felt, and what it did next.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -9,14 +14,37 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.increments import INCREMENTS, PERIOD, STATE, arm_state, increments_of
+from vico.agents.robot.arm_interface import ArmStage
+from vico.agents.robot.arm_skills import ArmWorker
+from vico.agents.robot.body import Stance
+from vico.agents.robot.increments import INCREMENTS, JOINTS, PERIOD, STATE, arm_state, increments_of
 from vico.assets.models.movable import movable_prototype, movable_surfaces
-from vico.challenges.pick_place.field import TABLE
-from vico.challenges.pick_place.task import NEXT_TO, PickPlaceTask, Thing, world_of_task
+from vico.assets.robots import robot_model
+from vico.challenges.pick_place.tasks import NEXT_TO, TABLE, PickPlaceTask, TaskThing, draw_task, world_of_task
+from vico.challenges.robot_tasks import arm_body
 from vico.clock import clock_of
 from vico.envs import Simulation, make
 from vico.world.world import World
 
+__all__ = [
+    "FPS",
+    "INCREMENTS",
+    "METHOD",
+    "PERIOD",
+    "ROBOT",
+    "SIDE",
+    "STATE",
+    "Actor",
+    "DemonstratedEpisode",
+    "Demonstrator",
+    "Observation",
+    "ObservationHook",
+    "Played",
+    "Verdict",
+    "demonstrate",
+    "play",
+    "simulation_of",
+]
 #: The robot's name.
 ROBOT = "robot_0"
 #: Side of its pictures unless told, pixels, as in the paper.
@@ -74,7 +102,7 @@ class Played:
 
 
 #: Told what the robot observed, and what it does next.
-Seen = Callable[[Observation], None]
+ObservationHook = Callable[[Observation], None]
 
 
 def play(
@@ -84,7 +112,7 @@ def play(
     *,
     side: int = SIDE,
     outputs: tuple[str, ...] = ("rgb", "depth", "segmentation"),
-    seen: Seen | None = None,
+    seen: ObservationHook | None = None,
     to_the_end: bool = False,
 ) -> Played:
     """Play an episode.
@@ -125,7 +153,7 @@ def play(
         if observation["sensors"]["fallen"][0]:
             cause = Verdict.FALLEN
             break
-        done = done + 1 if lifted and _judged(sim, task, observation, lifted=lifted)[0] == Verdict.DONE else 0
+        done = done + 1 if lifted and _judge(sim, task, observation, lifted=lifted)[0] == Verdict.DONE else 0
         if done * PERIOD >= _RESTS and not to_the_end:
             cause = ""
             break
@@ -133,7 +161,7 @@ def play(
     for _ in range(round(_RESTS / PERIOD)):
         before = sim.ground_truth.object_position("thing").copy()
         observation = _step(sim, {"type": "stop"})
-    found, off = _judged(sim, task, observation, lifted=lifted)
+    found, off = _judge(sim, task, observation, lifted=lifted)
     still = float(np.linalg.norm(sim.ground_truth.object_position("thing") - before)) < _STILL * PERIOD
     success = found == Verdict.DONE and still and cause != Verdict.FALLEN
     if not cause and not success and found == Verdict.DONE:
@@ -174,7 +202,7 @@ def _set_up(sim: Simulation, task: PickPlaceTask) -> None:
         _add(sim, name, thing)
 
 
-def _add(sim: Simulation, name: str, thing: Thing) -> None:
+def _add(sim: Simulation, name: str, thing: TaskThing) -> None:
     sim.scenario.add_object(
         name,
         movable_prototype(thing.kind, thing.colour),
@@ -198,7 +226,7 @@ def _rise(sim: Simulation, task: PickPlaceTask) -> float:
     return float(sim.ground_truth.object_position("thing")[2] - task.thing.position[2])
 
 
-def _judged(sim: Simulation, task: PickPlaceTask, observation: Observation, *, lifted: bool) -> tuple[str, float]:
+def _judge(sim: Simulation, task: PickPlaceTask, observation: Observation, *, lifted: bool) -> tuple[str, float]:
     """Return what is to be said of where the thing is, and how far off it is."""
     at = sim.ground_truth.object_position("thing")
     if task.destination == "table":
@@ -217,3 +245,129 @@ def _judged(sim: Simulation, task: PickPlaceTask, observation: Observation, *, l
     if not lifted:
         return Verdict.NOT_TAKEN, distance
     return Verdict.NOT_PLACED, distance
+
+
+#: What it is called in the records of a dataset.
+METHOD = "arm_worker"
+# Nearer than that the arm's own skills bring the base up, metres; on the way there, m/s and rad/s.
+_NEAR, _FASTEST, _TURNS, _GAIN, _AHEAD = 1.2, 0.5, 0.8, 1.5, 0.15
+
+
+class Demonstrator:
+    """An `ArmWorker` that is told which thing it is about and where to put it.
+
+    All it does are speeds of the base and places of the servos: what a policy can do, too.
+
+    Attributes
+    ----------
+    why
+        What did not work; empty if all did.
+    """
+
+    def __init__(self, *, period: float) -> None:
+        self._worker = ArmWorker(arm_body(robot_model("manipulator")), period=period)
+        self._task: PickPlaceTask | None = None
+        self._entity = 0
+        self._begun = 0
+        self._servos: list[float] = []
+        self.why = ""
+
+    def begin(self, task: PickPlaceTask, entity: int) -> None:
+        """Take up a task; the thing is the entity in what the robot sees."""
+        self._task, self._entity = task, entity
+
+    def act(self, observation: Observation, instruction: str) -> dict[str, Any] | None:
+        """Return the action for the coming period; None once all is done, or given up."""
+        assert self._task is not None
+        if not self._servos:
+            self._servos = [float(angle) for angle in observation["sensors"]["joint_position"]]
+        worker = self._worker
+        if self._begun and not worker.busy:
+            self.why = worker.why
+            if worker.outcome == "failed" or self._begun == 2:
+                return None
+        goal = np.array(self._task.spot if self._begun and not worker.busy else self._task.thing.position)
+        if not worker.busy:
+            way = self._approach(observation, goal)
+            if way is not None:
+                return way
+            self._begun += 1
+            if self._begun == 1:
+                worker.pick(self._entity, goal)
+            else:
+                worker.place(goal)
+        action = worker.act(observation)
+        if action["type"] != "control":  # it would drive by the map, which is no speeds
+            self.why = "drifted off"
+            return None
+        self._servos = action["vector"][: len(JOINTS)]
+        return action if worker.busy or worker.stage is ArmStage.IDLE else None
+
+    def _approach(self, observation: Observation, goal: NDArray[np.float64]) -> dict[str, Any] | None:
+        """Return speeds that bring the base straight near a goal; None if it is there."""
+        x, y, _ = Stance.of(observation).inside(goal).tolist()
+        distance, bearing = math.hypot(x, y), math.atan2(y, x)
+        if distance <= _NEAR:
+            return None
+        turn = min(max(_GAIN * bearing, -_TURNS), _TURNS)
+        forward = min(0.08 + distance - _NEAR, _FASTEST) if abs(bearing) < _AHEAD else 0.0
+        return {"type": "control", "vector": [*self._servos, forward, turn]}
+
+
+#: Frames a second.
+FPS = round(1.0 / PERIOD)
+
+
+@dataclass(frozen=True)
+class DemonstratedEpisode:
+    """An episode that was shown.
+
+    Attributes
+    ----------
+    task, played
+        What was asked for, and what came of it.
+    kept
+        Numbers of the steps that are frames of it, int64, ascending, shape ``(m,)``.
+    """
+
+    task: PickPlaceTask
+    played: Played
+    kept: NDArray[np.int64]
+
+
+def demonstrate(
+    seed: int,
+    world: World | None,
+    *,
+    seconds: int,
+    side: int,
+    drop_below: float = 0.0,
+    seen: Callable[[int, dict[str, Any]], None] | None = None,
+) -> DemonstratedEpisode:
+    """Draw the task of a seed and show how it is done.
+
+    Parameters
+    ----------
+    world
+        Whose streets it is set in; None for a level field.
+    seconds
+        That it may last.
+    side
+        Of the pictures that are wanted, pixels; the robot sees no fewer than 224, for it plans by what it sees.
+    drop_below
+        Steps whose largest increment is smaller are left out, rad and metres, as in the paper (0.01).
+    seen
+        Told the number of each step and what the robot observed then.
+    """
+    task = draw_task(seed, world, seconds=seconds)
+    count = 0
+
+    def told(observation: Observation) -> None:
+        nonlocal count
+        if seen is not None:
+            seen(count, observation)
+        count += 1
+
+    played = play(task, world, Demonstrator(period=PERIOD), side=max(side, SIDE), seen=told, to_the_end=True)
+    largest = np.abs(played.actions).max(axis=1, initial=0.0)
+    return DemonstratedEpisode(task, played, np.flatnonzero(largest >= drop_below))

@@ -1,23 +1,41 @@
-"""Trained policies as a robot's arm in a city: each is told what it was trained on, at the rate it was trained at."""
+"""Trained policies as a robot's arm in a city, and their files as methods of `vico eval robot`.
+
+Each policy is told what it was trained on, at the rate it was trained at. Files are checked before anything is
+played, and told apart by hash.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.robot.following import turned_aside
-from vico.agents.robot.increments import PERIOD
-from vico.agents.robot.policy_clock import PolicyClock
-from vico.agents.robot.skill import Errand, Ready
-from vico.agents.robot.thing_watch import ThingPose, presses
-from vico.agents.state import AgentState
-from vico.challenges.learning.manipulation.controller import ArmController, ArmMoment
-from vico.challenges.learning.manipulation.draws import APART, OPENING, RAISED, ready_angles
-from vico.challenges.learning.manipulation.options import RATE
-from vico.errors import InputError
+from vico.agents.base import AgentState
+from vico.agents.robot.arm_interface import ArmPolicy, PolicyErrand, ReadyPose
+from vico.agents.robot.body import ArmBody, rotate_aside
+from vico.agents.robot.chunk_policy import ChunkActor, ChunkPolicy
+from vico.agents.robot.grasps import ObjectPose, finger_contacts
+from vico.agents.robot.increments import PERIOD, PolicyClock
+from vico.agents.robot.lerobot_policy import LeRobotActor
+from vico.challenges.learning.manipulation.observation import size_of
+from vico.challenges.learning.manipulation.policies import ArmController, ArmState, read_policy
+from vico.challenges.learning.manipulation.scene import (
+    ACTIONS,
+    APART,
+    OPENING,
+    RAISED,
+    RATE,
+    ManipulationOptions,
+    ready_angles,
+)
+from vico.challenges.records import Setting
+from vico.challenges.robot.tasks import RobotTask
+from vico.errors import InputError, MissingFileError, SchemaError, VicoError
+from vico.io.files import read_json, sha256_of
 
 Array = NDArray[np.float64]
 
@@ -48,7 +66,7 @@ class ReinforcedArm:
     seconds = RL_SECONDS
 
     def __init__(self, pick: ArmController, place: ArmController, *, lifts: bool, period: float) -> None:
-        self.ready: Ready | None = Ready(np.array(ready_angles()), OPENING)
+        self.ready: ReadyPose | None = ReadyPose(np.array(ready_angles()), OPENING)
         self._pick, self._place = pick, place
         self._lifts = lifts
         self._clock = PolicyClock(period, own=1.0 / RATE)
@@ -57,14 +75,14 @@ class ReinforcedArm:
         self._goal = np.zeros(3)
         self._from = self._to = np.zeros(9)
 
-    def begin(self, errand: Errand, servos: Array) -> None:
+    def begin(self, errand: PolicyErrand, servos: Array) -> None:
         """Begin an errand."""
         self._places, self._entity = errand.goal is not None, errand.entity
         self._goal = self._picking_goal(errand.thing) if errand.goal is None else errand.goal.copy()
         self._from = self._to = servos.copy()
         self._clock.ticks = 0
 
-    def act(self, observation: Mapping[str, Any], thing: ThingPose) -> Array:
+    def act(self, observation: Mapping[str, Any], thing: ObjectPose) -> Array:
         """Return what the robot is told for the coming period, shape ``(11,)``; the base stands.
 
         Raises
@@ -74,7 +92,7 @@ class ReinforcedArm:
         """
         due = self._clock.tick()
         controller = self._place if self._places else self._pick
-        moment = moment_of(observation, thing, self._goal, pressing=presses(observation, self._entity))
+        moment = moment_of(observation, thing, self._goal, pressing=finger_contacts(observation, self._entity))
         for _ in range(due.asks):
             self._from = self._to
             controller.reset(self._from)
@@ -83,12 +101,12 @@ class ReinforcedArm:
                 raise InputError("policy: its action holds NaN or infinity")
         return np.concatenate([self._from + due.share * (self._to - self._from), [0.0, 0.0]])
 
-    def _picking_goal(self, thing: ThingPose) -> Array:
+    def _picking_goal(self, thing: ObjectPose) -> Array:
         """Return a goal as training draws it, metres."""
         if self._lifts:
             return thing.middle + np.array([0.0, 0.0, sum(RAISED) / 2])
         # On the side where the arm has more room, as far off as goals are at least and a little more.
-        return turned_aside(thing.middle, -1.1 * APART if thing.middle[1] > 0.0 else 1.1 * APART)
+        return rotate_aside(thing.middle, -1.1 * APART if thing.middle[1] > 0.0 else 1.1 * APART)
 
     def state(self) -> AgentState:
         """Return all it remembers."""
@@ -134,7 +152,7 @@ class ImitatingArm:
         Seconds between two actions of the robot.
     """
 
-    ready: Ready | None = None
+    ready: ReadyPose | None = None
     drives = True
     seconds = IMITATION_SECONDS
 
@@ -147,7 +165,7 @@ class ImitatingArm:
         self.instruction = ""
         self._from = self._to = np.zeros(11)
 
-    def begin(self, errand: Errand, servos: Array) -> None:
+    def begin(self, errand: PolicyErrand, servos: Array) -> None:
         """Begin an errand, told in the words of training."""
         raised = self._by_deck
         if errand.goal is not None:
@@ -159,7 +177,7 @@ class ImitatingArm:
         self._from = self._to = np.concatenate([servos, [0.0, 0.0]])
         self._clock.ticks = 0
 
-    def act(self, observation: Mapping[str, Any], thing: ThingPose) -> Array:
+    def act(self, observation: Mapping[str, Any], thing: ObjectPose) -> Array:
         """Return what the robot is told for the coming period, shape ``(11,)``.
 
         Raises
@@ -200,11 +218,11 @@ class ImitatingArm:
 
 
 def moment_of(
-    observation: Mapping[str, Any], thing: ThingPose, goal: Array, *, pressing: NDArray[np.bool_]
-) -> ArmMoment:
+    observation: Mapping[str, Any], thing: ObjectPose, goal: Array, *, pressing: NDArray[np.bool_]
+) -> ArmState:
     """Return what a policy is told of an arm and its thing; all in the frame of the base."""
     sensors = observation["sensors"]
-    return ArmMoment(
+    return ArmState(
         joints=np.asarray(sensors["joint_position"], np.float64),
         joint_rates=np.asarray(sensors["joint_velocity"], np.float64),
         box=thing.middle,
@@ -213,3 +231,197 @@ def moment_of(
         goal=goal,
         pressing=pressing,
     )
+
+
+#: Methods whose arm is moved by a policy that was learned.
+LEARNED = ("rl", "rl-decomposed", "vla")
+#: Side of robots' pictures in the challenge, pixels.
+PICTURE = 256
+_TRAIN = "scripts/train_manipulation.py"
+
+
+class _Controllers(NamedTuple):
+    """The controllers of a method of reinforcement learning."""
+
+    pick: ArmController
+    place: ArmController
+    lifts: bool
+
+
+def policy_setting(method: str, path: str) -> Setting:
+    """Return what an episode's setting says of a policy: where it lies, and its hash.
+
+    The policy is read whole, so that what is wrong with it is said before anything is played.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file or folder.
+    SchemaError
+        If it is no such policy, or one for something else; pickles are never read.
+    MissingExtraError
+        If what it runs on is not installed.
+    InputError
+        If the method needs no policy.
+    """
+    if method not in LEARNED:
+        raise InputError(f"robot: {method} has no policy; methods that have one are {', '.join(LEARNED)}")
+    if not path:
+        writes = "scripts/train_chunk_policy.py or LeRobot" if method == "vla" else _TRAIN
+        raise InputError(f"robot: {method} needs --policy with what {writes} has written")
+    if method == "vla":
+        _imitator(Path(path), seed=0)
+        return {"policy": path, "policy_sha256": _digest(_files_of(Path(path)))}
+    files = _files(method, path)
+    _controllers(method, path)
+    return {"policy": path, "policy_sha256": _digest(files)}
+
+
+def policy_settings(methods: Sequence[str], given: Sequence[str]) -> dict[str, Setting]:
+    """Return what settings say of the policies of methods, by method.
+
+    Parameters
+    ----------
+    methods
+        That are to be judged; those that were not learned need none.
+    given
+        ``METHOD=PATH``, or a path alone where one of them was learned.
+
+    Raises
+    ------
+    VicoError
+        If one is missing or too many, or as `policy_setting` does.
+    """
+    learned = [method for method in methods if method in LEARNED]
+    paths: dict[str, str] = {}
+    for one in given:
+        method, _, path = one.partition("=")
+        if method not in LEARNED:
+            if len(learned) != 1:
+                raise InputError(
+                    f"eval: --policy {one}: say whose it is, METHOD={one}; methods that have one are "
+                    f"{', '.join(LEARNED)}, and {', '.join(learned) or 'none of them'} is asked for"
+                )
+            method, path = learned[0], one
+        if method not in learned or method in paths:
+            why = "is given twice" if method in paths else "is for a method that is not asked for; add --method"
+            raise InputError(f"eval: --policy {one}: {method} {why}")
+        paths[method] = path
+    return {method: policy_setting(method, paths.get(method, "")) for method in learned}
+
+
+def read_arm_policy(method: str, setting: Setting, task: RobotTask, body: ArmBody, *, period: float) -> ArmPolicy:
+    """Return the policy of an episode.
+
+    Parameters
+    ----------
+    setting
+        With ``policy``, and ``policy_sha256`` where somebody has looked at the file before.
+    period
+        Seconds between two actions of the robot.
+
+    Raises
+    ------
+    VicoError
+        As `policy_setting` does; and if the file has changed since then.
+    """
+    path = str(setting.get("policy", ""))
+    found, wanted = policy_setting(method, path)["policy_sha256"], setting.get("policy_sha256", "")
+    if wanted and found != wanted:
+        raise SchemaError(f"policy: {path} has changed since the evaluation began; begin it anew with --force")
+    if method != "vla":
+        given = _controllers(method, path)
+        return ReinforcedArm(given.pick, given.place, lifts=given.lifts, period=period)
+    return ImitatingArm(
+        _imitator(Path(path), seed=task.seed),
+        thing=task.thing.name,
+        destination=task.destination.name,
+        by_deck=task.category == "deliver",
+        stand=body.stand,
+        period=period,
+    )
+
+
+def _controllers(method: str, path: str) -> _Controllers:
+    files = _files(method, path)
+    if method == "rl":
+        controller = _controller(files[0], "pickplace")
+        return _Controllers(controller, controller, False)
+    return _Controllers(_controller(files[0], "lift"), _controller(files[1], "place"), True)
+
+
+def _files(method: str, path: str) -> list[Path]:
+    """Return the files of a policy: of one, or of lifting and of placing."""
+    if method == "rl":
+        folder = Path(path)
+        return [folder / "policy.npz" if folder.is_dir() else folder]
+    parts = [Path(part) for part in path.split(",")]
+    if len(parts) == 1 and (parts[0].is_dir() or parts[0].suffix != ".npz"):
+        return [parts[0] / part / "policy.npz" for part in ("lift", "place")]
+    if len(parts) != 2:
+        raise InputError(
+            f"policy: {path}: rl-decomposed has two of them: give the folder that {_TRAIN} --task decomposed wrote, or "
+            "LIFT.npz,PLACE.npz"
+        )
+    return parts
+
+
+def _controller(path: Path, task: str) -> ArmController:
+    """Read a policy, and what is said of its training beside it."""
+    options = _options_beside(path, task)
+    try:
+        policy = read_policy(path, inputs=None if options is None else size_of(options.observation), outputs=ACTIONS)
+    except MissingFileError:
+        raise MissingFileError(f"policy: {path}: no such file; train one with {_TRAIN} --task {task}") from None
+    if options is None:
+        sizes = {size_of(name): name for name in ("paper", "full")}
+        if policy.inputs not in sizes:
+            raise SchemaError(
+                f"policy: {path} has {policy.inputs} inputs; observations have {' or '.join(map(str, sizes))} numbers: "
+                f"train it with {_TRAIN}"
+            )
+        options = ManipulationOptions(observation=sizes[policy.inputs])
+    return ArmController(policy.act, options)
+
+
+def _options_beside(path: Path, task: str) -> ManipulationOptions | None:
+    """Return what a policy was trained with, by the file beside it; None without one.
+
+    Raises
+    ------
+    SchemaError
+        If that says that it was trained for another task, or is of another policy.
+    """
+    about = path.with_suffix(".json")
+    if not about.is_file() or not path.is_file():
+        return None
+    content: Any = read_json(about)
+    try:
+        said, digest, options = content["task"], content["sha256"], ManipulationOptions(**content["options"])
+    except (KeyError, TypeError, VicoError) as error:
+        raise SchemaError(f"{about}: does not say how {path.name} was trained ({error}); train it anew") from None
+    if digest != sha256_of(path):
+        raise SchemaError(f"{about}: is of another policy than {path.name} (sha256 differs); keep both together")
+    if said != f"vico/{task}":
+        raise SchemaError(f"{path}: was trained for {said}, not for vico/{task}; train it with {_TRAIN} --task {task}")
+    return options
+
+
+def _imitator(path: Path, *, seed: int) -> ChunkActor | LeRobotActor:
+    """Read our chunk policy (a file), or one of LeRobot's (a folder)."""
+    if path.is_dir():
+        return LeRobotActor.read(path, seed=seed)
+    policy = ChunkPolicy.read(path)
+    if policy.shape.side > PICTURE:
+        raise SchemaError(
+            f"policy: {path} looks at pictures of {policy.shape.side} pixels; robots of the challenge see {PICTURE}"
+        )
+    return ChunkActor(policy, every=max(1, policy.shape.chunk // 2))
+
+
+def _files_of(path: Path) -> list[Path]:
+    return sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]
+
+
+def _digest(files: list[Path]) -> str:
+    return hashlib.sha256("".join(f"{path.name} {sha256_of(path)}\n" for path in files).encode()).hexdigest()

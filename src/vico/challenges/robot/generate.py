@@ -19,14 +19,11 @@ from numpy.typing import NDArray
 
 from vico.assets.models.movable import MovableKind, kinds_for
 from vico.assets.robots import robot_model
-from vico.challenges.assistant.choose import Chooser, seeded_chooser
-from vico.challenges.assistant.model import Region, Start
-from vico.challenges.assistant.regions import Neighbourhood, place_region, told
-from vico.challenges.assistant.rules import entrance_of
-from vico.challenges.drawing import Draw, described, person_of
-from vico.challenges.robot.bodies import arm_body
-from vico.challenges.robot.model import Category, RobotTask
-from vico.challenges.robot.thresholds import (
+from vico.challenges.assistant.candidates import Chooser, seeded_chooser
+from vico.challenges.assistant.evaluate import entrance_of
+from vico.challenges.assistant.placement import Neighbourhood, place_region, region_text
+from vico.challenges.assistant.tasks import Region, Start
+from vico.challenges.robot.tasks import (
     APART,
     ARM_COMES,
     CARRIER_COMES,
@@ -40,8 +37,10 @@ from vico.challenges.robot.thresholds import (
     REACH,
     SOURCE_RADIUS,
     STEPS,
+    Category,
+    RobotTask,
 )
-from vico.challenges.task_files import frame_of
+from vico.challenges.robot_tasks import Draw, arm_body, frame_of, object_description, person_of
 from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError
 from vico.seeds import rng
@@ -112,7 +111,7 @@ def _deliver(draw: Draw, frame: dict[str, Any]) -> RobotTask | None:
     source = spots[draw.pick("Where does the thing lie?", [r.name for r in spots], asker)]
     targets = [place_region(place) for place in hood.places_of(asker)]
     targets += hood.spots_of(asker, draw.chance, radius=DESTINATION_RADIUS)
-    targets = [region for region in targets if _apart(region, source)]
+    targets = [region for region in targets if _are_apart(region, source)]
     if not targets:
         return None
     target = targets[draw.pick("Where is it brought to?", [r.name for r in targets], asker)]
@@ -122,8 +121,8 @@ def _deliver(draw: Draw, frame: dict[str, Any]) -> RobotTask | None:
         return None
     thing = draw.thing("What is brought?", portable_kinds(), asker, lies)
     text = (
-        f"{asker.name} asks: bring {described(thing)} from the ground {told(source)} to {told(target)} and put it "
-        "down there."
+        f"{asker.name} asks: bring {object_description(thing)} from the ground {region_text(source)} to "
+        f"{region_text(target)} and put it down there."
     )
     asked = {"text": text, "person": person_of(asker), "waits_at": None, "thing": thing}
     return _task(draw, frame, robots, source, target, asked)
@@ -143,8 +142,8 @@ def _carry(draw: Draw, frame: dict[str, Any]) -> RobotTask | None:
     thing = draw.thing("What is brought?", portable_kinds(), asker, waits, holder=asker.id)
     person = person_of(asker)
     text = (
-        f"{asker.name}, {person.looks}, waits near by with {described(thing)}: go there and call them, take up what "
-        f"they put down, go home with them to {told(region)}, and put it down there."
+        f"{asker.name}, {person.looks}, waits near by with {object_description(thing)}: go there and call them, take "
+        f"up what they put down, go home with them to {region_text(region)}, and put it down there."
     )
     waits_at = draw.stands(waits, towards=np.array(robots[0].position))
     asked = {"text": text, "person": person, "waits_at": waits_at, "thing": thing}
@@ -205,5 +204,5 @@ def _starts(draw: Draw, start: Array) -> tuple[Start, Start] | None:
     return None if beside is None else (draw.stands(start), draw.stands(beside))
 
 
-def _apart(region: Region, other: Region) -> bool:
+def _are_apart(region: Region, other: Region) -> bool:
     return float(np.hypot(*np.subtract(region.centre[:2], other.centre[:2]))) >= APART

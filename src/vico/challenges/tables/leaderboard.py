@@ -16,7 +16,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat, StrictInt, ValidationError, model_validator
 
 from vico.challenges.records import Challenge, EpisodeRecord, Metric
-from vico.challenges.tables.files import read_results
+from vico.challenges.tables.results import read_results
 from vico.errors import InputError, SchemaError
 from vico.io.files import read_json, write_json
 

@@ -1,15 +1,92 @@
-"""What a method came to in a category: means of all metrics, causes of failure, faults, and what it cost."""
+"""What a method came to in a category: means of all metrics, causes of failure, faults, and what it cost.
+
+Means have 95 % confidence intervals, where episodes of one world are more alike than those of two.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
 from vico.challenges.episodes import Outcome
 from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting, setting_of_task
-from vico.challenges.tables.means import Estimate, estimate, estimate_of_means
-from vico.runner.faults import FAULT_KINDS
+from vico.runner.gather import FAULT_KINDS
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean, with 95 % confidence.
+
+    Attributes
+    ----------
+    low, high
+        Its interval; None where one episode, or nothing, gives none.
+    count
+        Episodes it is over.
+    clusters
+        Worlds it is over.
+    """
+
+    mean: float
+    low: float | None
+    high: float | None
+    count: int
+    clusters: int
+
+    def clipped(self, low: float, high: float) -> Estimate:
+        """Return it with an interval that does not leave some bounds."""
+        if self.low is None or self.high is None:
+            return self
+        return Estimate(self.mean, max(self.low, low), min(self.high, high), self.count, self.clusters)
+
+    @property
+    def differs(self) -> bool:
+        """Whether its interval leaves 0 out."""
+        return self.low is not None and self.high is not None and (self.low > 0.0 or self.high < 0.0)
+
+
+def estimate(values: Sequence[float], worlds: Sequence[Hashable]) -> Estimate:
+    """Return the mean of values, with an interval that is clustered by world.
+
+    Parameters
+    ----------
+    worlds
+        In which world each value was found.
+    """
+    return estimate_of_means([values], [worlds])
+
+
+def estimate_of_means(groups: Sequence[Sequence[float]], worlds: Sequence[Sequence[Hashable]]) -> Estimate:
+    """Return the mean of several groups' means (each counts the same), with an interval clustered by world."""
+    x = np.concatenate([np.asarray(group, np.float64) for group in groups])
+    where = [world for group in worlds for world in group]
+    weight = np.concatenate([np.full(len(group), 1.0 / (len(groups) * len(group))) for group in groups])
+    means = np.concatenate([np.full(len(group), float(np.mean(group))) for group in groups])
+    mean = float(np.mean([np.mean(group) for group in groups]))
+    clusters = len(set(where))
+    labels: Sequence[Hashable] = where if clusters > 1 else range(len(x))
+    spread = _spread(weight * (x - means), labels)
+    if spread is None:
+        return Estimate(mean, None, None, len(x), clusters)
+    return Estimate(mean, mean - spread, mean + spread, len(x), clusters)
+
+
+def _spread(residuals: NDArray[np.float64], labels: Sequence[Hashable]) -> float | None:
+    """Return half the interval's width; None for a single cluster."""
+    sums: dict[Hashable, float] = {}
+    for label, residual in zip(labels, residuals, strict=True):
+        sums[label] = sums.get(label, 0.0) + float(residual)
+    number = len(sums)
+    if number < 2:
+        return None
+    variance = number / (number - 1) * math.fsum(value**2 for value in sums.values())
+    return math.sqrt(variance) * float(stats.t.ppf(0.975, number - 1))
 
 
 @dataclass(frozen=True)
@@ -161,7 +238,7 @@ def _difference(
 ) -> Difference:
     found = {}
     for metric in metrics:
-        pairs = _paired(outcomes, others, metric.key)
+        pairs = _paired_differences(outcomes, others, metric.key)
         if pairs:
             found[metric.key] = estimate([value for value, _ in pairs], [world for _, world in pairs])
     both = _tasks(outcomes) & _tasks(others)
@@ -184,7 +261,7 @@ def _averages(
         if not all(values):
             continue
         mean = estimate_of_means([[v for v, _ in group] for group in values], [[w for _, w in g] for g in values])
-        pairs = [_paired(groups[c, method], groups.get((c, reference), []), key) for c in categories]
+        pairs = [_paired_differences(groups[c, method], groups.get((c, reference), []), key) for c in categories]
         difference = None
         if method != reference and all(pairs):
             difference = estimate_of_means([[v for v, _ in p] for p in pairs], [[w for _, w in p] for p in pairs])
@@ -201,7 +278,7 @@ def _values(outcomes: Sequence[Outcome], key: str) -> list[tuple[float, str]]:
     return [(o.record.metrics[key], _world(o)) for o in outcomes if o.record is not None and key in o.record.metrics]
 
 
-def _paired(outcomes: Sequence[Outcome], others: Sequence[Outcome], key: str) -> list[tuple[float, str]]:
+def _paired_differences(outcomes: Sequence[Outcome], others: Sequence[Outcome], key: str) -> list[tuple[float, str]]:
     """Return how much larger a metric is than in the other method's episode of the same task, and in which world."""
     theirs = {_task(o): o.record.metrics[key] for o in others if o.record is not None and key in o.record.metrics}
     return [

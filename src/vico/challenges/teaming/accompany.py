@@ -17,14 +17,20 @@ from typing import Any
 
 import numpy as np
 
-from vico.agents.teaming.visitor import LETS_GO
-from vico.challenges.assistant.regions import place_region
-from vico.challenges.assistant.rules import entrance_of
-from vico.challenges.drawing import Draw, person_of
-from vico.challenges.teaming.drawing import has_ways, pace, somebody, walk_task
-from vico.challenges.teaming.looking import Company, Look, away
-from vico.challenges.teaming.model import TeamingTask, Walk
-from vico.challenges.teaming.thresholds import (
+from vico.agents.teaming.people import LETS_GO
+from vico.challenges.assistant.evaluate import entrance_of
+from vico.challenges.assistant.placement import place_region
+from vico.challenges.robot_tasks import Draw, person_of
+from vico.challenges.teaming.category import (
+    Accompaniment,
+    JudgeSample,
+    draw_pace,
+    draw_person,
+    ground_distance,
+    has_routes,
+    walk_task,
+)
+from vico.challenges.teaming.tasks import (
     DOOR_DISTANCE,
     DOOR_GRACE,
     DOOR_SHARE,
@@ -35,6 +41,8 @@ from vico.challenges.teaming.thresholds import (
     WAITS_WITHIN,
     WITH_DISTANCE,
     WITH_SHARE,
+    TeamingTask,
+    Walk,
 )
 from vico.world.world import World
 
@@ -52,7 +60,7 @@ CAUSES = (
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     """Draw a task; None where this start has no place to go to."""
-    who, hood = somebody(draw)
+    who, hood = draw_person(draw)
     world = draw.world
     at_home = world.place_by_id[who.home].building
     near = [p for p in hood.places_of(who) if p.entrance and LEAST_WALK <= hood.distance(p.position) <= MOST_WALK]
@@ -62,7 +70,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
         return None
     target = targets[draw.pick("Where to?", [place.name for place in targets], who)]
     door = np.array(target.position[:2])
-    if not has_ways(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (door, DOOR_DISTANCE / 2)):
+    if not has_routes(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (door, DOOR_DISTANCE / 2)):
         return None
     comes_out = bool(draw.chance.integers(2))
     stay = round(float(draw.chance.uniform(*STAYS)), 1) if comes_out else None
@@ -80,7 +88,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
         text=text,
         person=person,
         destination=region,
-        walk=lambda: Walk(waits_at=draw.stands(waits, towards=hood.start), pace=pace(draw), stay=stay),
+        walk=lambda: Walk(waits_at=draw.stands(waits, towards=hood.start), pace=draw_pace(draw), stay=stay),
     )
 
 
@@ -103,15 +111,15 @@ class Accompany:
         self._door = entrance_of(task.destination, world)
         self.done_at: float | None = None
         self.over = False
-        self.company = Company()
+        self.company = Accompaniment()
         self._called = self._failed = False
         self._inside_since: float | None = None
         self._stood = 0.0
         self._waited = self._at_door = 0
 
-    def look(self, look: Look) -> None:
+    def look(self, look: JudgeSample) -> None:
         """Take in how things stand."""
-        at_door = look.stands[0] and away(look.robots[0], self._door) <= DOOR_DISTANCE
+        at_door = look.stands[0] and ground_distance(look.robots[0], self._door) <= DOOR_DISTANCE
         self._stood = self._stood + 1.0 if at_door else 0.0
         self._called = self._called or LETS_GO in look.said
         if not self._called or self.over:
@@ -129,15 +137,15 @@ class Accompany:
             self._waited += 1
             self._at_door += at_door
 
-    def _walk(self, look: Look) -> None:
+    def _walk(self, look: JudgeSample) -> None:
         if look.place == self._place:
             self._inside_since = look.second
             self._failed = self.company.share() < 100.0 * WITH_SHARE
             self.over = self._failed
             return
-        self.company.count(away(look.robots[0], look.person) <= WITH_DISTANCE)
+        self.company.count(ground_distance(look.robots[0], look.person) <= WITH_DISTANCE)
 
-    def _end(self, look: Look, *, good: bool, last: bool) -> None:
+    def _end(self, look: JudgeSample, *, good: bool, last: bool) -> None:
         if good:
             self.done_at = look.second
         self.over = good or last

@@ -15,14 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from vico.agents.teaming.newcomer import GAVE_UP, I_FOLLOW
-from vico.challenges.assistant.model import Region
-from vico.challenges.assistant.regions import place_region
-from vico.challenges.drawing import Draw, person_of
-from vico.challenges.teaming.drawing import has_ways, pace, somebody, walk_task
-from vico.challenges.teaming.looking import Company, Look, away
-from vico.challenges.teaming.model import Pause, TeamingTask, Walk
-from vico.challenges.teaming.thresholds import (
+from vico.agents.teaming.people import GAVE_UP, I_FOLLOW
+from vico.challenges.assistant.placement import place_region
+from vico.challenges.assistant.tasks import Region
+from vico.challenges.robot_tasks import Draw, person_of
+from vico.challenges.teaming.category import (
+    Accompaniment,
+    JudgeSample,
+    draw_pace,
+    draw_person,
+    ground_distance,
+    has_routes,
+    walk_task,
+)
+from vico.challenges.teaming.tasks import (
     ARRIVED,
     FOLLOWS_WITHIN,
     LEAST_WALK,
@@ -31,6 +37,9 @@ from vico.challenges.teaming.thresholds import (
     PAUSES,
     TOGETHER,
     WAITS_WITHIN,
+    Pause,
+    TeamingTask,
+    Walk,
 )
 from vico.world.world import World
 
@@ -48,7 +57,7 @@ CAUSES = (
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     """Draw a task; None where this start has nowhere to go to."""
-    who, hood = somebody(draw)
+    who, hood = draw_person(draw)
     targets = [place_region(place) for place in hood.places_of(who)]
     targets += hood.spots_of(who, draw.chance, radius=ARRIVED)
     targets = [region for region in targets if LEAST_WALK <= hood.distance(region.centre) <= MOST_WALK]
@@ -58,7 +67,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     order = [targets[int(k)] for k in draw.chance.permutation(len(targets))]
     target = order[draw.pick("Where to?", [region.name for region in order], who)]
     goal = np.array(target.centre[:2])
-    if not has_ways(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (goal, ARRIVED / 3)):
+    if not has_routes(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (goal, ARRIVED / 3)):
         return None
     person = person_of(who)
     text = (
@@ -75,7 +84,7 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
         destination=target,
         walk=lambda: Walk(
             waits_at=draw.stands(waits, towards=hood.start),
-            pace=pace(draw),
+            pace=draw_pace(draw),
             pauses=_pauses(draw, hood.distance(target.centre)),
         ),
     )
@@ -108,19 +117,19 @@ class Guide:
         self._goal = task.destination.centre
         self.done_at: float | None = None
         self.over = False
-        self.company = Company()
+        self.company = Accompaniment()
         self._called = self._gave_up = self._was_there = False
 
-    def look(self, look: Look) -> None:
+    def look(self, look: JudgeSample) -> None:
         """Take in how things stand."""
         self._called = self._called or I_FOLLOW in look.said
         if not self._called or self.over:
             return
         robot, person = look.robots[0], look.person
-        self.company.count(away(robot, person) <= FOLLOWS_WITHIN)
-        there = away(robot, self._goal) <= ARRIVED
+        self.company.count(ground_distance(robot, person) <= FOLLOWS_WITHIN)
+        there = ground_distance(robot, self._goal) <= ARRIVED
         self._was_there = self._was_there or there
-        if there and away(person, self._goal) <= ARRIVED and away(robot, person) <= TOGETHER:
+        if there and ground_distance(person, self._goal) <= ARRIVED and ground_distance(robot, person) <= TOGETHER:
             self.done_at, self.over = look.second, True
         elif GAVE_UP in look.said:
             self._gave_up = self.over = True

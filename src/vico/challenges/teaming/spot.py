@@ -15,12 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from vico.challenges.assistant.regions import told
-from vico.challenges.drawing import Draw, described, person_of
-from vico.challenges.teaming.drawing import has_ways, somebody, visible_kinds
-from vico.challenges.teaming.looking import Look, away
-from vico.challenges.teaming.model import Member, TeamingTask
-from vico.challenges.teaming.thresholds import (
+from vico.challenges.assistant.placement import region_text
+from vico.challenges.robot_tasks import Draw, object_description, person_of
+from vico.challenges.teaming.category import JudgeSample, draw_person, ground_distance, has_routes, visible_kinds
+from vico.challenges.teaming.tasks import (
     AREA,
     AREA_WITHIN,
     BESIDE,
@@ -29,6 +27,8 @@ from vico.challenges.teaming.thresholds import (
     MOST_WALK,
     SEEN_PIXELS,
     STANDS_FOR,
+    Member,
+    TeamingTask,
 )
 from vico.world.world import World
 
@@ -44,7 +44,7 @@ DRONE, GROUND = 0, 1
 
 def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     """Draw a task; None where this start has no area near by to look in."""
-    who, hood = somebody(draw)
+    who, hood = draw_person(draw)
     middle = draw.spot(hood.start, *AREA_WITHIN)
     beside = draw.spot(hood.start, *BESIDE)
     if middle is None or beside is None or hood.distance(middle) > MOST_WALK:
@@ -53,13 +53,13 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     if lies is None:
         return None
     ground = GROUND_ROBOTS[int(draw.chance.integers(len(GROUND_ROBOTS)))]
-    if not has_ways(draw, ground, np.asarray(hood.start), (lies, BESIDE_THING * 0.8)):
+    if not has_routes(draw, ground, np.asarray(hood.start), (lies, BESIDE_THING * 0.8)):
         return None
     region = hood.spot(middle, radius=AREA)
     thing = draw.thing("What is lost?", visible_kinds(), who, lies)
     text = (
-        f"{who.name} has lost {described(thing)} {told(region)}: find it, one from above and one on the ground, which "
-        "is to stand beside it."
+        f"{who.name} has lost {object_description(thing)} {region_text(region)}: find it, one from above and one on "
+        "the ground, which is to stand beside it."
     )
     return TeamingTask(
         **frame,
@@ -96,11 +96,11 @@ class Spot:
         self.over = False
         self._stood = 0.0
 
-    def look(self, look: Look) -> None:
+    def look(self, look: JudgeSample) -> None:
         """Take in how things stand."""
         if self.seen_at is None and max(look.shown, default=0) >= SEEN_PIXELS:
             self.seen_at = look.second
-        near = look.thing is not None and away(look.robots[GROUND], look.thing) <= BESIDE_THING
+        near = look.thing is not None and ground_distance(look.robots[GROUND], look.thing) <= BESIDE_THING
         self._stood = self._stood + 1.0 if near and look.stands[GROUND] else 0.0
         if self._stood >= STANDS_FOR:
             self.done_at = look.second if self.done_at is None else self.done_at

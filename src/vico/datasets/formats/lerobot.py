@@ -24,10 +24,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from vico.datasets.formats.pictures import frames_of_video, joined_video
-from vico.datasets.layout import IMAGES, STATUSES, EpisodeColumns, Layout
-from vico.datasets.parts import PartEpisode, vectors
-from vico.datasets.statistics import Statistics, vector_statistics
+from vico.datasets.episodes import Statistics, vector_statistics
+from vico.datasets.layout import IMAGES, STATUSES, EpisodeColumns, Layout, PartEpisode, vectors
+from vico.datasets.pictures import frames_of_video, joined_video
 from vico.io.files import write_json
 
 VERSION = "v3.0"

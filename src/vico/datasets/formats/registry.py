@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from vico.datasets.formats import lerobot, tables, webdataset
-from vico.datasets.formats.pictures import BlobWriter, PictureWriter, VideoWriter
 from vico.datasets.layout import Layout
+from vico.datasets.pictures import BlobWriter, PictureWriter, VideoWriter
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from vico.datasets.formats.lerobot import frame_table
-from vico.datasets.formats.pictures import array_of_blob
 from vico.datasets.layout import Layout
+from vico.datasets.pictures import array_of_blob
 from vico.io.files import write_json
 
 #: A file is closed once it is larger, MB.

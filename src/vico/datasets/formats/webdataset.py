@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 
-from vico.datasets.formats.pictures import array_of_blob, npy_of
 from vico.datasets.layout import EpisodeColumns, Layout
+from vico.datasets.pictures import array_of_blob, npy_of
 from vico.io.files import read_json, write_json
 
 #: A shard is closed once it is larger, MB.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError, MissingFileError
 from vico.io.files import read_json
 from vico.rules import ActionStatus, code_name
-from vico.runner.bookmarks import bookmarks_of
+from vico.runner.recording import bookmarks_of
 from vico.sim.animation.motions import CLIPS
 from vico.sim.bodies.arrays import KINDS
 from vico.sim.bodies.state_arrays import Posture

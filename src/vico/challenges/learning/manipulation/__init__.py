@@ -1,9 +1,14 @@
 """An arm and a box: environments for learners, one file a task, with MuJoCo's batched stepping for many copies."""
 
-from vico.challenges.learning.manipulation.environment import ManipulationBatch, ManipulationEnv
-from vico.challenges.learning.manipulation.make import MANIPULATION, make_manipulation, make_manipulation_vec
-from vico.challenges.learning.manipulation.options import ManipulationOptions
-from vico.challenges.learning.manipulation.policy import ArrayPolicy, read_policy
+from vico.challenges.learning.manipulation.environment import (
+    MANIPULATION,
+    ManipulationBatch,
+    ManipulationEnv,
+    make_manipulation,
+    make_manipulation_vec,
+)
+from vico.challenges.learning.manipulation.policies import ArrayPolicy, read_policy
+from vico.challenges.learning.manipulation.scene import ManipulationOptions
 
 __all__ = [
     "MANIPULATION",

@@ -1,8 +1,13 @@
-"""Manipulation for one learner (Gymnasium), and many copies in one process (Gymnasium's vector environments)."""
+"""Manipulation environments: for one learner, many copies in one process, and scores of policies.
+
+``gymnasium.make("vico/Lift-v0")`` and ``gymnasium.make_vec("vico/Lift-v0", 64)`` make them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -12,14 +17,10 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from vico.challenges.learning.manipulation.copies import Advanced, Copies
-from vico.challenges.learning.manipulation.motors import ACTIONS
-from vico.challenges.learning.manipulation.observation import BOUND, observe, size_of
-from vico.challenges.learning.manipulation.options import RATE, ManipulationOptions
-from vico.challenges.learning.manipulation.readings import Bools, Readings
-from vico.challenges.learning.manipulation.rewards import paper
-from vico.challenges.learning.manipulation.scene import Array
-from vico.challenges.learning.manipulation.tasks import ManipulationTask
+from vico.challenges.learning.manipulation.batch import BatchedScene, BatchStep
+from vico.challenges.learning.manipulation.observation import BOUND, Bools, Readings, observe, size_of
+from vico.challenges.learning.manipulation.scene import ACTIONS, RATE, Array, ManipulationOptions
+from vico.challenges.learning.manipulation.tasks import LIFT, PICK_PLACE, PLACE, REACH, ManipulationTask, paper_reward
 from vico.errors import InputError
 
 Numbers = NDArray[np.float32]
@@ -35,13 +36,13 @@ def action_space() -> spaces.Box[Any]:
     return spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
 
 
-def reward_of(task: ManipulationTask, options: ManipulationOptions, done: Advanced) -> Array:
+def reward_of(task: ManipulationTask, options: ManipulationOptions, done: BatchStep) -> Array:
     """Return the rewards of a step, shape ``(n,)``; none where it broke down."""
-    found = paper(done.readings, task.paper_terms) if options.reward == "paper" else task.staged(done.readings)
+    found = paper_reward(done.readings, task.paper_terms) if options.reward == "paper" else task.staged(done.readings)
     return np.where(done.broken, 0.0, found)
 
 
-def evaluation_of(task: ManipulationTask, done: Advanced) -> dict[str, Bools]:
+def evaluation_of(task: ManipulationTask, done: BatchStep) -> dict[str, Bools]:
     """Return what of the task's rule holds; nothing is a success that broke down."""
     found = task.evaluate(done.readings)
     return {**found, "success": found["success"] & ~done.broken}
@@ -68,7 +69,7 @@ class ManipulationEnv(gymnasium.Env[Numbers, Numbers]):
 
     def __init__(self, task: ManipulationTask, options: ManipulationOptions, *, seed: int = 0) -> None:
         self.task, self.options = task, options
-        self.copies = Copies(task, options, 1)
+        self.copies = BatchedScene(task, options, 1)
         self.copies.seeds[0] = seed
         self.observation_space, self.action_space = observation_space(options), action_space()
         self.render_mode = None
@@ -165,7 +166,7 @@ class ManipulationBatch(gymnasium.vector.VectorEnv[Numbers, Numbers, NDArray[Any
         seed: int = 0,
     ) -> None:
         self.task, self.options = task, options
-        self.copies = Copies(task, options, num_envs, threads=threads)
+        self.copies = BatchedScene(task, options, num_envs, threads=threads)
         self.copies.seeds[:] = seed + np.arange(num_envs)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = observation_space(options), action_space()
@@ -231,7 +232,7 @@ class ManipulationBatch(gymnasium.vector.VectorEnv[Numbers, Numbers, NDArray[Any
         return seen, reward, ended, cut, info
 
     def _finals(
-        self, seen: Numbers, info: Mapping[str, Any], done: Advanced, over: NDArray[np.int64]
+        self, seen: Numbers, info: Mapping[str, Any], done: BatchStep, over: NDArray[np.int64]
     ) -> dict[str, Any]:
         """Return what episodes that are over came to."""
         finals, infos = np.full(self.num_envs, None, object), np.full(self.num_envs, None, object)
@@ -262,3 +263,126 @@ class ManipulationBatch(gymnasium.vector.VectorEnv[Numbers, Numbers, NDArray[Any
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""
         self.copies.close()
+
+
+#: Tasks by name.
+MANIPULATION: dict[str, ManipulationTask] = {task.name: task for task in (REACH, LIFT, PLACE, PICK_PLACE)}
+
+
+def make_manipulation(task: str, *, seed: int = 0, render_mode: None = None, **options: Any) -> ManipulationEnv:
+    """Make an environment of one arm.
+
+    Parameters
+    ----------
+    task
+        One of `MANIPULATION`.
+    seed
+        Of its episodes until `reset` is given one.
+    options
+        Those of `ManipulationOptions`.
+
+    Raises
+    ------
+    InputError
+        If there is no such task, option or render mode.
+    """
+    found, given = _checked_options(task, render_mode, options)
+    return ManipulationEnv(found, given, seed=seed)
+
+
+def make_manipulation_vec(
+    task: str, *, num_envs: int = 1, threads: int = 1, seed: int = 0, render_mode: None = None, **options: Any
+) -> ManipulationBatch:
+    """Make many copies of an environment in one process; see `make_manipulation`.
+
+    Parameters
+    ----------
+    num_envs, threads
+        How many copies, and threads that step them.
+    """
+    found, given = _checked_options(task, render_mode, options)
+    return ManipulationBatch(found, given, num_envs=num_envs, threads=threads, seed=seed)
+
+
+def _checked_options(
+    task: str, render_mode: None, options: dict[str, Any]
+) -> tuple[ManipulationTask, ManipulationOptions]:
+    if task not in MANIPULATION:
+        raise InputError(f"env: no manipulation task {task!r}; there are {', '.join(MANIPULATION)}")
+    if render_mode is not None:
+        raise InputError(f"env: render_mode is {render_mode!r}; manipulation environments draw nothing: use None")
+    unknown = sorted(options.keys() - {field.name for field in fields(ManipulationOptions)})
+    if unknown:
+        known = ", ".join(field.name for field in fields(ManipulationOptions))
+        raise InputError(f"env: no option {unknown[0]!r}; there are {known}")
+    return MANIPULATION[task], ManipulationOptions(**options)
+
+
+#: Entry points of the registered ids.
+make_reach, make_reach_vec = partial(make_manipulation, "reach"), partial(make_manipulation_vec, "reach")
+make_lift, make_lift_vec = partial(make_manipulation, "lift"), partial(make_manipulation_vec, "lift")
+make_place, make_place_vec = partial(make_manipulation, "place"), partial(make_manipulation_vec, "place")
+make_pick_place = partial(make_manipulation, "pick_place")
+make_pick_place_vec = partial(make_manipulation_vec, "pick_place")
+
+
+#: From observations, shape ``(n, size)``, to actions, shape ``(n, 8)``.
+Policy = Callable[[Numbers], NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Score:
+    """What episodes came to.
+
+    Attributes
+    ----------
+    episodes
+        How many.
+    success_at_end, success_once
+        Share of episodes whose last step was a success, and that had a successful step.
+    total_reward
+        Of an episode, mean.
+    causes
+        Of episodes that broke off, by what was said.
+    """
+
+    episodes: int
+    success_at_end: float
+    success_once: float
+    total_reward: float
+    causes: dict[str, int]
+
+    def __str__(self) -> str:
+        found = f"success {self.success_at_end:.2f} at the end, {self.success_once:.2f} at any time, "
+        found += f"reward {self.total_reward:.1f}, {self.episodes} episodes"
+        return found + (f"; {self.causes}" if self.causes else "")
+
+
+def score(batch: ManipulationBatch, policy: Policy, *, seed: int = 10**6) -> Score:
+    """Play an episode in each copy.
+
+    Parameters
+    ----------
+    batch
+        Has as many copies as episodes are to be played.
+    policy
+        May remember things between calls: it sees whole episodes from the first step on.
+    seed
+        Of the first copy's episode; the others have the following ones. Training draws from small seeds.
+    """
+    seen, _ = batch.reset(seed=seed)
+    n = batch.num_envs
+    over, once, at_end = np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, bool)
+    total, causes = np.zeros(n), dict[str, int]()
+    while not over.all():
+        seen, reward, ended, cut, info = batch.step(np.asarray(policy(seen), np.float32))
+        total += np.where(over, 0.0, reward)
+        once |= info["is_success"] & ~over
+        ends = (ended | cut) & ~over
+        at_end |= info["is_success"] & ends
+        for k in np.nonzero(ends)[0].tolist():
+            cause = info["final_info"][k].get("cause")
+            if cause:
+                causes[cause] = causes.get(cause, 0) + 1
+        over |= ends
+    return Score(n, float(at_end.mean()), float(once.mean()), float(total.mean()), causes)

@@ -1,22 +1,98 @@
-"""The physics of a manipulation environment: a robot, a box, the ground and a table, as a model of MuJoCo's.
+"""The scene of a manipulation environment: options, physics in MuJoCo, motors, and what the seed decides.
 
-Cities are simulated by `vico.sim`, whose scenes hold streets, people and vehicles. A learner needs nothing of that but
-millions of steps, so this is a model of its own: the same robot from the same MJCF, and settings of contact that hold
-things (elliptic cones, `impratio` 10).
+A robot, a box, the ground and a table are one model. Actions move the targets of the arm's motors. The seed decides
+boxes, where they stand, where they are to be, and how the arm begins.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import LIMB, TOUCH, MobileManipulator, RobotModel, robot_model
-from vico.challenges.learning.manipulation.options import PHYSICS_STEP
+from vico.errors import EmptyInputError, InputError
 from vico.io.mujoco import mujoco
-from vico.kinematics.arm import Chain
+from vico.kinematics.arm import Chain, reach_pose
+from vico.kinematics.ways import downward
+from vico.quaternions import upright
+
+#: Control steps a second, and seconds of a step of physics.
+RATE, PHYSICS_STEP = 20, 0.01
+#: Steps of physics in one of control.
+SUBSTEPS = 5
+
+_CHOICES = {
+    "reward": ("staged", "paper"),
+    "observation": ("full", "paper"),
+    "surface": ("any", "ground", "table"),
+    "base": ("fixed", "wheels"),
+    "start": ("ready", "folded"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManipulationOptions:
+    """Options of a manipulation environment.
+
+    Attributes
+    ----------
+    reward
+        ``"staged"``: parts that follow each other (align, down, close, lift, hold, place). ``"paper"``: the four terms
+        of the paper.
+    observation
+        ``"paper"``: 31 numbers as the paper lists them. ``"full"``: these, and size and turn of the box to the hand
+        and which fingers press on it, 42 numbers.
+    surface
+        What boxes stand on: ``"ground"``, ``"table"``, or ``"any"``, each every second time.
+    base
+        ``"fixed"``: with its brakes on, which steps twice as fast. ``"wheels"``: it stands on its wheels, as in a
+        simulation of a city, and may roll.
+    start
+        ``"ready"``: the hand points down in front of the base. ``"folded"``: the arm is folded as on a drive.
+    oracle_grasp
+        Whether a box is fastened to the hand once both pads press on it while the jaw is being closed, and let go of
+        when it is opened. Nothing else is given. Without it friction alone holds a box.
+    max_steps
+        Of an episode.
+    terminate_on_success
+        Whether an episode ends with success. If not, what has been achieved has to be kept until the end.
+    joint_step, finger_step
+        What an action of 1 moves a target by, rad and metres.
+
+    Raises
+    ------
+    InputError
+        If a value is not one of these.
+    """
+
+    reward: str = "staged"
+    observation: str = "full"
+    surface: str = "any"
+    base: str = "fixed"
+    start: str = "ready"
+    oracle_grasp: bool = False
+    max_steps: int = 250
+    terminate_on_success: bool = False
+    joint_step: float = 0.06
+    finger_step: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name, choices in _CHOICES.items():
+            value: Any = getattr(self, name)
+            if value not in choices:
+                raise InputError(f"env: {name} is {value!r}; use {' or '.join(map(repr, choices))}")
+        if self.max_steps < 1:
+            raise InputError(f"env: max_steps is {self.max_steps}; it has to be 1 or more")
+        for name, most in (("joint_step", 0.2), ("finger_step", 0.05)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0.0 < value <= most):
+                raise InputError(f"env: {name} is {value}; it has to be above 0 and at most {most}")
+
 
 Array = NDArray[np.float64]
 
@@ -79,7 +155,7 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Thing:
+class BoxParameters:
     """The box of an episode, and what it stands on.
 
     Attributes
@@ -136,7 +212,7 @@ def compile_scene(base: str) -> Scene:
         name="grasp", type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1="gripper", name2="thing"
     )
     weld.active = False
-    return _indexed(spec.compile(), robot, base)
+    return _scene_of_model(spec.compile(), robot, base)
 
 
 def _put_brakes_on(spec: Any) -> None:
@@ -152,7 +228,7 @@ def _put_brakes_on(spec: Any) -> None:
         spec.delete(spec.body(name))
 
 
-def _indexed(model: Any, robot: RobotModel, base: str) -> Scene:
+def _scene_of_model(model: Any, robot: RobotModel, base: str) -> Scene:
     arm = robot.controller
     assert isinstance(arm, MobileManipulator)
     names = robot.motors[:9]
@@ -171,7 +247,7 @@ def _indexed(model: Any, robot: RobotModel, base: str) -> Scene:
     )
 
 
-def write_thing(model: Any, thing: Thing) -> None:
+def write_thing(model: Any, thing: BoxParameters) -> None:
     """Write a box and its table into a copy's model, with what the solver derives from them."""
     body, geom = model.body("thing").id, model.geom("thing").id
     half, squares = thing.half, thing.half * thing.half
@@ -193,7 +269,7 @@ def write_thing(model: Any, thing: Thing) -> None:
     model.body_pos[model.body("table").id, 2] = height
 
 
-def listen() -> None:
+def silence_warnings() -> None:
     """Have MuJoCo keep to itself what it would append to a file in the folder people happen to be in.
 
     Motion that breaks down is noticed by its numbers.
@@ -204,3 +280,174 @@ def listen() -> None:
 
 def _ignore(message: str) -> None:
     """Say nothing: MuJoCo calls from C, on any thread."""
+
+
+#: Of an action: the arm's joints and the jaw.
+ACTIONS = 8
+# Targets run ahead of joints by no more, rad, and fingers past what they press on, metres: 150 Nm and 60 N.
+_AHEAD, _PAST = 0.1, 0.03
+
+
+class Motors(NamedTuple):
+    """Bounds of joints and jaw, and what an action of 1 moves them by, rad and metres, shape ``(8,)`` each."""
+
+    low: Array
+    high: Array
+    step: Array
+
+    def moved(self, targets: Array, joints: Array, actions: Array) -> Array:
+        """Return targets moved by actions, within bounds and not far ahead of the joints; shape ``(n, 8)`` each."""
+        wanted = targets + np.clip(actions, -1.0, 1.0) * self.step
+        ahead = np.append(np.full(7, _AHEAD), _PAST)
+        return np.clip(np.clip(wanted, joints - ahead, joints + ahead), self.low, self.high)
+
+
+def motors_of(arm: MobileManipulator, options: ManipulationOptions) -> Motors:
+    """Return those of an arm."""
+    step = np.append(np.full(7, options.joint_step), options.finger_step)
+    return Motors(np.append(arm.low, 0.0), np.append(arm.high, arm.opening), step)
+
+
+#: Sides of a box, metres; kilograms; friction; height of the table, metres.
+SIDES, MASS, FRICTION, TABLES = (0.05, 0.25), (0.1, 2.0), (0.6, 1.0), (0.15, 0.5)
+#: Where boxes stand: from the middle of the base, metres, and off straight ahead, rad.
+DISTANCE, BEARING = (0.54, 0.70), 0.45
+#: From a box to its goal at least; goals above it, metres.
+APART, RAISED = 0.2, (0.15, 0.25)
+#: Noise of the arm's first angles, rad; way of each finger then, metres.
+NOISE, OPENING = 0.05, 0.08
+#: Where a hand that is ready is, in the base's frame, metres.
+READY = np.array([0.5, -0.1, 0.75])
+# How far fingers are told to go past what they hold, and above what it stood on it is held, metres.
+_SQUEEZE, _HELD = 0.03, (0.12, 0.2)
+_TRIES = 60
+
+
+@dataclass(frozen=True)
+class EpisodeDraw:
+    """How an episode begins.
+
+    Attributes
+    ----------
+    thing
+        The box.
+    position, rotation
+        Of its middle, metres, shape ``(3,)``, and its quaternion, shape ``(4,)``.
+    goal
+        Where its middle is to be, metres, shape ``(3,)``.
+    arm
+        Angles, rad, shape ``(7,)``.
+    opening, target
+        Way of each finger and where it is told to be, metres.
+    """
+
+    thing: BoxParameters
+    position: Array
+    rotation: Array
+    goal: Array
+    arm: Array
+    opening: float
+    target: float
+
+
+class Hand(NamedTuple):
+    """An arm and the height of its base's frame above the ground, metres."""
+
+    chain: Chain
+    stand: float
+
+
+@cache
+def hand_of_robot() -> Hand:
+    """Return the arm that is drawn for."""
+    robot = robot_model("manipulator")
+    arm = robot.controller
+    assert isinstance(arm, MobileManipulator)
+    return Hand(Chain(arm.places, arm.axes, arm.low, arm.high, arm.grip), robot.stand)
+
+
+@cache
+def ready_angles() -> tuple[float, ...]:
+    """Return the arm's angles with the hand down in front of the base, rad."""
+    found = reach_pose(
+        hand_of_robot().chain, downward(READY, np.array([0.0, 1.0]), 0.0), robot_model("manipulator").rest[:7]
+    )
+    assert found is not None
+    return tuple(found.tolist())
+
+
+def first_angles(chance: np.random.Generator, options: ManipulationOptions) -> Array:
+    """Draw the arm's angles, rad, shape ``(7,)``."""
+    rest = np.array(ready_angles()) if options.start == "ready" else robot_model("manipulator").rest[:7]
+    chain = hand_of_robot().chain
+    return np.clip(rest + chance.uniform(-NOISE, NOISE, 7), chain.low, chain.high)
+
+
+def draw_spot(chance: np.random.Generator) -> Array:
+    """Draw a place in front of the base, metres, shape ``(2,)``."""
+    away, bearing = chance.uniform(*DISTANCE), chance.uniform(-BEARING, BEARING)
+    return np.array([away * math.cos(bearing), away * math.sin(bearing)])
+
+
+def draw_spot_apart(chance: np.random.Generator, other: Array) -> Array:
+    """Draw a place that is not near another one, metres, shape ``(2,)``."""
+    for _ in range(_TRIES):
+        found = draw_spot(chance)
+        if math.dist(found, other) >= APART:
+            return found
+    raise EmptyInputError(f"env: no place {APART} m from {other} in front of the robot in {_TRIES} draws; draw anew")
+
+
+def standing_box(chance: np.random.Generator, options: ManipulationOptions) -> EpisodeDraw:
+    """Draw a box on the ground or on a table, turned anyhow; its goal is where it stands."""
+    half = chance.uniform(*SIDES, 3) / 2
+    mass, friction = float(chance.uniform(*MASS)), float(chance.uniform(*FRICTION))
+    # Both are drawn whatever is chosen: the rest of an episode does not depend on the choice.
+    on_table, height = bool(chance.random() < 0.5), float(chance.uniform(*TABLES))
+    if options.surface != "any":
+        on_table = options.surface == "table"
+    thing = BoxParameters(half, mass, friction, height if on_table else 0.0)
+    place, yaw = draw_spot(chance), float(chance.uniform(-math.pi, math.pi))
+    position = np.array([*place, thing.surface + half[2]])
+    arm = first_angles(chance, options)
+    return EpisodeDraw(thing, position, upright(yaw), position.copy(), arm, OPENING, OPENING)
+
+
+def held_box(chance: np.random.Generator, options: ManipulationOptions) -> EpisodeDraw:
+    """Draw a box in the closed jaw above a table or the ground; its goal is where it is.
+
+    Fingers stand on its faces and are told to go past them: friction holds it from the first step on.
+    """
+    for _ in range(_TRIES):
+        drawn = standing_box(chance, options)
+        hand, thing = hand_of_robot(), drawn.thing
+        up = float(chance.uniform(*_HELD))
+        position = drawn.position + np.array([0.0, 0.0, up])
+        grip = np.array([*position[:2], grip_height(thing.half[2], position[2]) - hand.stand])
+        yaw = 2.0 * math.atan2(drawn.rotation[3], drawn.rotation[0])
+        across = 0 if thing.half[0] <= thing.half[1] else 1
+        turn = yaw + across * math.pi / 2
+        for sign in (1.0, -1.0):
+            along = sign * np.array([math.cos(turn), math.sin(turn)])
+            arm = reach_pose(hand.chain, downward(grip, along, 0.0), np.array(ready_angles()))
+            if arm is not None:
+                opening = float(thing.half[across]) - PAD
+                held = replace(drawn, position=position, goal=position.copy(), arm=arm, opening=opening)
+                return replace(held, target=max(opening - _SQUEEZE, 0.0))
+    raise EmptyInputError(f"env: no box that the arm can hold in {_TRIES} draws; draw anew")
+
+
+def grip_height(half: float, middle: float) -> float:
+    """Return where pads hold a box of half a height that stands with its middle at a height, metres."""
+    return max(middle + half - 0.06, middle - half + 0.047)
+
+
+def goal_beside(chance: np.random.Generator, drawn: EpisodeDraw) -> EpisodeDraw:
+    """Draw a goal on what the box stands on, or is held above, at another place."""
+    place = draw_spot_apart(chance, drawn.position[:2])
+    return replace(drawn, goal=np.array([*place, drawn.thing.surface + drawn.thing.half[2]]))
+
+
+def goal_above(chance: np.random.Generator, drawn: EpisodeDraw) -> EpisodeDraw:
+    """Draw a goal above the box."""
+    return replace(drawn, goal=drawn.position + np.array([0.0, 0.0, chance.uniform(*RAISED)]))

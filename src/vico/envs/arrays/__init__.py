@@ -1,1 +1,0 @@
-"""The array form: observations and actions as arrays of fixed shape, for learners."""
