@@ -40,7 +40,7 @@ from scipy.ndimage import gaussian_filter
 
 from photogrammetry.aerial import Photogrammetry, photogrammetry
 from photogrammetry.tileset import write_tileset
-from vico.geo.street_images.model import heading_of, looking
+from vico.geo.street_images import camera_rotation, heading_of
 from vico.render import Cameras, Scene, render
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
@@ -160,7 +160,7 @@ def angles_of(rotation: NDArray[np.float64]) -> tuple[float, float, float]:
     """Heading, pitch and roll, degrees, of a world-to-camera rotation: what `looking` makes it of."""
     heading = heading_of(rotation)
     pitch = math.degrees(math.asin(float(np.clip(rotation[2, 2], -1, 1))))
-    level = looking(heading, pitch)
+    level = camera_rotation(heading, pitch)
     roll = math.degrees(math.atan2(float(rotation[0] @ level[1]), float(rotation[0] @ level[0])))
     return heading, pitch, roll
 
@@ -202,7 +202,7 @@ def spots(world: World, scene: Scene, count: int, seed: int) -> list[Pose]:
     chosen: list[Pose] = []
     while len(chosen) < count:
         xy = places[random.integers(len(places))]
-        pose = Pose(np.array([*xy, float(world.height(xy)) + EYE]), looking(random.uniform(0, 360), 6.0))
+        pose = Pose(np.array([*xy, float(world.height(xy)) + EYE]), camera_rotation(random.uniform(0, 360), 6.0))
         if any(np.linalg.norm(pose.position - other.position) < 4.0 for other in chosen):
             continue
         _, depth, entity = picture(scene, pose, width=96, height=54)
@@ -330,7 +330,7 @@ def poses(work: Path, world: World, reports: StreetviewReport) -> list[str]:
         record = given[name]
         xy = world.frame.to_enu(record["lat"], record["lon"])
         place = np.array([*xy, float(world.height(xy)) + record["eye"]])
-        return Pose(place, looking(record["heading"], record["pitch"], record["roll"]))
+        return Pose(place, camera_rotation(record["heading"], record["pitch"], record["roll"]))
 
     def off(pose: Pose, name: str) -> Correction:
         return correction(pose, Pose(np.array(true[name]["position"]), np.array(true[name]["rotation"])))

@@ -33,13 +33,13 @@ from scipy.ndimage import gaussian_filter
 
 from photogrammetry.aerial import photogrammetry as from_the_air
 from photogrammetry.tileset import write_tileset
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.seeds import rng
 from vico.threads import WORKERS, workers
 from vico.world.folder import read_world
 from vico.world.glb import glb_bytes
 from vico.world.mesh import Surface
-from vico.world.stored import stage_seconds
+from vico.world.world import stage_seconds
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap

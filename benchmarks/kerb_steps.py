@@ -27,8 +27,8 @@ from vico.rules import STAIRS_SPEED
 from vico.seeds import rng
 from vico.sim.animation import clip_index, ground_under_feet, pose, stride_length, style_of
 from vico.sim.animation.motions import pace_of_step
+from vico.world.heights import DEEPEST
 from vico.world.model import FLIGHT_STEPS, LANDING
-from vico.world.stairs import DEEPEST
 from vico.world.world import World
 
 _LENGTH, _SPEED, _RATE, _KERB = 5.0, 1.2, 50.0, 0.07

@@ -27,7 +27,7 @@ from reporting import machine, publish, row, vico
 from vico.io.files import read_json
 from vico.seeds import rng
 from vico.world.folder import read_world
-from vico.world.stored import stage_seconds
+from vico.world.world import stage_seconds
 
 WAYS = {
     "one process": ("--workers", "1"),

@@ -23,10 +23,10 @@ from pathlib import Path
 from reporting import machine
 
 from vico.community import Community, build_community, check_community
-from vico.community.day_measures import character_findings
+from vico.community.day import character_findings
 from vico.community.model import RelationKind
 from vico.community.place_index import PlaceIndex
-from vico.community.social_network import NetworkMeasures, network_measures
+from vico.community.relations import NetworkMeasures, network_measures
 from vico.community.work import check_beds
 from vico.errors import EmptyInputError
 from vico.world.folder import read_world

@@ -26,7 +26,7 @@ from vico.render import Cameras, Scene, render
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
 from vico.world.folder import read_world
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 
 EYE = 1.6
 
@@ -125,21 +125,21 @@ def synthetic_city(half: float = 400.0) -> tuple[Scene, list[NDArray[np.float64]
                         inner + np.array([i, j]) * side, side, floors, facades[(i + j) % 3], roof, entity, tint
                     )
                     entity += 1
-    static = joined(parts)
+    static = merge_surfaces(parts)
     leaf = ball((1.7, 1.7, 2.0), (0, 0, 4.6), colour=(92, 138, 62), sides=12, rings=9)
-    tree = joined(
+    tree = merge_surfaces(
         [leaf, ball((1.2, 1.2, 1.2), (0.9, 0.4, 3.8), colour=(80, 124, 56)), cylinder(0.16, 3.4, colour=(96, 74, 56))]
     )
-    lamp = joined(
+    lamp = merge_surfaces(
         [cylinder(0.07, 5.0, colour=(70, 74, 78)), box((0.7, 0.25, 0.12), (0.25, 0, 5.0), colour=(70, 74, 78))]
     )
-    bench = joined(
+    bench = merge_surfaces(
         [
             box((1.6, 0.45, 0.06), (0, 0, 0.45), colour=(140, 96, 60)),
             box((1.4, 0.35, 0.42), (0, 0, 0.21), colour=(60, 60, 64)),
         ]
     )
-    car = joined(
+    car = merge_surfaces(
         [
             box((4.3, 1.8, 0.75), (0, 0, 0.62), colour=(178, 40, 44)),
             box((2.3, 1.6, 0.6), (-0.2, 0, 1.25), colour=(60, 70, 82)),
@@ -215,7 +215,7 @@ class WalkingFigures:
         for k in range(len(places)):
             shade = int(60 + 12 * k)
             self.bodies.append(
-                joined(
+                merge_surfaces(
                     [
                         ball(
                             (0.16, 0.22, 0.34), (0, 0, 1.15), colour=(shade, 90, 200 - shade // 2), sides=16, rings=12

@@ -27,8 +27,8 @@ from reporting import machine, publish, row, vico
 from vico.assets.people import body_of, passer_by
 from vico.assets.vehicles import vehicle_prototypes
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images.folder import FolderImages
-from vico.geo.street_images.model import StreetImage, looking, pinhole
+from vico.geo.street_image_folder import FolderImages
+from vico.geo.street_images import StreetImage, camera_rotation, pinhole
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
@@ -184,7 +184,7 @@ def true_cameras(world: World, count: int, seed: int) -> list[Pose]:
         heading = math.degrees(math.atan2(spot.forward[0], spot.forward[1])) + (0.0, 48.0, -48.0)[k // len(spots) % 3]
         xy = np.array(spot.position[:2]) + random.uniform(-1, 1, 2)
         position = np.array([*xy, float(world.height(xy)) + EYE])
-        cameras.append(Pose(position, looking(heading + random.uniform(-8, 8), random.uniform(3, 12))))
+        cameras.append(Pose(position, camera_rotation(heading + random.uniform(-8, 8), random.uniform(3, 12))))
     return cameras
 
 

@@ -15,7 +15,8 @@ import numpy as np
 import shapely
 
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmArea, polygons_of, read_osm
+from vico.geo.osm import OsmArea, read_osm
+from vico.geo.overlay import polygons_of
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions

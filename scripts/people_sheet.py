@@ -18,9 +18,8 @@ from PIL import Image, ImageDraw, ImageFont
 from vico.assets.people import Appearance, body_of
 from vico.assets.people.weather_clothes import dressed
 from vico.community import build_community
-from vico.community.clothes import trade_clothes
 from vico.community.people import ResidentDraft
-from vico.community.wardrobe import Wardrobe
+from vico.community.profiles import Wardrobe, trade_clothes
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng

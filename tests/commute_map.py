@@ -8,7 +8,7 @@ import numpy as np
 
 from vico.world.heights import HeightField
 from vico.world.public import PublicMap
-from vico.world.transit_model import BikeStation, Line, Stop
+from vico.world.transit import BikeStation, Line, Stop
 from vico.world.walkable import SIDEWALK, WalkableMap
 
 HALF = 400.0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images.model import looking
+from vico.geo.street_images import camera_rotation
 
 WIDTH, HEIGHT, FOV = 1600, 1200, 60.0
 Place = tuple[float, float]
@@ -31,7 +31,7 @@ def box_of(camera: tuple[float, float, float], thing: Place, low: float, high: f
     """Box of a thing half a metre wide between two heights, as a camera 2 m above flat ground sees it."""
     focal = HEIGHT / 2 / np.tan(np.radians(FOV) / 2)
     corners = np.array([[*thing, z] for z in (low, high)]) - (camera[0], camera[1], 2.0)
-    seen = corners @ looking(camera[2]).T
+    seen = corners @ camera_rotation(camera[2]).T
     if seen[:, 2].min() < 1.0:
         return None
     u, v = seen[:, 0] / seen[:, 2] * focal + WIDTH / 2, seen[:, 1] / seen[:, 2] * focal + HEIGHT / 2

@@ -10,12 +10,12 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData, polygons_of, read_osm
+from vico.geo.osm import OsmData, read_osm
+from vico.geo.overlay import polygons_of
 from vico.world.heights import HeightField
-from vico.world.lane_reader import read_lanes
-from vico.world.lanes import LaneGraph
-from vico.world.street_model import Roads
-from vico.world.transit_model import Transit
+from vico.world.lanes import LaneGraph, read_lanes
+from vico.world.model import Roads
+from vico.world.transit import Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import RoadNetwork, road_network
 from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm

@@ -12,7 +12,7 @@ from vico.sim.physics import DEFAULT_ENGINE, engine_names
 from vico.world.heights import HeightField
 from vico.world.model import Manifest, Origin
 from vico.world.objects import Objects
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 from vico.world.world import World
 

@@ -21,7 +21,7 @@ from vico.llm import Budget, Connection, LanguageModel, user
 from vico.runner.gather import Fault
 from vico.seeds import rng
 from vico.world.folder import read_world
-from vico.world.records import manifest_bytes
+from vico.world.world import manifest_bytes
 
 NAME = "toy_challenge:TOY"
 SKILL = {"good": 0.9, "fair": 0.5, "bad": 0.1}

@@ -19,10 +19,20 @@ from vico.community.model import (
 )
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
-from vico.world.model import ENTITY_GROUND, Building, Category, Container, Entrance, Manifest, Origin, Place, Room
+from vico.world.model import (
+    ENTITY_GROUND,
+    Building,
+    Category,
+    Container,
+    Entrance,
+    Manifest,
+    Origin,
+    Place,
+    Roads,
+    Room,
+)
 from vico.world.objects import Objects
-from vico.world.street_model import Roads
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walkable import BLOCKED, OPEN, SIDEWALK, WalkableMap
 from vico.world.world import World
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Manifest, Origin, Place
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap
 from vico.world.world import World
 

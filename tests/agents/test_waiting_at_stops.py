@@ -13,7 +13,7 @@ from vico.rules import STATION_REACH, TRAM_WIDTH, ReasonCode, code_name
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.public import PublicMap
-from vico.world.transit_model import Line, Stop, TramLine
+from vico.world.transit import Line, Stop, TramLine
 from vico.world.walkable import BLOCKED, ROADWAY, SIDEWALK, WalkableMap
 
 HALF, EIGHT = 200.0, 8 * 3600.0

@@ -17,7 +17,7 @@ from vico.io.folders import FolderKind
 from vico.sim.recording import interventions
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.world.exports import EXPORT_FOLDER
-from vico.world.stored import WORLD_FOLDER
+from vico.world.world import WORLD_FOLDER
 
 Words = list[object]
 

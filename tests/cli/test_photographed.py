@@ -14,7 +14,7 @@ from PIL import Image
 from command_line import vico
 from photogrammetry.aerial import Photogrammetry, photogrammetry
 from photogrammetry.tileset import write_tileset
-from vico.geo.street_images.model import looking, pinhole
+from vico.geo.street_images import camera_rotation, pinhole
 from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.world import World
@@ -45,7 +45,7 @@ def survey(helsinki: World, tmp_path_factory: pytest.TempPathFactory) -> Path:
         xy = np.array(spot.position[:2])
         heading = math.degrees(math.atan2(spot.forward[0], spot.forward[1])) + turn
         position = np.array([*xy, float(helsinki.height(xy)) + EYE])
-        picture, _, _ = take(position, looking(heading, 8.0), pinhole(WIDE, HIGH, 0.72 * WIDE), WIDE, HIGH)
+        picture, _, _ = take(position, camera_rotation(heading, 8.0), pinhole(WIDE, HIGH, 0.72 * WIDE), WIDE, HIGH)
         Image.fromarray(picture).save(photos / f"{k}.jpg", quality=92)
         lat, lon = helsinki.frame.to_geodetic(xy + random.normal(0, 0.7, 2))
         records.append(

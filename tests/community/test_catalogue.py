@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from vico.community import catalogue
-from vico.community.hours import usual_spans
-from vico.community.jobs import job_of
+from vico.community.place_index import usual_spans
+from vico.community.work import job_of
 from vico.errors import InputError, SchemaError
 
 PAGE = Path(__file__).parents[2] / "docs" / "adding_people.md"

@@ -9,8 +9,8 @@ import pytest
 
 from toytown import PLACES, make_world
 from vico.community import Community, Resident, check_community, procedural_author
-from vico.community.childhood import ALONE_FROM, GROWN_UP
 from vico.community.model import RelationKind
+from vico.community.people import ALONE_FROM, GROWN_UP
 from vico.rules import walk_speed
 from vico.world.world import World
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vico.community.hours import staffed, usual_spans
+from vico.community.place_index import staffed_spans, usual_spans
 
 
 def test_every_category_has_usual_hours() -> None:
@@ -11,5 +11,5 @@ def test_every_category_has_usual_hours() -> None:
 
 
 def test_staff_stay_over_a_short_closing_and_go_home_over_a_long_one() -> None:
-    assert staffed([(480, 630), (660, 960)]) == [(420, 1020)]
-    assert staffed([(540, 780), (960, 1200)]) == [(480, 840), (900, 1260)]
+    assert staffed_spans([(480, 630), (660, 960)]) == [(420, 1020)]
+    assert staffed_spans([(540, 780), (960, 1200)]) == [(480, 840), (900, 1260)]

@@ -11,10 +11,10 @@ import pytest
 from toytown import PLACES, make_world
 from vico.community import Community, build_community, check_community
 from vico.community.catalogue import claims, trait_words, ways
-from vico.community.day_measures import character_findings, day_measures
+from vico.community.day import character_findings, day_measures
 from vico.community.model import ActivityTag, Resident
 from vico.community.place_index import PlaceIndex
-from vico.community.staff import staff_capacity
+from vico.community.work import staff_capacity
 from vico.errors import EmptyInputError
 from vico.world.model import Category
 from vico.world.world import World

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vico.community import Community, RelationKind, build_community
-from vico.community.social_network import measures_of, network_measures
+from vico.community.relations import measures_of, network_measures
 from vico.world.world import World
 
 _CLOSE = [RelationKind.FRIEND]

@@ -21,9 +21,8 @@ from vico.community import (
     read_community,
     write_community,
 )
-from vico.community.authorship import Origin
-from vico.community.findings import CommunityFinding
 from vico.community.llm import LlmCommunityAuthor
+from vico.community.model import CommunityFinding, Origin
 from vico.errors import InputError, SchemaError
 from vico.llm import Budget, Connection, Endpoint, LanguageModel
 from vico.world.world import World

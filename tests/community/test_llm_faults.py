@@ -15,8 +15,8 @@ from llm_server import refuses, says
 from scripted_author import ScriptedAuthor, Twist, characters, day_plan, network
 from toytown import PLACES, make_world
 from vico.community import Community, build_community, check_community
-from vico.community.authorship import Origin
 from vico.community.llm import LlmCommunityAuthor
+from vico.community.model import Origin
 from vico.llm import Connection, Endpoint, LanguageModel
 from vico.world.world import World
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from vico.community import Community, Resident
-from vico.community.homelife import CHAT
-from vico.community.llm.fitting import MIDNIGHT, DayFitter, Stay, minute_of, overlaid, stays_of
+from vico.community.day import CHAT
+from vico.community.llm.lives import MIDNIGHT, DayFitter, Stay, minute_of, overlaid, stays_of
 from vico.community.model import ItemType
 from vico.community.place_index import PlaceIndex
 from vico.world.world import World

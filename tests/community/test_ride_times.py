@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from vico.community.model import Mode
-from vico.community.ride_times import RideTimes
-from vico.community.walks import Walk, Walks
+from vico.community.ride_times import RideTimes, Walks
 from vico.rules import BUS_DWELL, BUS_FARE
 from vico.world.model import Point2
 from vico.world.routing import Router
-from vico.world.transit_model import BikeStation, Line, Stop, TramLine, TramStop, Transit
+from vico.world.transit import BikeStation, Line, Stop, TramLine, TramStop, Transit
 from vico.world.trips import Trips
-from vico.world.trips.ways import find_way
+from vico.world.trips.network import find_way
+from vico.world.walk_lengths import Walk
 from vico.world.walkable import BLOCKED, OPEN, WalkableMap
 from vico.world.world import World
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vico.community import Resident, build_community
-from vico.community.clothes import clothes_of, trade_clothes
 from vico.community.model import ResidentAppearance
+from vico.community.profiles import clothes_of, trade_clothes
 from vico.world.world import World
 
 # What makes one unit of difference: years, metres, shares, and a channel of a colour.

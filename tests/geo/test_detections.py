@@ -12,11 +12,10 @@ import pytest
 
 from detected_city import HEIGHT, WIDTH, coco, write_poses
 from vico.errors import MissingFileError, SchemaError
-from vico.geo.detections.model import rays_of
-from vico.geo.detections.reader import read_detections
+from vico.geo.detections import rays_of, read_detections
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images.folder import FolderImages
-from vico.geo.street_images.model import undistorted
+from vico.geo.street_image_folder import FolderImages
+from vico.geo.street_images import undistort
 
 FRAME = LocalFrame(60.169, 24.9435)
 CAMERA = (0.0, -10.0, 0.0)
@@ -58,7 +57,7 @@ def test_a_panorama_and_a_bent_lens_are_looked_through(tmp_path: Path) -> None:
     (pose,) = FolderImages(tmp_path).poses(FRAME)
     picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     picture[900:904, 1300:1304] = 255  # where a straight lens would have it is found by straightening the picture
-    straight = undistorted(picture, 0.8 * WIDTH, -0.2, 0.05)
+    straight = undistort(picture, 0.8 * WIDTH, -0.2, 0.05)
     row, column = np.argwhere(straight[..., 0] > 128).mean(axis=0) + 0.5
     ray = rays_of(pose, [(1302.0, 902.0)], WIDTH, HEIGHT)[0] @ pose.rotation.T
     at = ray[:2] / ray[2] * 0.8 * WIDTH + (WIDTH / 2, HEIGHT / 2)

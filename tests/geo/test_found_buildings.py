@@ -12,10 +12,8 @@ import shapely
 from pyproj import Transformer
 
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.geo.buildings.city_json import read_cityjson
-from vico.geo.buildings.files import read_buildings
-from vico.geo.buildings.forms import form_of
-from vico.geo.buildings.model import FoundBuilding
+from vico.geo.building_files import read_buildings, read_cityjson
+from vico.geo.buildings import FoundBuilding, form_of
 from vico.geo.frame import LocalFrame
 from vico.io import json_stream
 

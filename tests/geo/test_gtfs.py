@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from vico.errors import InputError, MissingFileError, SchemaError, VicoError
 from vico.geo.frame import LocalFrame
-from vico.geo.gtfs.feed import Feed, Pattern
-from vico.geo.gtfs.reader import kind_of, read_gtfs, seconds_of
+from vico.geo.gtfs import kind_of, read_gtfs, seconds_of
+from vico.geo.gtfs_feed import Feed, Pattern
 
 FRAME = LocalFrame(49.41013, 8.70711)
 HALF = 400.0

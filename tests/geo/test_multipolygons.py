@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vico.geo.frame import LocalFrame
-from vico.geo.multipolygons import MemberWay, area_of_members, role_meant
 from vico.geo.osm import read_osm
+from vico.geo.outlines import MemberWay, area_of_members, role_meant
 
 FRAME = LocalFrame(52.1, 11.6)
 CORNERS = np.array([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0)])

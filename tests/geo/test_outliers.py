@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.geo.outliers import without_outliers
+from vico.geo.raster_windows import without_outliers
 from vico.geo.rasters import read_raster
 
 

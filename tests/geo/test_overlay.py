@@ -108,7 +108,7 @@ def test_unions_buffers_and_simplified_outlines_are_valid(shapes: list[Polygon],
 
 @given(neighbours())
 def test_measures_agree_with_overlays(pair: tuple[Polygon, Polygon]) -> None:
-    first, second = (overlay.mended(shape) for shape in pair)
+    first, second = (overlay.make_valid(shape) for shape in pair)
     assert _near(overlay.common_area(first, second), overlay.intersection(first, second).area, first, second)
 
 

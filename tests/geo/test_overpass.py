@@ -20,7 +20,7 @@ from vico.errors import EmptyInputError, InputError, SourceError
 from vico.geo import overpass as module
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
-from vico.geo.overpass import Overpass, parsed, quarters, query, seconds_to_a_slot
+from vico.geo.overpass import Overpass, parse_answer, quarters, query, seconds_to_a_slot
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
 LAT, LON, HALF = 60.1690, 24.9435, 70.0
@@ -337,7 +337,7 @@ def test_the_derived_answers_are_the_extracts_they_were_made_from(name: str, sha
 
 @pytest.mark.parametrize("name", ["mapquery", "outgeom", "relation"])
 def test_real_answers_are_read(name: str, shared_data: Path) -> None:
-    found = parsed((shared_data / "samples" / f"overpass_{name}_real.json").read_bytes())
+    found = parse_answer((shared_data / "samples" / f"overpass_{name}_real.json").read_bytes())
     assert len(found.elements) == {"mapquery": 435, "outgeom": 3, "relation": 1}[name]
 
 
@@ -351,4 +351,4 @@ GOOD = answer(
 def test_noise_in_an_answer_is_one_of_our_errors(noise: bytes, at: int, cut: int) -> None:
     refusals = (InputError, module._BusyError, module._TooMuchError)
     with contextlib.suppress(*refusals):
-        assert all("id" in element for element in parsed(GOOD.body[:at] + noise + GOOD.body[at + cut :]).elements)
+        assert all("id" in element for element in parse_answer(GOOD.body[:at] + noise + GOOD.body[at + cut :]).elements)

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from http_server import Answer, Request, serve
 from vico.errors import InputError, MissingFileError, SchemaError, SourceError, VicoError
 from vico.geo.frame import LocalFrame
-from vico.geo.places.google import GooglePlaces, google_key
-from vico.geo.places.overture import OverturePlaces
+from vico.geo.overture import OverturePlaces
+from vico.geo.places import GooglePlaces, google_key
 from vico.io.http import HttpClient
 
 FRAME = LocalFrame(60.1678, 24.9424)

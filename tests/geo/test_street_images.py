@@ -12,8 +12,16 @@ from PIL import Image
 
 from vico.errors import EmptyInputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images.folder import FolderImages
-from vico.geo.street_images.model import decoded, heading_of, looking, pinhole, spread, turned, undistorted
+from vico.geo.street_image_folder import FolderImages
+from vico.geo.street_images import (
+    camera_rotation,
+    decode_picture,
+    heading_of,
+    pinhole,
+    rotation_from_axis_angle,
+    select_spread,
+    undistort,
+)
 
 HERE = LocalFrame(60.169, 24.9435)
 ANGLES = st.floats(-3.1, 3.1)
@@ -28,7 +36,7 @@ def jpeg(width: int = 64, height: int = 48, colour: tuple[int, int, int] = (200,
 @settings(max_examples=30, deadline=None)
 @given(ANGLES, ANGLES, ANGLES)
 def test_an_angle_axis_vector_gives_a_rotation_about_it(x: float, y: float, z: float) -> None:
-    rotation = turned((x, y, z))
+    rotation = rotation_from_axis_angle((x, y, z))
     assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
     assert np.isclose(np.linalg.det(rotation), 1.0)
     assert np.allclose(rotation @ np.array([x, y, z]), [x, y, z], atol=1e-9)
@@ -37,7 +45,7 @@ def test_an_angle_axis_vector_gives_a_rotation_about_it(x: float, y: float, z: f
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0, 359.9), st.floats(-80, 80), st.floats(-170, 170))
 def test_a_camera_looks_where_heading_and_pitch_say(heading: float, pitch: float, roll: float) -> None:
-    rotation = looking(heading, pitch, roll)
+    rotation = camera_rotation(heading, pitch, roll)
     assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
     assert np.isclose(np.linalg.det(rotation), 1.0)
     assert abs((heading_of(rotation) - heading + 180) % 360 - 180) < 1e-6
@@ -45,7 +53,7 @@ def test_a_camera_looks_where_heading_and_pitch_say(heading: float, pitch: float
 
 
 def test_a_level_camera_to_the_east_sees_south_to_its_right() -> None:
-    right, down, forward = looking(90.0)
+    right, down, forward = camera_rotation(90.0)
     assert np.allclose(forward, [1, 0, 0], atol=1e-12)
     assert np.allclose(right, [0, -1, 0], atol=1e-12)
     assert np.allclose(down, [0, 0, -1], atol=1e-12)
@@ -59,7 +67,7 @@ def test_undistortion_takes_each_pixel_from_where_the_lens_put_it(k1: float, k2:
     focal = share * width
     row, column = np.mgrid[0:height, 0:width]
     picture = np.stack([column * 3, row * 4, np.zeros_like(row)], axis=-1).astype(np.uint8)
-    made = undistorted(picture, focal, k1, k2).astype(float)
+    made = undistort(picture, focal, k1, k2).astype(float)
     x, y = (column + 0.5 - width / 2) / focal, (row + 0.5 - height / 2) / focal
     square = x * x + y * y
     bend = 1 + k1 * square + k2 * square**2
@@ -70,7 +78,7 @@ def test_undistortion_takes_each_pixel_from_where_the_lens_put_it(k1: float, k2:
 
 
 def test_a_large_photo_is_made_smaller() -> None:
-    assert decoded(jpeg(900, 600), "photo", longest=300).shape == (200, 300, 3)
+    assert decode_picture(jpeg(900, 600), "photo", longest=300).shape == (200, 300, 3)
 
 
 @settings(max_examples=30, deadline=None)
@@ -78,15 +86,15 @@ def test_a_large_photo_is_made_smaller() -> None:
 def test_a_broken_photo_is_refused_in_one_sentence(junk: bytes, cut: int) -> None:
     for data in (junk, jpeg()[:cut] if cut < 500 else b"\xff\xd8" + junk):
         with pytest.raises(SchemaError, match=r"^photo 7: not a readable photo"):
-            decoded(data, "photo 7")
+            decode_picture(data, "photo 7")
 
 
 def test_photos_are_spread_over_the_place() -> None:
     places = np.array([[0.0, 0], [1, 0], [50, 0], [50.5, 0], [0, 60]])
-    assert spread(places, [0.0] * 5, 3) == [0, 4, 3]
-    assert spread(places[:0], [], 3) == []
+    assert select_spread(places, [0.0] * 5, 3) == [0, 4, 3]
+    assert select_spread(places[:0], [], 3) == []
     # Two photos from one spot that look opposite ways are worth more than one a metre away.
-    assert spread(np.array([[0.0, 0], [0, 0], [1, 0]]), [0.0, 180.0, 0.0], 2) == [0, 1]
+    assert select_spread(np.array([[0.0, 0], [0, 0], [1, 0]]), [0.0, 180.0, 0.0], 2) == [0, 1]
 
 
 def folder(path: Path, **changes: object) -> Path:
@@ -104,7 +112,7 @@ def test_our_own_pose_file_gives_cameras(tmp_path: Path) -> None:
     assert photo.eye == photo.position[2] == 1.5
     assert photo.attribution == "A. Person, CC BY"
     assert photo.intrinsics == pytest.approx(pinhole(64, 48, 24 / np.tan(np.radians(25))))
-    assert photo.rotation == pytest.approx(looking(90.0, 5.0))
+    assert photo.rotation == pytest.approx(camera_rotation(90.0, 5.0))
 
 
 def test_an_altitude_is_taken_as_it_is(tmp_path: Path) -> None:

@@ -13,9 +13,9 @@ from PIL import Image
 from http_server import Answer, Request, serve
 from vico.errors import InputError, SchemaError, SourceError
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images.google import GoogleStreetView
-from vico.geo.street_images.mapillary import FIELDS, Mapillary, boxes, images_in
-from vico.geo.street_images.model import looking
+from vico.geo.google_street_view import GoogleStreetView
+from vico.geo.mapillary import FIELDS, Mapillary, images_in, split_box
+from vico.geo.street_images import camera_rotation
 from vico.io.http import HttpClient
 
 HERE = LocalFrame(60.169, 24.9435)
@@ -101,7 +101,7 @@ def test_mapillary_photos_come_page_by_page_and_bad_ones_are_told() -> None:
     assert "nothing there (404)" in reasons["4"]
     assert "not a readable photo" in reasons["5"]
     assert reasons["6"].startswith("width")
-    assert photos["7"].rotation == pytest.approx(looking(90.0))
+    assert photos["7"].rotation == pytest.approx(camera_rotation(90.0))
     assert photos["1"].position[:2] == pytest.approx(HERE.to_enu(60.169, 24.9436))
     assert photos["1"].intrinsics[0, 0] == pytest.approx(0.85 * 80)
     assert photos["1"].captured == "2023-07-22T04:26:40+00:00"
@@ -154,7 +154,7 @@ def test_a_full_page_without_a_next_one_is_asked_again_in_quarters() -> None:
 
 
 def test_large_boxes_are_asked_for_in_pieces() -> None:
-    pieces = list(boxes((24.93, 60.16, 24.955, 60.172)))
+    pieces = list(split_box((24.93, 60.16, 24.955, 60.172)))
     assert len(pieces) == 6
     assert max(max(e - w, n - s) for w, s, e, n in pieces) <= 0.0101
 
@@ -240,7 +240,7 @@ def test_google_views_are_cut_at_headings_and_nothing_is_kept(tmp_path: Path) ->
     assert not source.may_be_kept
     assert [name for name, _ in source.refused] == ["P60.1690@180", "P60.1694@180"]
     assert KEY not in str(source.refused)
-    assert photos[1].rotation == pytest.approx(looking(90.0, 12.0))
+    assert photos[1].rotation == pytest.approx(camera_rotation(90.0, 12.0))
     assert photos[0].intrinsics[0, 0] == pytest.approx(320.0)
     assert photos[0].attribution == "© Google"
     assert photos[0].eye == 2.5

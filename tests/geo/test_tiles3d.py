@@ -15,11 +15,8 @@ from tile_files import at_place, b3dm, box, cmpt, ecef, enu_axes, glb, square
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.gltf import read_gltf
-from vico.geo.tiles3d.content import read_tile_file
-from vico.geo.tiles3d.mesh import TileMesh
-from vico.geo.tiles3d.reader import TileLimits, TileReport, credits_of, read_tileset
-from vico.geo.tiles3d.volumes import ECEF, TileWindow, boxes_touch
-from vico.geo.tiles3d.welding import welded
+from vico.geo.tiles3d import TileLimits, TileMesh, TileReport, credits_of, read_tileset, weld_borders
+from vico.geo.tiles3d_files import ECEF, TileWindow, boxes_touch, read_tile_file
 
 FRAME = LocalFrame(60.169, 24.9435)
 PLACE = at_place(60.169, 24.9435)
@@ -364,7 +361,7 @@ def test_welding_leaves_the_inside_of_a_tile_alone() -> None:
     faces = [[a, a + 1, a + 4] for a in (0, 1, 3, 4)] + [[a, a + 4, a + 3] for a in (0, 1, 3, 4)]
     other = rows + np.array([0.05, 0.0, 0.0])
     points = np.concatenate([rows, other])
-    moved = welded(points, np.array([*faces, *(np.array(faces) + 9)]), np.repeat([0, 1], 9), 0.2)
+    moved = weld_borders(points, np.array([*faces, *(np.array(faces) + 9)]), np.repeat([0, 1], 9), 0.2)
     assert np.array_equal(moved[:9], rows)
     assert np.array_equal(moved[13], other[4])  # the middle is no border
     assert np.array_equal(np.delete(moved[9:], 4, axis=0), np.delete(rows, 4, axis=0))

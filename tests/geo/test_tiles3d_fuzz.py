@@ -12,8 +12,8 @@ from tile_files import at_place, b3dm, box, cmpt, glb, square
 from vico.errors import VicoError
 from vico.geo.frame import LocalFrame
 from vico.geo.gltf import read_gltf
-from vico.geo.tiles3d.content import read_tile_file
-from vico.geo.tiles3d.reader import TileLimits, read_tileset
+from vico.geo.tiles3d import TileLimits, read_tileset
+from vico.geo.tiles3d_files import read_tile_file
 
 FRAME = LocalFrame(60.169, 24.9435)
 PICTURE = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)

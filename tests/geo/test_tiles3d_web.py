@@ -11,8 +11,8 @@ from http_server import Answer, Request, serve
 from tile_files import at_place, box, ecef, enu_axes, glb, square
 from vico.errors import InputError, SchemaError, SourceError
 from vico.geo.frame import LocalFrame
-from vico.geo.tiles3d.reader import read_tileset
-from vico.geo.tiles3d.source import GOOGLE_KEY, tile_source
+from vico.geo.tiles3d import read_tileset
+from vico.geo.tiles3d_files import GOOGLE_KEY, tile_source
 from vico.io.http import HttpClient
 
 FRAME = LocalFrame(60.169, 24.9435)

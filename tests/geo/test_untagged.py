@@ -8,8 +8,8 @@ import pytest
 from vico.errors import EmptyInputError
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
+from vico.geo.raster_windows import without_voids
 from vico.geo.rasters import read_raster
-from vico.geo.untagged import without_voids
 
 from .test_elevation import write_geotiff
 

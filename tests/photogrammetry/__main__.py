@@ -19,7 +19,7 @@ from photogrammetry.aerial import Photogrammetry, photogrammetry
 from photogrammetry.tile_view import tile_surfaces
 from photogrammetry.tileset import write_tileset
 from vico.errors import VicoError
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.render import Cameras, render
 from vico.render.lighting import Lighting
 from vico.render.scene import Scene

@@ -20,7 +20,7 @@ from photogrammetry.scene import BUILDING, Seen, seen_world
 from photogrammetry.surface_net import surface_net
 from photogrammetry.tileset import leaf_cells
 from vico.errors import InputError
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.seeds import rng
 from vico.world.world import World
 

@@ -11,8 +11,7 @@ import pytest
 from photogrammetry.tileset import leaf_cells, write_tileset
 from vico.errors import EmptyInputError, InputError, MissingExtraError, OutputExistsError
 from vico.geo.frame import LocalFrame
-from vico.geo.tiles3d.mesh import TileMesh
-from vico.geo.tiles3d.reader import read_tileset
+from vico.geo.tiles3d import TileMesh, read_tileset
 
 FRAME = LocalFrame(43.73384, 7.41813)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.world.mesh import Material, Surface
 
 

@@ -30,7 +30,7 @@ _QUALITY = 88
 
 
 class TexturedTriangles(Protocol):
-    """What can be written: triangles with textures, ENU metres, as `vico.geo.tiles3d.mesh.TileMesh` has them."""
+    """What can be written: triangles with textures, ENU metres, as `vico.geo.tiles3d.TileMesh` has them."""
 
     @property
     def positions(self) -> NDArray[np.float64]:

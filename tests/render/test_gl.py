@@ -24,7 +24,7 @@ from vico.render.records import GROUND_WINDOWS, OPENING, ROOM_FRONT, UPPER_WINDO
 from vico.render.sensors.batch import Viewers
 from vico.render.sensors.lens import Lens
 from vico.sim.config import SimConfig
-from vico.world.mesh import Material, joined
+from vico.world.mesh import Material, merge_surfaces
 
 DAY, NIGHT = Lighting.at(15 * 3600), Lighting.at(23 * 3600, clouds=0.8)
 OUTSIDE = Cameras(np.array([[-14.0, -6.0, 2.0]]), np.array([[1.0, 0.4, -0.1]]), width=160, height=120, hidden_entity=8)
@@ -59,7 +59,7 @@ def scene() -> Scene:
         "crown": [replace(crown, material=Material("glow", emission=1.0))],
     }
     made = Scene(
-        joined(static),
+        merge_surfaces(static),
         models,
         indoor=[s.of_entity(60) for s in room],
         rooms=[[100, 0, 0, 4, 4, 3, 0.0]],
@@ -200,7 +200,9 @@ def test_what_moves_is_moved_there_too(both: tuple[Scene, GlRenderer]) -> None:
 def people(made: Scene, spots: list[tuple[float, float]], *, with_limbs: bool) -> None:
     """Put slim bodies at some spots, whose limbs are a row of leaning capsules."""
     made.set_rigid([made.names["cube"]], np.array([pose_matrix(-9.5, -3, 0.4, 0.3)]), [5])
-    parts = joined([ball((0.25, 0.25, 0.9), (x, y, 0.9)).of_entity(20 + k) for k, (x, y) in enumerate(spots)])[0]
+    parts = merge_surfaces([ball((0.25, 0.25, 0.9), (x, y, 0.9)).of_entity(20 + k) for k, (x, y) in enumerate(spots)])[
+        0
+    ]
     rows = [[[x, y, 0.1, x, y + 0.1 * k - 0.6, 1.6, 0.06] for k in range(len(LIMBS))] for x, y in spots]
     limbs = np.array(rows, np.float32) if with_limbs else None
     made.set_skinned(parts.positions, parts.normals, parts.triangles, parts.colour, parts.entity, limbs=limbs)

@@ -15,7 +15,7 @@ from vico.render.behind.fronts import room_fronts
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import RenderQuality
 from vico.render.records import GROUND_WINDOWS, ROOM_FRONT, UPPER_WINDOWS
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 from vico.world.model import Doorway
 
 INTERIORS = RenderQuality(interiors=True)
@@ -36,7 +36,10 @@ def street(windows: int, *, storeys: int = 0) -> Scene:
         box((0.6, 0.6, 0.6), (201, 51, -5.0), colour=(230, 10, 10)).of_entity(61),
     ]
     scene = Scene(
-        [*joined([ground]), pane], indoor=walls, rooms=[[200, 49, -6, 4, 4, 3, 0.0]], lighting=Lighting.at(13 * 3600)
+        [*merge_surfaces([ground]), pane],
+        indoor=walls,
+        rooms=[[200, 49, -6, 4, 4, 3, 0.0]],
+        lighting=Lighting.at(13 * 3600),
     )
     record = scene.arrays.textures.materials[scene.material_names.index("pane")]
     record["windows"], record["storeys"] = windows, storeys

@@ -13,7 +13,7 @@ from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import FINE, PLAIN, RenderQuality
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 
 LOOK = Cameras(np.array([[-9.0, -3.0, 2.0]]), np.array([[1.0, 0.25, -0.12]]), width=160, height=120)
 
@@ -31,7 +31,7 @@ def scene() -> Scene:
         box((60, 60, 1), (0, 0, -0.5), colour=(150, 150, 150)).of_entity(2),
         box((2, 2, 3), (0, 0, 1.5)).of_entity(3),
     ]
-    return Scene([*joined(parts), glass], lighting=Lighting.at(15 * 3600))
+    return Scene([*merge_surfaces(parts), glass], lighting=Lighting.at(15 * 3600))
 
 
 def colours(scene: Scene, quality: RenderQuality) -> NDArray[Any]:
@@ -64,7 +64,7 @@ def test_what_stands_off_a_wall_has_no_halo_and_what_touches_it_has() -> None:
     change = []
     for off in (0.4, 0.0):
         parts = [box((0.2, 8, 8), (0, 0, 0)).of_entity(2), box((0.2, 0.3, 0.3), (-0.2 - off, 0, 0)).of_entity(3)]
-        one = Scene(joined(parts), lighting=Lighting())
+        one = Scene(merge_surfaces(parts), lighting=Lighting())
         before = Cameras(np.array([[-2.5, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]]))
         dark = take_pictures(one, before, PictureRequest(quality=RenderQuality(ambient_occlusion=True)))
         plain = render(one, before)

@@ -11,7 +11,7 @@ from vico.assets.shapes import ball, box, pose_matrix
 from vico.assets.vehicle_parts import Cabin
 from vico.render import Cameras, Lighting, Scene, render, render_top_down
 from vico.render.limbs import LIMBS
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 
 AHEAD = np.array([[1.0, 0, 0]])
 
@@ -75,7 +75,8 @@ def square() -> Scene:
         for k, (x, y) in enumerate([(30, 0), (30, 25), (-30, -10), (0, 50)])
     ]
     scene = Scene(
-        joined([ground, *houses]), {"post": [box((0.3, 0.3, 3), (0, 0, 1.5))], "car": [box((4, 2, 1.5), (0, 0, 0.75))]}
+        merge_surfaces([ground, *houses]),
+        {"post": [box((0.3, 0.3, 3), (0, 0, 1.5))], "car": [box((4, 2, 1.5), (0, 0, 0.75))]},
     )
     scene.place(["post"] * 20, np.array([pose_matrix(x, -8) for x in range(20)]), np.arange(20) + 20_000)
     return scene
@@ -142,7 +143,7 @@ def test_a_car_darkens_the_ground_beside_it(square: Scene) -> None:
 
 
 def test_two_legs_throw_two_shadows() -> None:
-    legs = joined([box((0.2, 0.2, 1.0), (0, y, 0.5)) for y in (-0.4, 0.4)])[0].of_entity(9)
+    legs = merge_surfaces([box((0.2, 0.2, 1.0), (0, y, 0.5)) for y in (-0.4, 0.4)])[0].of_entity(9)
     scene = Scene([box((40, 40, 1), (0, 0, -0.5)).of_entity(2)], lighting=Lighting(sun_direction=(-1.0, 0.0, 0.5)))
     limbs = np.array([[[0, y, 0.1, 0, y, 0.9, 0.1] for y in (-0.4, 0.4)]], np.float32)
     limbs = np.concatenate([limbs, np.tile(limbs[:, :1], (1, len(LIMBS) - 2, 1))], axis=1)
@@ -250,6 +251,6 @@ def test_any_picture_size_works_and_agrees_with_the_256_one_in_the_middle(
 def test_the_map_has_north_up_and_east_right() -> None:
     ground = box((100, 100, 1), (0, 0, -0.5), colour=(40, 40, 40))
     red, blue = box((10, 10, 1), (30, 0, 0.5), colour=(255, 0, 0)), box((10, 10, 1), (0, 30, 0.5), colour=(0, 0, 255))
-    picture = render_top_down(Scene(joined([ground, red, blue])), 50.0, 100).astype(int)
+    picture = render_top_down(Scene(merge_surfaces([ground, red, blue])), 50.0, 100).astype(int)
     assert picture[50, 80, 0] > 150 > picture[50, 80, 2]
     assert picture[20, 50, 2] > 120 > picture[20, 50, 0]

@@ -15,7 +15,7 @@ from vico.errors import InputError
 from vico.render import Cameras, Frames, Lighting, Scene, ViewCache, render
 from vico.render.frames import PendingView
 from vico.render.records import OPENING
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 
 
 def rays(cameras: Cameras) -> NDArray[np.float64]:
@@ -53,7 +53,7 @@ def town() -> tuple[Scene, list[tuple[NDArray[np.float64], NDArray[np.float64], 
         centre = np.array([*generator.uniform(-120, 120, 2), generator.uniform(0, 12)])
         surfaces.append(box(size.tolist(), centre.tolist()).of_entity(1000 + k))
         boxes.append((centre - size / 2, centre + size / 2, 1000 + k))
-    return Scene(joined(surfaces)), boxes
+    return Scene(merge_surfaces(surfaces)), boxes
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, 4.4])
@@ -161,7 +161,7 @@ def test_a_camera_that_stands_sees_what_moves_as_one_that_has_just_come() -> Non
     ground = box((90, 90, 1), (0, 0, -0.5)).of_entity(1)
     houses = [box((6, 6, 9), (x, y, 4.5)).of_entity(1000 + x) for x, y in [(14, 6), (22, -9), (30, 8)]]
     car = box((4, 2, 1.5), (0, 0, 0.75))
-    textured = [replace(surface, material=Material("tiles", tiles)) for surface in joined([ground, *houses])]
+    textured = [replace(surface, material=Material("tiles", tiles)) for surface in merge_surfaces([ground, *houses])]
     scene = Scene(textured, {"car": [replace(car, material=Material("paint", tiles))]})
     cameras = Cameras(np.array([[-4.0, 0.3, 1.6], [0.0, -20, 9]]), np.array([[1.0, 0.1, -0.1], [0.4, 1, -0.5]]))
     body, cache = ball((0.3, 0.3, 0.8), (0, 0, 0.8)), ViewCache()

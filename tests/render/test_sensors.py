@@ -13,7 +13,7 @@ from vico.errors import InputError
 from vico.render import Cameras, Scene, render
 from vico.render.sensors.batch import Viewers
 from vico.render.sensors.lens import Lens, directions
-from vico.world.mesh import joined
+from vico.world.mesh import merge_surfaces
 
 EAST = np.array([[0.0, 0.0, 1.5, 1.0, 0.0, 0.0]])
 OWN = np.array([7], np.int32)
@@ -29,7 +29,7 @@ def scene() -> Scene:
             size, centre = high - low + 1.0, (low + high) / 2
             size[axis], centre[axis] = 0.5, at[axis] + (0.25 if side else -0.25)
             walls.append(box(size.tolist(), centre.tolist()).of_entity(100 + 2 * axis + side))
-    return Scene(joined(walls), {"cube": [box((1.0, 1.0, 1.0), (0, 0, 0), colour=(200, 30, 30))]})
+    return Scene(merge_surfaces(walls), {"cube": [box((1.0, 1.0, 1.0), (0, 0, 0), colour=(200, 30, 30))]})
 
 
 def taken(scene: Scene, lens: Lens, *outputs: str, pose: NDArray[np.float64] = EAST) -> dict[str, NDArray[Any]]:

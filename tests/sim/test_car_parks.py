@@ -15,8 +15,8 @@ from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.state import APPROACHING, BACKING_OUT, DRIVING, DRIVING_IN, DRIVING_OUT, LEAVING, NONE, STANDING
 from vico.sim.traffic.stopping_places import places_in_car_parks, with_places
 from vico.world.heights import HeightField
+from vico.world.model import ParkingSpot
 from vico.world.objects import Objects
-from vico.world.street_model import ParkingSpot
 from vico.worldgen.objects.car_park_ways import with_ways
 
 _ROWS, _PITCH = (14.0, 25.5), 2.5  # m from the lane's middle, and from spot to spot

@@ -23,10 +23,10 @@ from vico.sim.pictures import city as city_pictures
 from vico.sim.pictures.buildings import RoomsInSight
 from vico.sim.pictures.city import CityRenderer, Neighbourhood
 from vico.sim.pictures.people import DrawnPeople
-from vico.world.city_silhouettes import CitySilhouettes
 from vico.world.city_world import CityWorld
 from vico.world.folder import read_world
 from vico.world.model import ENTITY_BACKDROP
+from vico.world.silhouettes import CitySilhouettes
 from vico.worldgen.city_build import build_city, city_request
 from vico.worldgen.sources import Sources
 

@@ -19,7 +19,7 @@ from vico.sim.physics.records import COARSE, FINE, FrameCount, FrameNeeds, Physi
 from vico.sim.physics.surroundings import convex_parts
 from vico.sim.robots import RobotPopulation
 from vico.world.heights import HeightField
-from vico.world.mesh import joined
+from vico.world.mesh import merge_surfaces
 
 
 def test_a_motion_that_diverges_is_an_error_and_leaves_no_log_file(
@@ -48,7 +48,7 @@ def test_running_out_of_memory_in_a_step_is_an_error(monkeypatch: pytest.MonkeyP
 
 
 def test_pieces_of_a_collision_surface_are_told_apart() -> None:
-    surface = joined([box((1, 1, 1), (x, 0, 0)).of_entity(x) for x in (0, 1, 5)])[0]
+    surface = merge_surfaces([box((1, 1, 1), (x, 0, 0)).of_entity(x) for x in (0, 1, 5)])[0]
     parts = convex_parts(surface)
     # The first two touch but belong to different entities.
     assert sorted(float(part[:, 0].mean()) for part in parts) == [0.0, 1.0, 5.0]

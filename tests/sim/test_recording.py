@@ -25,9 +25,9 @@ from vico.sim.recording import PosedPeople, read_run
 from vico.sim.recording.recorder import Recorder
 from vico.sim.recording.samples import LONGEST_ACTION, action_text
 from vico.sim.recording.schema import SEGMENT_STEPS
-from vico.world.lane_reader import read_lanes
+from vico.world.lanes import read_lanes
 from vico.world.public import PublicMap
-from vico.world.transit_model import BikeStation, Transit
+from vico.world.transit import BikeStation, Transit
 from vico.world.world import World
 
 STEPS = 100

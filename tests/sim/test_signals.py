@@ -14,7 +14,7 @@ from vico.sim.bodies.arrays import Bodies
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.signals import SignalClock
 from vico.sim.traffic.state import AMBER, DARK, GREEN, RED
-from vico.world.lane_reader import read_lanes
+from vico.world.lanes import read_lanes
 
 NOWHERE = Bodies.none()
 CYCLE = 94

@@ -15,8 +15,7 @@ from vico.sim.bodies.arrays import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.traffic import Traffic
-from vico.world.heights import HeightField
-from vico.world.stairs import Stairs
+from vico.world.heights import HeightField, Stairs
 
 
 def treads_over(west: float, south: float, east: float, north: float) -> Stairs:

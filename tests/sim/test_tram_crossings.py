@@ -11,7 +11,7 @@ from vico.sim.traffic.route import STANDING_ROOM
 from vico.sim.traffic.state import TRACK_CROSSING
 from vico.sim.transit.tram_network import TramCrossings
 from vico.world.heights import HeightField
-from vico.world.rails import Track
+from vico.world.transit import Track
 
 _NOBODY = np.zeros((0, 9))
 

@@ -24,8 +24,7 @@ from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.system import TransitSystem
 from vico.sim.transit.tram_network import TramNetwork, zones_of
 from vico.world.public import PublicMap
-from vico.world.rails import TRAM_LENGTH, Track
-from vico.world.transit_model import TramLine, TramStop
+from vico.world.transit import TRAM_LENGTH, Track, TramLine, TramStop
 from vico.world.walkways import CORNER, CROSSING, SIDEWALK
 from vico.world.world import World
 from vico.worldgen.streets.netconvert import empty_network

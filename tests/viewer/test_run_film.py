@@ -32,7 +32,7 @@ from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, Span, still, write_film_of_shots, write_run_film
 from vico.viewer.shots import read_shots
 from vico.viewer.targets import Target, target_between, target_of
-from vico.world.mesh import joined
+from vico.world.mesh import merge_surfaces
 from vico.world.public import PublicMap
 
 STEPS = 12
@@ -208,7 +208,7 @@ def test_things_and_bodies_go_half_way_and_what_leaps_waits() -> None:
 
 def test_avatars_that_are_not_drawn_at_a_moment_are_nowhere_in_its_frames() -> None:
     scene = Scene([box((40, 40, 1), (0, 0, -0.5)).of_entity(2)])
-    bodies = joined([box((0.4, 0.4, 1.0 + 0.2 * k), (0, 3.0 * k, 0.5)).of_entity(10 + k) for k in range(3)])[0]
+    bodies = merge_surfaces([box((0.4, 0.4, 1.0 + 0.2 * k), (0, 3.0 * k, 0.5)).of_entity(10 + k) for k in range(3)])[0]
     shape = bodies.normals, bodies.triangles, bodies.colour, bodies.entity
 
     def shown(x: float, drawn: list[int]) -> SceneMoment:
@@ -245,7 +245,9 @@ def test_avatars_want_all_their_vertices() -> None:
 @pytest.mark.parametrize("view", ["behind", "front", "side", "above", "orbit"])
 def test_the_camera_follows_smoothly_and_stays_before_walls(view: str) -> None:
     """Along a street 5 m wide whose walls are nearer than the camera would like to be, round a corner."""
-    scene = Scene(joined([box((80, 1, 8), (0, 3, 4)), box((80, 1, 8), (0, -3, 4)), box((80, 80, 1), (0, 0, -0.5))]))
+    scene = Scene(
+        merge_surfaces([box((80, 1, 8), (0, 3, 4)), box((80, 1, 8), (0, -3, 4)), box((80, 80, 1), (0, 0, -0.5))])
+    )
     camera = FollowCamera(view, 64, 36)
     last = None
     for k in range(100):
@@ -286,7 +288,7 @@ def test_through_a_door_the_camera_is_there_at_once() -> None:
 def test_in_a_shop_the_camera_sees_whom_it_follows_over_the_racks(view: str) -> None:
     """Between racks 1.4 m high, 1.2 m apart, under a ceiling: it never comes so near that nobody is drawn."""
     racks = [box((3.0, 0.5, 1.4), (0.0, y, 0.7)) for y in (-2.55, -0.85, 0.85, 2.55)]
-    scene = Scene(joined([box((20, 20, 1), (0, 0, -0.5)), box((20, 20, 1), (0, 0, 3.3)), *racks]))
+    scene = Scene(merge_surfaces([box((20, 20, 1), (0, 0, -0.5)), box((20, 20, 1), (0, 0, 3.3)), *racks]))
     camera = FollowCamera(view, 64, 36)
     for k in range(80):
         # Along an aisle, and at its end round the rack.

@@ -10,8 +10,7 @@ import pytest
 from vico.world.check import check_world
 from vico.world.folder import read_world
 from vico.world.objects import write_objects
-from vico.world.records import write_records
-from vico.world.world import World
+from vico.world.world import World, write_records
 
 
 @pytest.fixture

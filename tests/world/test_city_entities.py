@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from vico.world.city import City, CityManifest, CityTile
-from vico.world.city_entities import CityEntities
-from vico.world.city_world import CityWorld
+from vico.world.city_world import CityEntities, CityWorld
 from vico.world.model import FIRST_STOP, Origin
 from vico.world.objects import write_objects
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.world import World
 
 TILES = [(-1, 0), (1, 0), (0, 1)]

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from vico.errors import MissingFileError, SchemaError
-from vico.world.city_rooms import CityRooms, RoomsById
-from vico.world.moving import Shift
-from vico.world.records import write_records
-from vico.world.world import World
+from vico.world.city import TileShift
+from vico.world.city_world import CityRooms, RoomsById
+from vico.world.world import World, write_records
 
-WEST, EAST = Shift(-400.0, 0.0, 2_000_000, "-1_0"), Shift(400.0, 0.0, 3_000_000, "1_0")
+WEST, EAST = TileShift(-400.0, 0.0, 2_000_000, "-1_0"), TileShift(400.0, 0.0, 3_000_000, "1_0")
 
 
 @pytest.fixture

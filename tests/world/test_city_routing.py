@@ -18,12 +18,10 @@ from scipy.sparse.csgraph import dijkstra
 from vico.errors import SchemaError
 from vico.io.arrays import mapped_array
 from vico.world import city_routing
-from vico.world.city_files import COST, GATES, REACHED, ROOM, STEPS, SURFACES
-from vico.world.city_gates import Gates, Window, border_gates, tile_gates
-from vico.world.city_ground import whole_walkable
-from vico.world.city_routing import CityRouter
-from vico.world.city_walk_lengths import CityWalkLengths
-from vico.world.grid_search import followed
+from vico.world.city import COST, GATES, REACHED, ROOM, STEPS, SURFACES, whole_walkable
+from vico.world.city_gates import Gates, WindowSearch, border_gates, tile_gates
+from vico.world.city_routing import CityRouter, CityWalkLengths
+from vico.world.grid_search import cells_along
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
 from vico.worldgen.seams.grid import TileGrid, tile_name
@@ -164,13 +162,13 @@ def test_walks_from_gate_to_gate_are_kept_cell_by_cell(router: CityRouter) -> No
     for tile in ((0, 0), (1, 1), (2, 1)):
         cells = graph.cells[graph.of_tile(tile)].tolist()
         square = tuple(slice(k * SIDE, (k + 1) * SIDE) for k in tile)
-        window = Window(np.ascontiguousarray(router._cost[square]), square[0].start, square[1].start, n)
+        window = WindowSearch(np.ascontiguousarray(router._cost[square]), square[0].start, square[1].start, n)
         for a, b in permutations(cells, 2):
             kept, searched = graph.walk(a, b), window.walk(a, b)
             assert (kept is None) == (searched is None)
             if kept is None or searched is None:
                 continue
-            walk, costs = followed(router._cost, a, *kept)
+            walk, costs = cells_along(router._cost, a, *kept)
             assert (walk[0], walk[-1]) == (a, b)
             # Of several that cost the same, either may be the one that is found the other way round.
             assert costs[-1] == searched[1][-1]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from vico.errors import SchemaError
 from vico.world.heights import EDGE_RANGE, HeightField, Steps
-from vico.world.records import read_terrain, write_terrain
+from vico.world.world import read_terrain, write_terrain
 
 HALF = 20.0
 

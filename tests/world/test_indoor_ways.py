@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from vico.world.indoor_ways import DOOR, IndoorWays, walk_within
 from vico.world.model import LANDING, Doorway, Point3, Room
+from vico.world.walk_lengths import DOOR, IndoorWays, walk_within
 from vico.world.world import World
 
 

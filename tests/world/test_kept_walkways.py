@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from vico.world.kept_walkways import walkways_past
-from vico.world.walkways import Walkways, walkways_of
+from vico.world.walkways import Walkways, walkways_of, walkways_past
 
 POSTS = [shapely.box(19.9, 0.7, 20.1, 0.9), shapely.box(9.9, -0.9, 10.1, -0.7)]
 

@@ -8,7 +8,7 @@ import shapely
 
 from road_city import road_city
 from vico.errors import MissingFileError, SchemaError
-from vico.world.lane_reader import read_lanes
+from vico.world.lanes import read_lanes
 from vico.world.walkways import CROSSING, SIDEWALK
 
 

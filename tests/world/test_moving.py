@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from vico.errors import SchemaError
+from vico.world.city import TileShift
 from vico.world.model import FIRST_BODY, FIRST_BUILDING, FIRST_FURNITURE, FIRST_ROOM, FIRST_STOP
-from vico.world.moving import Shift
 from vico.world.world import World
 
-HERE = Shift(400.0, -800.0, 2_500_000, "1_-2")
+HERE = TileShift(400.0, -800.0, 2_500_000, "1_-2")
 
 
 def test_things_keep_their_shape_and_get_numbers_of_their_own(corner: World) -> None:

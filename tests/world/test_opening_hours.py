@@ -14,7 +14,7 @@ from vico.world.opening_hours import (
     how_read,
     is_public_holiday,
     open_spans,
-    respelled,
+    standard_spelling,
     weekly_hours,
 )
 
@@ -152,7 +152,7 @@ def test_the_sun_sets_when_it_does_at_the_place() -> None:
     ],
 )
 def test_common_spellings_are_read(typed: str, meant: str) -> None:
-    assert (how_read(typed), respelled(typed)) == ("respelled", meant)
+    assert (how_read(typed), standard_spelling(typed)) == ("respelled", meant)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_common_spellings_are_read(typed: str, meant: str) -> None:
     ],
 )
 def test_days_are_read_in_the_language_that_knows_all_their_names(typed: str, meant: str) -> None:
-    assert (how_read(typed), respelled(typed)) == ("respelled", meant)
+    assert (how_read(typed), standard_spelling(typed)) == ("respelled", meant)
 
 
 @pytest.mark.parametrize(

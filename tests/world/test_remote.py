@@ -12,8 +12,7 @@ import pytest
 from s3_server import S3Server, needs_s3
 from vico.errors import MissingFileError, SchemaError
 from vico.io.stores import store_at
-from vico.world.folder import read_world
-from vico.world.remote import fetch_manifest, fetch_world
+from vico.world.folder import fetch_manifest, fetch_world, read_world
 
 pytestmark = needs_s3
 

@@ -10,10 +10,9 @@ import pytest
 import shapely
 
 from vico.errors import InputError
-from vico.world.far_windows import BAYS, SHOWN, STOREYS, WINDOWS
+from vico.world.far_colours import BAYS, LINEAR, STOREYS, WINDOWS, WINDOWS_MEAN, srgb
 from vico.world.heights import HeightField
-from vico.world.mean_colours import LINEAR, srgb
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 from vico.world.model import ENTITY_GROUND, FIRST_BUILDING, FIRST_OBJECT, Building
 from vico.world.objects import Objects
 from vico.world.silhouettes import FAR, silhouette_of
@@ -30,9 +29,9 @@ def _in_one(surfaces: list[Surface]) -> Surface:
     """Return surfaces as one, whatever they are of; colours are those from afar."""
     seen = []
     for surface in surfaces:
-        shown = SHOWN if surface.material is WINDOWS else 1.0
+        shown = WINDOWS_MEAN if surface.material is WINDOWS else 1.0
         seen.append(replace(surface, colour=srgb(LINEAR[surface.colour] * shown), material=Material(FAR)))
-    (one,) = joined(seen)
+    (one,) = merge_surfaces(seen)
     return one
 
 
@@ -158,7 +157,7 @@ def test_walls_whose_windows_shine_have_windows_from_afar(helsinki: World) -> No
         points, [(2, 4, 5), (2, 5, 3), (4, 6, 7), (4, 7, 5), (6, 0, 1), (6, 1, 7)], uv=uv, colour=(150, 150, 150),
         entity=1000, material=Material("glazed", picture, emission=1.0),
     )  # fmt: skip
-    walls = joined([blind, glazed])
+    walls = merge_surfaces([blind, glazed])
     like = helsinki.buildings[0].model_copy(
         update={
             "entity": 1000, "footprint": [foot], "base": 0.0, "height": 9.0, "roof_shape": "flat", "tags": {},
@@ -177,7 +176,7 @@ def test_walls_whose_windows_shine_have_windows_from_afar(helsinki: World) -> No
     assert len(windows.triangles) == 6
     assert plain.normals[:, 1].min() < -0.5
     # Seen from afar the wall has the colour it had.
-    seen = srgb(LINEAR[windows.colour] * SHOWN)
+    seen = srgb(LINEAR[windows.colour] * WINDOWS_MEAN)
     assert np.abs(seen.astype(int) - 150).max() <= 1
     corners = windows.uv[windows.triangles].astype(np.float64) * (BAYS, STOREYS)
     ground, head = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)

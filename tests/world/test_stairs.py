@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vico.world.heights import HeightField
-from vico.world.stairs import Stairs
+from vico.world.heights import HeightField, Stairs
 
 _GOING, _RISE, _WIDTH, _COUNT = 0.3, 0.16, 2.0, 12
 

@@ -6,8 +6,7 @@ import pytest
 
 from vico.clock import DAY
 from vico.rules import BUS_DWELL, ride_price
-from vico.world.timetable import LineTimes, buses_needed, departure, next_departure
-from vico.world.transit_model import Line
+from vico.world.transit import Line, LineTimes, buses_needed, departure, next_departure
 
 
 def line(departures: list[int], travel: list[float]) -> Line:

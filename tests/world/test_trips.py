@@ -21,11 +21,10 @@ from vico.errors import InputError
 from vico.rules import BUS_DWELL, BUS_FARE, ride_price
 from vico.world.model import Point2
 from vico.world.routing import Router
-from vico.world.timetable import LineTimes
-from vico.world.transit_model import BikeStation, Line, Stop, Transit
+from vico.world.transit import BikeStation, Line, LineTimes, Stop, Transit
 from vico.world.trips import MODES, Trip, Trips
 from vico.world.trips.model import AHEAD, ALIGHT, BOARD, DISMOUNT, MOUNT
-from vico.world.trips.ways import find_way
+from vico.world.trips.network import find_way
 from vico.world.walkable import BLOCKED, OPEN, SIDEWALK, WalkableMap
 
 HALF, CELL = 200.0, 2.0

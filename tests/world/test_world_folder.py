@@ -10,9 +10,7 @@ import pytest
 from vico.errors import MissingFileError, SchemaError
 from vico.world.folder import kept_world, read_world
 from vico.world.model import VERSION, Place
-from vico.world.records import read_records
-from vico.world.stored import seal
-from vico.world.world import LAYERS, World
+from vico.world.world import LAYERS, World, read_records, seal
 
 
 @pytest.fixture

@@ -11,8 +11,7 @@ import pytest
 from vico.jobs import Helper
 from vico.threads import WORKERS
 from vico.world.folder import read_world
-from vico.world.stored import stage_seconds
-from vico.world.world import World
+from vico.world.world import World, stage_seconds
 from vico.worldgen import ahead, laying
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vico.errors import EmptyInputError, InputError
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.world.mesh import Surface
 from vico.worldgen.photos.baking import Baked, bake
 

@@ -11,7 +11,7 @@ from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.seeds import rng
-from vico.world.check.solids import coplanar_overlaps, open_edges
+from vico.world.check.buildings import coplanar_overlaps, open_edges
 from vico.worldgen.buildings.projections import projections, water_tank
 from vico.worldgen.buildings.roofs.dormers import dormers
 from vico.worldgen.buildings.roofs.eaves import eaves, edges_of, slopes_of

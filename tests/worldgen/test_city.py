@@ -20,9 +20,8 @@ from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
 from vico.io.files import write_json
-from vico.world.borders import Side, border_findings, profile_of
 from vico.world.check import check_whole
-from vico.world.city import CityManifest, CityTile, read_city
+from vico.world.city import CityManifest, CityTile, Side, border_findings, profile_of, read_city
 from vico.world.city_world import CityWorld
 from vico.world.folder import read_world
 from vico.world.heights import HeightField

@@ -8,11 +8,9 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from vico.world.city_ground import whole_ground
-from vico.world.decks import Decks
-from vico.world.heights import HeightField, Steps
-from vico.world.lane_reader import read_lanes
-from vico.world.lanes import LaneGraph
+from vico.world.city import whole_ground
+from vico.world.heights import Decks, HeightField, Steps
+from vico.world.lanes import LaneGraph, read_lanes
 from vico.world.world import World
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.grid import Tile, TileGrid

@@ -11,14 +11,13 @@ import pytest
 
 from detected_city import coco, write_poses
 from vico.errors import SchemaError
-from vico.geo.detections.reader import read_detections
+from vico.geo.detections import read_detections
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode
 from vico.seeds import rng
-from vico.world.detected import detected_objects
 from vico.world.folder import read_world
 from vico.world.heights import HeightField
-from vico.world.world import World
+from vico.world.world import World, detected_objects
 from vico.worldgen.objects.detections.classes import detected_classes
 from vico.worldgen.objects.detections.matching import DetectedThings, things_from_detections
 from vico.worldgen.packaged import packaged_extract

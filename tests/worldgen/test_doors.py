@@ -10,7 +10,7 @@ import shapely
 
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
-from vico.world.check.places import entrance_findings
+from vico.world.check.outdoors import entrance_findings
 from vico.world.heights import HeightField
 from vico.world.model import Building
 from vico.world.walkable import BLOCKED, OPEN, WalkableMap

@@ -12,7 +12,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
-from vico.world.transit_model import TramLine, Transit
+from vico.world.transit import TramLine, Transit
 from vico.world.world import World
 from vico.worldgen.objects.stage import Grounds, objects_from_osm
 

@@ -12,9 +12,8 @@ from defusedxml.ElementTree import fromstring
 from road_city import PLACES, network_of, road_city
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
-from vico.world.check.opendrive import opendrive_findings
 from vico.world.heights import HeightField
-from vico.world.opendrive import Curve, beside, elevation, lane_borders, reference_line
+from vico.world.opendrive import Curve, elevation, lane_borders, offset_point, opendrive_findings, reference_line
 from vico.worldgen.streets.opendrive import SHORTEST, sound_opendrive
 
 _HOUSE = shapely.box(-5, 30, 5, 40)
@@ -84,7 +83,7 @@ def test_where_traffic_keeps_left_roads_through_junctions_lie_where_their_lanes_
         number = next(int(str(lane.get("id"))) for lane in road.iter("lane") if lane.get("type") == "driving")
         for curve in reference_line(road):
             point, heading = curve.end(0.0)
-            middle = beside(point, heading, sum(borders[number]) / 2)
+            middle = offset_point(point, heading, sum(borders[number]) / 2)
             assert every.distance(shapely.Point(middle)) < 0.5
 
 

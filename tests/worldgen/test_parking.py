@@ -12,7 +12,7 @@ from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.worldgen.facts.bays import kerb_bays, lot_bays
 from vico.worldgen.facts.site import SiteFacts, site_facts
 from vico.worldgen.facts.streets import Street, StreetPolygons

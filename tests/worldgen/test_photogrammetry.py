@@ -16,8 +16,7 @@ from photogrammetry.tileset import write_tileset
 from vico.errors import EmptyInputError, InputError
 from vico.geo.osm import OsmData, read_osm
 from vico.geo.overlay import OverlayError
-from vico.geo.tiles3d.mesh import TileMesh
-from vico.geo.tiles3d.reader import read_tileset
+from vico.geo.tiles3d import TileMesh, read_tileset
 from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.heights import HeightField

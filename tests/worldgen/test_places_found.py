@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from conftest import EXTRACT
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
-from vico.geo.places.model import FoundPlace
+from vico.geo.places import FoundPlace
 from vico.world.model import Category, Dropped, Entrance, Place
 from vico.world.world import World
 from vico.worldgen.facts.named_places import NamedPlace, named_places

@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 
 from road_city import HALF, road_city
-from vico.geo.gtfs.feed import Feed, GtfsRoute, GtfsStop, Pattern
+from vico.geo.gtfs_feed import Feed, GtfsRoute, GtfsStop, Pattern
 from vico.world.heights import HeightField
-from vico.world.rails import TRAM_LENGTH, Track
+from vico.world.transit import TRAM_LENGTH, Track
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.transit.rails import trams_from_osm
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
 
-from vico.world.check.solids import open_edges
+from vico.world.check.buildings import open_edges
 from vico.worldgen.buildings.roofs.solid import building_solid
 from vico.worldgen.facts.outlines.roof_shapes import SHAPES, Roof, shape_named
 

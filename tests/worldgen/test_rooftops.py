@@ -7,7 +7,7 @@ from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.seeds import rng
-from vico.world.check.solids import coplanar_overlaps
+from vico.world.check.buildings import coplanar_overlaps
 from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
 from vico.worldgen.buildings.solids import Footing, part_mesh
 from vico.worldgen.buildings.stage import clad

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from vico.errors import InputError, SchemaError
-from vico.geo.buildings.model import FoundBuilding, FoundBuildings, RoofFacet
+from vico.geo.buildings import FoundBuilding, FoundBuildings, RoofFacet
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import OverlayError

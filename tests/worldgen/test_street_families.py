@@ -12,7 +12,7 @@ from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.seeds import rng
-from vico.world.check.solids import coplanar_overlaps
+from vico.world.check.buildings import coplanar_overlaps
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BUILDING
 from vico.worldgen.buildings.chimneys import height_of, party_wall_stacks, ridge_chimneys

@@ -9,9 +9,8 @@ import pytest
 
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import Building
+from vico.world.model import Building, Road, Roads
 from vico.world.objects import Objects
-from vico.world.street_model import Road, Roads
 from vico.worldgen.facades.pieces import Pieces
 from vico.worldgen.facades.signs import paint_boards
 from vico.worldgen.facades.street_names import NamePlate, Streets, name_plates

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from vico.errors import InputError, MissingExtraError
-from vico.geo.street_images.model import StreetImage, looking, pinhole, turned
-from vico.geo.street_images.panorama import cut
+from vico.geo.street_images import StreetImage, camera_rotation, cut_panorama, pinhole, rotation_from_axis_angle
 from vico.render import Cameras, Scene, render
 from vico.seeds import rng
 from vico.world.mesh import Surface
@@ -30,7 +29,7 @@ pytest.importorskip("embreex", reason="embreex is the extra photos")
 
 WIDTH, HEIGHT = 480, 360
 LENS = pinhole(WIDTH, HEIGHT, 330.0)
-TRUE = Pose(np.array([2.0, 0.0, 2.0]), looking(10.0, 8.0))
+TRUE = Pose(np.array([2.0, 0.0, 2.0]), camera_rotation(10.0, 8.0))
 
 
 def quad(corner: tuple[float, ...], along: tuple[float, ...], up: tuple[float, ...], entity: int) -> Surface:
@@ -121,7 +120,7 @@ def photo(
     """A photo of the true street from `TRUE`, brighter than the model is, whose metadata are off."""
     rgb, _, _ = photographer(street().true, extra)(TRUE.position, TRUE.rotation, LENS, WIDTH, HEIGHT)
     bright = np.clip(rgb.astype(np.float32) * (1.1, 1.05, 0.98) + rng(0, "noise").normal(0, 2, rgb.shape), 0, 255)
-    rotation = turned([0.015, -0.03, 0.02]) @ TRUE.rotation
+    rotation = rotation_from_axis_angle([0.015, -0.03, 0.02]) @ TRUE.rotation
     return StreetImage(name, bright.astype(np.uint8), TRUE.position + off, rotation, LENS, None, "test", "me")
 
 
@@ -167,7 +166,7 @@ def test_texels_become_known_only_where_a_photo_shows_them() -> None:
 def test_a_photo_of_elsewhere_is_refused_with_the_reason() -> None:
     s = street()
     other = replace(photo("other"), picture=rng(1, "x").integers(0, 255, (HEIGHT, WIDTH, 3)).astype(np.uint8))
-    far = replace(photo("far"), position=np.array([900.0, 0, 1500.0]), rotation=looking(0.0, 80.0))
+    far = replace(photo("far"), position=np.array([900.0, 0, 1500.0]), rotation=camera_rotation(0.0, 80.0))
     made, report = reproject(s.model, [other, far], photographer(s.model), s.sight, config=CONFIG)
     assert [p.used for p in report.photos] == [False, False]
     assert "matches agree on a pose; 10 are needed" in report.photos[0].reason
@@ -240,7 +239,7 @@ def rendered_panorama(pose: Pose, width: int) -> np.ndarray:
     rays = np.stack([flat * np.sin(longitude), -np.sin(latitude), flat * np.cos(longitude)], axis=-1) @ pose.rotation
     made = np.zeros((width // 2, width, 3), np.uint8)
     for heading, pitch in ((0, 0), (90, 0), (180, 0), (270, 0), (0, 89.99), (0, -89.99)):
-        rotation = looking(heading, pitch)
+        rotation = camera_rotation(heading, pitch)
         picture, _, _ = take(pose.position, rotation, lens, side, side)
         seen = rays @ rotation.T
         here = (seen[..., 2] > 0) & (np.abs(seen[..., :2]).max(axis=-1) <= seen[..., 2] * 1.001)
@@ -250,10 +249,10 @@ def rendered_panorama(pose: Pose, width: int) -> np.ndarray:
 
 
 def test_a_rendered_panorama_is_cut_into_what_cameras_would_see() -> None:
-    true = Pose(TRUE.position, looking(40.0, 6.0, -5.0))
+    true = Pose(TRUE.position, camera_rotation(40.0, 6.0, -5.0))
     whole = StreetImage("p", rendered_panorama(true, 1440), true.position, true.rotation, LENS, None, "test", "me")
     take = photographer(street().true)
-    for view in cut(whole)[:2]:
+    for view in cut_panorama(whole)[:2]:
         h, w = view.picture.shape[:2]
         direct, _, _ = take(view.position, view.rotation, view.intrinsics, w, h)
         gap = np.abs(cv2.GaussianBlur(view.picture, (0, 0), 1.0).astype(int) - cv2.GaussianBlur(direct, (0, 0), 1.0))

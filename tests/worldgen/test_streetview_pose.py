@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vico.geo.street_images.model import looking, pinhole, turned
+from vico.geo.street_images import camera_rotation, pinhole, rotation_from_axis_angle
 from vico.seeds import rng
 from vico.worldgen.photos.streetview.matching import Matches
 from vico.worldgen.photos.streetview.pose import Pose, correction, fit_pose, lifted, projected, se3_norm
@@ -14,7 +14,7 @@ pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 
 WIDTH, HEIGHT = 320, 240
 LENS = pinhole(WIDTH, HEIGHT, 240.0)
-PRIOR = Pose(np.array([0.0, 0.0, 1.8]), looking(20.0, 6.0))
+PRIOR = Pose(np.array([0.0, 0.0, 1.8]), camera_rotation(20.0, 6.0))
 SMALL = st.floats(-1.0, 1.0)
 
 
@@ -42,7 +42,7 @@ def matches_of(true: Pose, *, count: int = 150, wrong: float = 0.3, noise: float
 @given(st.tuples(SMALL, SMALL, SMALL), st.tuples(SMALL, SMALL, SMALL))
 def test_a_pose_is_found_among_wrong_matches(step: tuple[float, ...], turn: tuple[float, ...]) -> None:
     position = PRIOR.position + np.array(step) * (1.5, 1.5, 0.4)
-    true = Pose(position, turned(np.array(turn) * 0.06) @ PRIOR.rotation)
+    true = Pose(position, rotation_from_axis_angle(np.array(turn) * 0.06) @ PRIOR.rotation)
     fit = fit_pose(matches_of(true), depth_of_corner(PRIOR), PRIOR, LENS)
     assert fit.refined is not None
     left = correction(true, fit.refined)
@@ -52,7 +52,9 @@ def test_a_pose_is_found_among_wrong_matches(step: tuple[float, ...], turn: tupl
 
 
 def test_the_five_point_method_finds_a_long_step_and_depth_its_length() -> None:
-    true = Pose(PRIOR.position + np.array([1.6, 0.9, 0.2]), turned([0.02, -0.05, 0.03]) @ PRIOR.rotation)
+    true = Pose(
+        PRIOR.position + np.array([1.6, 0.9, 0.2]), rotation_from_axis_angle([0.02, -0.05, 0.03]) @ PRIOR.rotation
+    )
     fit = fit_pose(matches_of(true, noise=0.2), depth_of_corner(PRIOR), PRIOR, LENS)
     assert fit.five_point is not None
     left = correction(true, fit.five_point)
@@ -82,7 +84,7 @@ def test_points_beside_an_edge_have_no_clear_depth() -> None:
 @settings(max_examples=40, deadline=None)
 @given(st.tuples(SMALL, SMALL, SMALL), st.tuples(SMALL, SMALL, SMALL))
 def test_the_norm_of_a_motion_is_that_of_its_inverse(turn: tuple[float, ...], step: tuple[float, ...]) -> None:
-    rotation, translation = turned(np.array(turn) * 1.5), np.array(step) * 5
+    rotation, translation = rotation_from_axis_angle(np.array(turn) * 1.5), np.array(step) * 5
     norm = se3_norm(rotation, translation)
     assert norm == pytest.approx(se3_norm(rotation.T, -rotation.T @ translation), abs=1e-6)
     assert norm >= 20.0 * np.linalg.norm(np.array(turn) * 1.5) - 1e-6
@@ -90,13 +92,13 @@ def test_the_norm_of_a_motion_is_that_of_its_inverse(turn: tuple[float, ...], st
 
 def test_the_norm_of_a_pure_step_is_its_length_and_of_a_turn_its_arc_at_twenty_metres() -> None:
     assert se3_norm(np.eye(3), np.array([3.0, 4.0, 0.0])) == pytest.approx(5.0)
-    assert se3_norm(turned([0.1, 0, 0]), np.zeros(3)) == pytest.approx(2.0)
-    assert se3_norm(turned([np.pi, 0, 0]), np.zeros(3)) == pytest.approx(20.0 * np.pi)
+    assert se3_norm(rotation_from_axis_angle([0.1, 0, 0]), np.zeros(3)) == pytest.approx(2.0)
+    assert se3_norm(rotation_from_axis_angle([np.pi, 0, 0]), np.zeros(3)) == pytest.approx(20.0 * np.pi)
 
 
 def test_a_screw_motion_has_the_norm_of_its_axis_and_pitch() -> None:
     # About and along one axis the logarithm is the motion itself.
-    assert se3_norm(turned([0, 0, 0.3]), np.array([0, 0, 2.0])) == pytest.approx(np.hypot(2.0, 6.0))
+    assert se3_norm(rotation_from_axis_angle([0, 0, 0.3]), np.array([0, 0, 2.0])) == pytest.approx(np.hypot(2.0, 6.0))
 
 
 def test_a_correction_counts_what_the_camera_does() -> None:

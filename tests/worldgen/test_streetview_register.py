@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vico.geo.street_images.model import looking
+from vico.geo.street_images import camera_rotation
 from vico.seeds import rng
 from vico.worldgen.photos.atlas import Chart
 from vico.worldgen.photos.streetview.pose import Pose
@@ -20,7 +20,7 @@ SHAPE = 120, 200
 CHART = Chart(
     1, 0, 0, 0, 200, 120, np.zeros(3), np.array([TEXEL, 0, 0]), np.array([0, 0, TEXEL]), np.array([0, -1.0, 0])
 )
-CAMERA = Pose(np.array([6.0, -9.0, 1.7]), looking(0.0, 10.0))
+CAMERA = Pose(np.array([6.0, -9.0, 1.7]), camera_rotation(0.0, 10.0))
 WHOLE = np.ones(SHAPE, np.bool_)
 
 

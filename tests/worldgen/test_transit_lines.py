@@ -12,15 +12,14 @@ import pytest
 
 from road_city import HALF, RoadCity, lanes_of, network_of, road_city
 from vico.geo.frame import LocalFrame
-from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, GtfsStop, Pattern
-from vico.geo.gtfs.reader import read_gtfs
+from vico.geo.gtfs import read_gtfs
+from vico.geo.gtfs_feed import DAY, Feed, GtfsRoute, GtfsStop, Pattern
 from vico.geo.osm import OsmData, OsmNode, OsmRelation, read_osm
 from vico.rules import BUS_DWELL
 from vico.sim.transit import plan_buses
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.timetable import departure
-from vico.world.transit_model import Line, Transit
+from vico.world.transit import Line, Transit, departure
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import empty_network
 from vico.worldgen.transit.routes import interval_of, routes_from_osm

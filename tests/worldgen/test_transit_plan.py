@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from road_city import HALF, PLACES, STRIP, lanes_of, road_city
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.transit_model import Line, Transit
+from vico.world.transit import Line, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import empty_network
 from vico.worldgen.transit.plan import as_many, times_as_wide

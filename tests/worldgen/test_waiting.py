@@ -11,10 +11,10 @@ import shapely
 
 from road_city import road_city
 from vico.rules import BUS_DOOR_REACH, BUS_WIDTH
-from vico.world.check.streets import check_transit
+from vico.world.check.outdoors import check_transit
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.transit_model import Stop, Transit
+from vico.world.transit import Stop, Transit
 from vico.world.world import World
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.transit.drive import Kerbs

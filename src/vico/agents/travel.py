@@ -23,7 +23,7 @@ from vico.agents.wayfinding import Walker, closed_ground
 from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, TRAM_WIDTH, WALK_SPEED, ReasonCode, code_name
 from vico.world.model import Point2
 from vico.world.public import PublicMap
-from vico.world.transit_model import Line, Stop, TramLine, TramStop
+from vico.world.transit import Line, Stop, TramLine, TramStop
 from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
 from vico.world.walkable import ROADWAY, WalkableMap
 

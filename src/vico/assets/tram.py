@@ -27,7 +27,7 @@ from vico.assets.vehicle_parts import (
 )
 from vico.rules import TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.world.mesh import Surface
-from vico.world.rails import TRAM_DOORS
+from vico.world.transit import TRAM_DOORS
 
 TRAM_HEIGHT = 3.4
 #: Height of the floor riders stand on, metres.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.shapes import Colour
-from vico.world.mesh import Material, Surface, joined, quad_triangles
+from vico.world.mesh import Material, Surface, merge_surfaces, quad_triangles
 
 GLASS: Colour = (44, 54, 64)
 TYRE: Colour = (26, 26, 28)
@@ -55,7 +55,7 @@ class Cabin:
 
 def one_surface(parts: Sequence[Surface]) -> Surface:
     """Join parts of one material."""
-    return joined(parts)[0]
+    return merge_surfaces(parts)[0]
 
 
 def quads(corners: NDArray[np.float64] | Sequence[Sequence[Sequence[float]]], colour: Colour) -> Surface:

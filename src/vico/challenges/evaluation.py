@@ -19,7 +19,7 @@ from vico.io.stores import FolderStore, Store, store_at
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.jobs.shared import check_code, check_seen, seen_by_all
 from vico.runner.foreign import Terms
-from vico.world.remote import fetch_world
+from vico.world.folder import fetch_world
 
 _TOLD_EVERY = 10  # steps
 

@@ -149,9 +149,8 @@ def city_check(path: Positional[Path], borders: bool = False, json: bool = False
         json: Print JSON.
     """
     from vico.cli.output import print_json, progress_bars
-    from vico.world.borders import border_findings
     from vico.world.check import check_whole, check_world
-    from vico.world.city import read_city
+    from vico.world.city import border_findings, read_city
     from vico.world.city_world import CityWorld
 
     read = read_city(path)

@@ -20,9 +20,9 @@ from vico.community import (
     world_of,
     write_community,
 )
-from vico.community.authorship import Origin
 from vico.community.folder import COMMUNITY_FOLDER
 from vico.community.llm import LlmCommunityAuthor
+from vico.community.model import Origin
 from vico.errors import InputError
 from vico.world.folder import read_world
 from vico.world.world import World

@@ -23,7 +23,7 @@ from vico.community.folder import COMMUNITY_FOLDER
 from vico.errors import OutputExistsError, StageError
 from vico.io.folders import check_replaceable
 from vico.sim.recording.schema import RUN_FOLDER
-from vico.world.stored import WORLD_FOLDER
+from vico.world.world import WORLD_FOLDER
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
 

@@ -50,8 +50,7 @@ from vico.runner.foreign import Terms, check_loads
 from vico.runner.loading import load_agent
 from vico.threads import workers as processors
 from vico.viewer.server import require_server
-from vico.world.folder import read_world
-from vico.world.remote import fetch_manifest
+from vico.world.folder import fetch_manifest, read_world
 
 #: `evaluate` with all but where to, and who is told.
 Play = Callable[..., list[Outcome]]

@@ -14,11 +14,10 @@ from typing import Any
 from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
-from vico.geo.gtfs.feed import NO_TIMETABLE
+from vico.geo.gtfs_feed import NO_TIMETABLE
 from vico.world.folder import read_world
 from vico.world.model import FLAT_GROUND
-from vico.world.stored import WORLD_FOLDER, stage_seconds
-from vico.world.world import World
+from vico.world.world import WORLD_FOLDER, World, stage_seconds
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world

@@ -1,13 +1,12 @@
 """Who lives in a world: residents, groups, schedules, and the validator that keeps them grounded."""
 
 from vico.community.author import Author, build_community, procedural_author
-from vico.community.days import date_of
-from vico.community.findings import CommunityFinding
 from vico.community.folder import digest_of, read_community, read_manifest, read_names, world_of, write_community
 from vico.community.model import (
     ActivityTag,
     Community,
     CommunityDay,
+    CommunityFinding,
     CommunityManifest,
     Group,
     ItemType,
@@ -18,8 +17,9 @@ from vico.community.model import (
     Resident,
     ResidentAppearance,
     ScheduleItem,
+    with_tags,
 )
-from vico.community.tags import with_tags
+from vico.community.schedules import date_of
 from vico.community.validator import check_community
 
 __all__ = [

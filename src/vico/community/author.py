@@ -12,23 +12,26 @@ from typing import Protocol
 import numpy as np
 
 from vico.clock import clock_of
-from vico.community.biography import Biographer, honest_character, lifestyle_of
-from vico.community.childhood import POCKET_MONEY
-from vico.community.day_measures import day_measures
-from vico.community.days import FIRST_DAY, DayDrafts, DaySchedules, drafts_on, planning_date, write_days
-from vico.community.findings import CommunityFinding
-from vico.community.groups import Meeting, form_groups, meetings_by_member
-from vico.community.households import draw_households
-from vico.community.model import Community, CommunityDay, Group, Resident, ResidentAppearance, WorldIdentity
-from vico.community.people import Household, ResidentDraft, draw_character
+from vico.community.day import day_measures
+from vico.community.groups import Meeting, form_groups, form_playmates, meetings_by_member
+from vico.community.mode_choice import with_rides
+from vico.community.model import (
+    Community,
+    CommunityDay,
+    CommunityFinding,
+    Group,
+    Resident,
+    ResidentAppearance,
+    WorldIdentity,
+    with_tags,
+)
+from vico.community.people import POCKET_MONEY, Household, ResidentDraft, draw_character, draw_households
 from vico.community.place_index import PlaceIndex
-from vico.community.playmates import form_playmates
+from vico.community.profiles import Biographer, Wardrobe, honest_character, lifestyle_of
 from vico.community.relations import draw_relations
-from vico.community.rides import with_rides
+from vico.community.schedules import FIRST_DAY, DayDrafts, DaySchedules, drafts_on, planning_date, write_days
 from vico.community.schooling import assign_schools, plan_care, settle_care
-from vico.community.tags import with_tags
 from vico.community.validator import check_community
-from vico.community.wardrobe import Wardrobe
 from vico.community.work import assign_homes, assign_work, check_beds, employers, study_places
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
@@ -36,6 +39,7 @@ from vico.version import __version__
 from vico.world.model import Category
 from vico.world.world import World
 
+__all__ = ["Author", "CommunityFinding", "ResidentDraft", "build_community", "procedural_author"]
 #: For so many days, at most, schedules are written.
 MOST_DAYS = 14
 
@@ -158,7 +162,7 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
     days = write_days(planned, first, meetings, relations, dates, stream)
     groups = _groups(meetings)
     people = _residents(planned, days, meetings, stream)
-    riding = [_ridden(people, groups, day, stream) for day in days]
+    riding = [_schedules_with_rides(people, groups, day, stream) for day in days]
     community = Community(
         producer=f"vico {__version__}",
         author=_PROCEDURAL,
@@ -175,10 +179,10 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
             for day, residents in zip(days[1:], riding[1:], strict=True)
         ],
     )
-    return _told(community, planned, meetings, stream)
+    return _with_descriptions(community, planned, meetings, stream)
 
 
-def _told(
+def _with_descriptions(
     community: Community,
     planned: DayDrafts,
     meetings: Sequence[Meeting],
@@ -264,7 +268,7 @@ def _residents(
                 household=f"household_{draft.household}",
                 home=draft.home,
                 workplace=draft.workplace,
-                known_places=_known(index, draft, frequented, mine),
+                known_places=_known_places(index, draft, frequented, mine),
                 spawn=spawn,
                 schedule=days[0].items[draft.id],
             )
@@ -272,7 +276,7 @@ def _residents(
     return people
 
 
-def _ridden(
+def _schedules_with_rides(
     people: Sequence[Resident], groups: Sequence[Group], day: DaySchedules, stream: Callable[[str], np.random.Generator]
 ) -> list[Resident]:
     """Return everybody with the schedule of a day, rides put in."""
@@ -318,7 +322,9 @@ def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
     return int(np.clip(round(float(chance.normal(level, 90))), 100, 1000))
 
 
-def _known(index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]) -> list[str]:
+def _known_places(
+    index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]
+) -> list[str]:
     """Where they go, where they meet, where their hobbies could take them, and what they pass on their own street."""
     known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
     passed = (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT)
@@ -357,6 +363,3 @@ def _group_names(meetings: Sequence[Meeting]) -> list[str]:
     ]
     counts = [Counter(names) for names in zip(*forms, strict=True)]
     return [next(name for name, count in zip(mine, counts, strict=True) if count[name] == 1) for mine in forms]
-
-
-__all__ = ["Author", "CommunityFinding", "ResidentDraft", "build_community", "procedural_author"]

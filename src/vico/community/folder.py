@@ -21,9 +21,18 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from vico.community.authorship import Authorship
-from vico.community.model import SCHEMA, VERSION, Community, CommunityDay, CommunityManifest, Group, Relation, Resident
-from vico.community.tags import with_tags
+from vico.community.model import (
+    SCHEMA,
+    VERSION,
+    Authorship,
+    Community,
+    CommunityDay,
+    CommunityManifest,
+    Group,
+    Relation,
+    Resident,
+    with_tags,
+)
 from vico.errors import MissingFileError, SchemaError
 from vico.io.files import read_json, write_bytes, write_json
 from vico.io.folders import FolderKind, check_replaceable, mistaken, new_folder

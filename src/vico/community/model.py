@@ -1,24 +1,94 @@
-"""What a community is, as records: residents, groups, relations and the schedules of one or several days."""
+"""What a community is, as records: residents, groups, relations, and the schedules of one or several days.
+
+`Authorship` says who wrote what where a language model had a part: item by item, and why where the model did not.
+`CommunityFinding` is what the validator finds: where, what, and how to mend it. `with_tags` says what schedule items
+are about where their author did not: by type, place and group, never from words.
+"""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date as Date  # the field of that name would hide it
 from enum import StrEnum
-from typing import (
-    Annotated,
-    Literal,
-    NotRequired,  # pydantic needs this one before Python 3.12
-)
+from typing import Annotated, Literal, NotRequired
 
 from pydantic import AfterValidator, ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
 from vico.clock import DAY, clock_of
-from vico.community.authorship import Authorship
 from vico.english import split_name
 from vico.errors import InputError
-from vico.world.model import Point2, Record
+from vico.world.model import Category, Place, Point2, Record
+
+
+class Origin(StrEnum):
+    """Why an item is whose it is; all but the first are the procedural author's."""
+
+    WRITTEN = "written by the model"
+    NOT_ASKED = "not asked of the model"
+    NO_ANSWER = "no answer"
+    UNUSABLE = "no usable reply"
+    NOT_GROUNDED = "not grounded"
+
+
+class AuthoredItem(Record):
+    """An item of a community, and whose it is.
+
+    Attributes
+    ----------
+    item
+        ``resident_3.character``, ``resident_3.groups``, ``resident_3.schedule`` or ``relations``.
+    origin
+        Whose it is and why.
+    detail
+        More of why, such as what the validator found in the last draft; a sentence at most.
+    moved
+        Of a schedule that the model wrote: by how many minutes the start or end of a stay was moved at most, so that
+        the ways between them take as long as they do.
+    """
+
+    item: str
+    origin: Origin
+    detail: str = ""
+    moved: int = 0
+
+
+class Authorship(Record):
+    """Who wrote what.
+
+    Attributes
+    ----------
+    model
+        Name of the language model.
+    prompts
+        SHA-256 of each prompt it was asked with, by name.
+    """
+
+    model: str
+    prompts: dict[str, str]
+    items: list[AuthoredItem]
+
+    @property
+    def counts(self) -> Mapping[str, Mapping[Origin, int]]:
+        """How many items of each kind (character, groups, schedule, relations) have which origin."""
+        found: dict[str, Counter[Origin]] = {}
+        for one in self.items:
+            found.setdefault(one.item.rpartition(".")[2], Counter())[one.origin] += 1
+        return found
+
+    @property
+    def written(self) -> int:
+        """How many items are the model's."""
+        return sum(one.origin is Origin.WRITTEN for one in self.items)
+
+    @property
+    def fallen_back(self) -> list[AuthoredItem]:
+        """Return the items that the model was to write and did not."""
+        return [one for one in self.items if one.origin not in (Origin.WRITTEN, Origin.NOT_ASKED)]
+
 
 SCHEMA = "vico.community"
 VERSION = 2
@@ -81,7 +151,7 @@ class ScheduleItem(Record):
     Attributes
     ----------
     tag
-        What it is about. None where the author did not say; `vico.community.tags.with_tags` fills it in.
+        What it is about. None where the author did not say; `vico.community.model.with_tags` fills it in.
     start, end
         ``HH:MM:SS``; the next item starts when this one ends; the last one ends 23:59:59.
     mode
@@ -385,3 +455,120 @@ class CommunityManifest(Record):
     world: WorldIdentity
     counts: dict[str, int]
     files: dict[str, str]
+
+
+@dataclass(frozen=True)
+class CommunityFinding:
+    """Something wrong.
+
+    Attributes
+    ----------
+    where
+        Path into the community: ``resident_3.schedule[5]``.
+    what
+        What is wrong, with the values.
+    mend
+        What to do about it.
+    """
+
+    where: str
+    what: str
+    mend: str
+
+
+_MAIN = frozenset(
+    {
+        ActivityTag.WORK,
+        ActivityTag.STUDY,
+        ActivityTag.EXERCISE,
+        ActivityTag.SHOP,
+        ActivityTag.VISIT,
+        ActivityTag.LEISURE,
+        ActivityTag.GROUP,
+    }
+)
+#: Tags that go with each of the four types.
+TAGS_OF_TYPE: Mapping[ItemType, frozenset[ActivityTag]] = {
+    ItemType.SLEEP: frozenset({ActivityTag.SLEEP}),
+    ItemType.MEAL: frozenset({ActivityTag.MEAL_HOME, ActivityTag.MEAL_OUT, ActivityTag.GROUP}),
+    ItemType.MAIN: _MAIN,
+    ItemType.COMMUTE: frozenset({ActivityTag.COMMUTE}),
+}
+
+_EXERCISE = frozenset(
+    {"fitness_centre", "sports_centre", "sports_hall", "swimming_pool", "yoga", "pitch", "track", "dance"}
+)
+_STUDY = frozenset({"university", "college", "library"})
+_VISIT = frozenset({"museum", "gallery", "arts_centre", "attraction", "castle", "zoo", "place_of_worship", "monument"})
+
+
+def with_tags(community: Community, places: Sequence[Place] = ()) -> Community:
+    """Return a community all of whose schedule items have a tag; tags that are there stay.
+
+    Parameters
+    ----------
+    places
+        Of its world; without them only home, workplace and groups are known apart.
+    """
+    further = [items for day in community.further_days for items in day.schedules.values()]
+    if all(item.tag is not None for items in [*(r.schedule for r in community.residents), *further] for item in items):
+        return community
+    by_id = {place.id: place for place in places}
+    groups: dict[str, list[Group]] = {}
+    for group in community.groups:
+        for member in group.members:
+            groups.setdefault(member, []).append(group)
+
+    def tagged(resident: Resident, items: Sequence[ScheduleItem]) -> list[ScheduleItem]:
+        mine = groups.get(resident.id, [])
+        return [
+            item if item.tag is not None else item.model_copy(update={"tag": tag_of(item, resident, mine, by_id)})
+            for item in items
+        ]
+
+    people = community.resident_by_id
+    return community.model_copy(
+        update={
+            "residents": [r.model_copy(update={"schedule": tagged(r, r.schedule)}) for r in community.residents],
+            "further_days": [
+                day.model_copy(update={"schedules": {i: tagged(people[i], s) for i, s in day.schedules.items()}})
+                for day in community.further_days
+            ],
+        }
+    )
+
+
+def tag_of(item: ScheduleItem, resident: Resident, groups: Sequence[Group], places: Mapping[str, Place]) -> ActivityTag:
+    """Return what an item is about, by its type, its place and the groups that meet there then.
+
+    Parameters
+    ----------
+    groups
+        Those the resident belongs to.
+    places
+        By id.
+    """
+    if item.type is ItemType.SLEEP:
+        return ActivityTag.SLEEP
+    if item.type is ItemType.COMMUTE:
+        return ActivityTag.COMMUTE
+    if any(group.place == item.place and group.start < item.end and item.start < group.end for group in groups):
+        return ActivityTag.GROUP
+    if item.type is ItemType.MEAL:
+        return ActivityTag.MEAL_HOME if item.place == resident.home else ActivityTag.MEAL_OUT
+    if item.place == resident.workplace:
+        return ActivityTag.WORK
+    if item.place == resident.home or item.place is None or item.place not in places:
+        return ActivityTag.LEISURE
+    return _tag_of_place(places[item.place])
+
+
+def _tag_of_place(place: Place) -> ActivityTag:
+    """Return what people who neither live nor work at a place come there for."""
+    if place.kind in _EXERCISE:
+        return ActivityTag.EXERCISE
+    if place.kind in _STUDY:
+        return ActivityTag.STUDY
+    if place.kind in _VISIT or place.category is Category.ACCOMMODATION:
+        return ActivityTag.VISIT
+    return ActivityTag.SHOP if place.category is Category.STORE else ActivityTag.LEISURE

@@ -1,29 +1,188 @@
-"""What an author and the validator need to know of a world: which places can be reached, how far, and when."""
+"""What an author and the validator need to know of a world: which places can be reached, how far, and when.
+
+Places are open when the map says so, else at the usual hours of their kind. Usual hours are data:
+``vico/data/community/hours.toml`` and a user's own files. What is indoors at places is kept in numbers: a city has
+hundreds of thousands of rooms.
+"""
 
 from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Collection, Iterable, Sequence
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date as Date
 from datetime import timedelta
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.community.hours import given_hours, usual_spans
-from vico.community.place_rooms import PlaceRooms
-from vico.community.ride_times import RideTimes
-from vico.community.walks import Walks
-from vico.errors import EmptyInputError
+from vico.community.ride_times import RideTimes, Walks
+from vico.errors import EmptyInputError, SchemaError
 from vico.geometry import distances
+from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.io.recent import Recent
-from vico.rules import WALK_SPEED
-from vico.world.model import Category, Place, Point2
-from vico.world.opening_hours import Span, customary_weekday
+from vico.rules import BED_WIDTH, WALK_SPEED
+from vico.world.model import Category, Place, Point2, Room
+from vico.world.opening_hours import DAYS, MINUTES, Coordinates, Span, customary_weekday, open_spans, weekly_hours
+from vico.world.walk_lengths import IndoorWays
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.world import World
+
+# Rooms that one only passes through.
+_WAYS = frozenset({"corridor", "stairs", "lift", "lobby", "hall"})
+
+
+class PlaceRooms:
+    """Of each place, in the order of the world's.
+
+    Attributes
+    ----------
+    inside
+        Seconds on foot from the street to the farthest room; 0 in the open. float64, shape ``(places,)``.
+    beds
+        How many people can lie in the beds, which are for two where they are wide. int64, shape ``(places,)``.
+    area
+        Square metres of the rooms, without corridors, stairs and lifts. float64, shape ``(places,)``.
+    """
+
+    def __init__(self, world: World) -> None:
+        places = world.places
+        self.inside, self.area = np.zeros(len(places)), np.zeros(len(places))
+        self.beds: NDArray[np.int64] = np.zeros(len(places), np.int64)
+        by_id = world.room_by_id if any(place.rooms for place in places) else {}
+        ways = IndoorWays(by_id)
+        for k, place in enumerate(places):
+            self.inside[k] = ways.seconds(place.rooms)
+            rooms = [by_id[name] for name in place.rooms]
+            self.beds[k] = sum(map(_beds, rooms))
+            self.area[k] = sum(room.size[0] * room.size[1] for room in rooms if room.kind not in _WAYS)
+
+    @classmethod
+    def of(cls, world: World) -> PlaceRooms:
+        """Return those of a world, counted once."""
+        return world.shared(cls, lambda: cls(world))
+
+
+def _beds(room: Room) -> int:
+    return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in room.containers if top.kind == "bed")
+
+
+#: Staff are at their place so long before it opens and after it closes, at most, minutes.
+STAFF_MARGIN = 60
+
+_GUIDE = "docs/adding_people.md"
+# Rules of a value of `opening_hours`, and days that are all there is in one: open round the clock, by the letter.
+_RULES = re.compile(r";|\|\|")
+_DAYS = re.compile(r"(?:Mo|Tu|We|Th|Fr|Sa|Su|PH|SH|[-,\s])+")
+
+
+class _Usual(DataRecord):
+    hours: str
+    kinds: tuple[str, ...]
+
+
+class _HoursFile(DataRecord):
+    otherwise: str | None = None
+    usual: tuple[_Usual, ...] = ()
+
+
+@dataclass(frozen=True)
+class UsualHours:
+    """Spans of the seven days, Monday first, by kind or category of place, and of all others."""
+
+    by_kind: Mapping[str, list[list[Span]]]
+    otherwise: list[list[Span]]
+
+
+@cached_data
+def usual_hours() -> UsualHours:
+    """Return when places are usually open; a kind has the hours that named it last.
+
+    Raises
+    ------
+    SchemaError
+        If a file can't be used, or hours can't be read.
+    """
+    by_kind: dict[str, list[list[Span]]] = {}
+    otherwise: list[list[Span]] = [[] for _ in DAYS]
+    for path in data_files("community", "hours"):
+        file = read_record(path, _HoursFile, guide=_GUIDE)
+        for k, entry in enumerate(file.usual):
+            by_kind |= dict.fromkeys(entry.kinds, _week(path, f"usual.{k}.hours", entry.hours))
+        if file.otherwise is not None:
+            otherwise = _week(path, "otherwise", file.otherwise)
+    return UsualHours(by_kind, otherwise)
+
+
+def _week(path: Path, where: str, text: str) -> list[list[Span]]:
+    """Return the hours of a week with those that spill over from the day before, or refuse a data file's value."""
+    week = weekly_hours(text)
+    if any(_DAYS.fullmatch(rule.strip()) for rule in _RULES.split(text) if rule.strip()):
+        raise SchemaError(f"{path}: {where}: {text!r} names days without hours; write them like Mo-Fr 09:00-17:00")
+    if week is None or not any(week[:5]):
+        raise SchemaError(f"{path}: {where}: {text!r} says no hours of a working day; write them like 09:00-17:00")
+    late = [[(0, end - MINUTES) for _, end in day if end > MINUTES] for day in week]
+    return [sorted(late[k - 1] + day) for k, day in enumerate(week)]
+
+
+def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
+    """When a place of this kind is usually open on a day, minutes; empty where it is closed.
+
+    Parameters
+    ----------
+    weekday
+        0 Monday .. 6 Sunday; a working day unless given.
+    """
+    usual = usual_hours()
+    week = usual.by_kind.get(kind) or usual.by_kind.get(category, usual.otherwise)
+    return list(week[weekday])
+
+
+def stated_hours(place: Place, date: Date, coordinates: Coordinates, *, holidays: bool = True) -> list[Span] | None:
+    """When a place says that it is open on a date, minutes; None if it says nothing that can be read.
+
+    Parameters
+    ----------
+    coordinates
+        Latitude and longitude of the world, degrees: for public holidays and the sun.
+    holidays
+        Whether public holidays count.
+    """
+    said = place.opening_hours
+    return None if said is None else open_spans(said, date, coordinates, holidays=holidays)
+
+
+def hours_on(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
+    """When a place is open on a date, minutes: what it says, else what is usual for its kind."""
+    given = stated_hours(place, date, coordinates)
+    return usual_spans(place.kind, place.category, customary_weekday(date, coordinates)) if given is None else given
+
+
+def staffed_stretches(spans: Sequence[Span]) -> list[list[Span]]:
+    """Group the opening hours of a day into stretches between which staff go home.
+
+    A place that closes at midday for less than twice `STAFF_MARGIN` stays staffed: one stretch of two spans.
+    """
+    stretches: list[list[Span]] = []
+    for span in sorted(spans):
+        if stretches and span[0] - max(end for _, end in stretches[-1]) <= 2 * STAFF_MARGIN:
+            stretches[-1].append(span)
+        else:
+            stretches.append([span])
+    return stretches
+
+
+def staffed_spans(spans: Sequence[Span]) -> list[Span]:
+    """Return from when until when staff may be at a place with these opening hours, minutes of the day."""
+    return [
+        (min(start for start, _ in stretch) - STAFF_MARGIN, max(end for _, end in stretch) + STAFF_MARGIN)
+        for stretch in staffed_stretches(spans)
+    ]
+
 
 #: Accommodation in which people stay for a while, not for good.
 GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment", "chalet", "alpine_hut"})
@@ -233,7 +392,7 @@ class PlaceIndex:
 
     def given_hours(self, place: Place) -> list[Span] | None:
         """When the place says it is open on the day, minutes; None if it doesn't say, or not in a form we read."""
-        return given_hours(place, self.date, self.coordinates, holidays=self.holidays)
+        return stated_hours(place, self.date, self.coordinates, holidays=self.holidays)
 
     def hours(self, place: Place) -> list[Span]:
         """When a place is open on the day, minutes: what it says, else what is usual for its kind."""

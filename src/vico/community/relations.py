@@ -1,24 +1,181 @@
-"""The social network: who is what to whom, read off homes, workplaces and groups."""
+"""The social network: who is what to whom, read off homes, workplaces and groups; and what the network measures.
+
+Friends are drawn after Feld's foci (American Journal of Sociology 86, 1981: ties form where people share a group, a
+workplace, a class or a house), homophily (McPherson, Smith-Lovin, Cook; Annual Review of Sociology 27, 2001) and
+triadic closure. How many friends somebody has is skewed, and larger for the outgoing. ``docs/community.md`` holds it
+against real networks.
+
+The measures (degrees, clustering, assortativity, path lengths) are those of Newman, "Networks" (2nd edition, 2018), so
+that they can be held against published ones.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vico.community.friendships import Acquaintance, draw_friendships
 from vico.community.groups import Meeting
-from vico.community.model import Relation, RelationKind
+from vico.community.model import Community, Relation, RelationKind
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex
+
+# Friends of an adult of middling extraversion where there are many to choose from, and the shape of their gamma
+# distribution; among few, this share of all others.
+_MANY, _SHAPE, _OF_FEW = 7.0, 2.6, 0.33
+# Children have friends of their age, to within so many years; adults' friends thin out with the years between, scale.
+_CHILD_AGE_GAP, _YEARS_BETWEEN = 2, 9.0
+# Chance that a place in somebody's circle is filled by a friend of a friend.
+_CLOSURE = 0.35
+# How likely two are to be friends for what they share, of ties that may be of several kinds.
+_WEIGHTS = {"group": 9.0, "work": 2.0, "class": 4.0, "school": 1.0, "house": 1.5, "street": 0.6, "town": 0.12}
+_NOTES = {
+    "work": "friends from work",
+    "class": "in the same class",
+    "school": "go to the same school",
+    "house": "friends from the house",
+    "street": "friends from the street",
+    "town": "old friends",
+}
+_THROUGH_FRIENDS = "met through friends"
+
+
+@dataclass(frozen=True)
+class Friendship:
+    """Two who are friends: their numbers, the lower one first, and how they met."""
+
+    pair: tuple[int, int]
+    note: str
+
+
+@dataclass(frozen=True)
+class Acquaintance:
+    """Pairs of people, by numbers, whose lives cross at one kind of place: `work`, `class`, `school`, `house`, ..."""
+
+    kind: str
+    pairs: Iterable[tuple[int, int]]
+
+
+def draw_friendships(
+    rng: np.random.Generator,
+    people: Sequence[ResidentDraft],
+    groups: Sequence[Meeting],
+    acquaintances: Sequence[Acquaintance],
+) -> list[Friendship]:
+    """Draw who is friends with whom.
+
+    Parameters
+    ----------
+    people
+        Everybody, in the order of their numbers.
+    acquaintances
+        Pairs whose lives cross besides the groups.
+
+    Returns
+    -------
+    list of Friendship
+        Each pair once, in order. Nobody is without a friend who is in a group with somebody of their kind.
+    """
+    draw = _Draw(rng, people)
+    notes = {"group": "friends"} | _NOTES
+    how: dict[tuple[int, int], str] = {}
+    weights: dict[tuple[int, int], float] = {}
+
+    def cross(kind: str, pairs: Iterable[tuple[int, int]], note: str) -> None:
+        for i, j in pairs:
+            pair = (i, j) if i < j else (j, i)
+            if (fit := draw.fit(*pair)) > 0:
+                how.setdefault(pair, note)
+                weights[pair] = weights.get(pair, 0.0) + _WEIGHTS[kind] * fit
+
+    number = {draft.id: k for k, draft in enumerate(people)}
+    for group in groups:
+        members = [number[member.id] for member in group.members]
+        cross("group", combinations(members, 2), f"both in the {group.circle.name.lower()}")
+    for known in acquaintances:
+        cross(known.kind, known.pairs, notes[known.kind])
+    for i in range(len(people)):
+        others = rng.integers(len(people), size=6).tolist()
+        cross("town", [(i, j) for j in others if j != i], notes["town"])
+    draw.by_chance(weights)
+    draw.friends_of_friends()
+    draw.lonely(weights)
+    return [Friendship(pair, how.get(pair, _THROUGH_FRIENDS)) for pair in sorted(draw.found)]
+
+
+class _Draw:
+    """Friendships in the making."""
+
+    def __init__(self, rng: np.random.Generator, people: Sequence[ResidentDraft]) -> None:
+        self._rng, self._people = rng, people
+        self.found: set[tuple[int, int]] = set()
+        self._friends: list[set[int]] = [set() for _ in people]
+        few = _OF_FEW * (len(people) - 1)
+        mean = _MANY * few / (_MANY + few) if few else 0.0
+        liking = np.array([0.4 + 1.1 * draft.character.extraversion for draft in people])
+        self._room = np.rint(rng.gamma(_SHAPE, mean * liking / _SHAPE)).astype(np.int64)
+
+    def fit(self, i: int, j: int) -> float:
+        """Return how well two go together; 0 for those who share a home, and for a child and a grown-up."""
+        a, b = self._people[i], self._people[j]
+        apart = abs(a.age - b.age)
+        if a.household == b.household or a.child != b.child or (a.child and apart > _CHILD_AGE_GAP):
+            return 0.0
+        alike = len({h.name for h in a.hobbies} & {h.name for h in b.hobbies}) + len(set(a.values) & set(b.values))
+        kind = 0.4 + 0.6 * (a.character.agreeableness + b.character.agreeableness)
+        return float((1 + 0.4 * alike) * kind * math.exp(-apart / (_CHILD_AGE_GAP if a.child else _YEARS_BETWEEN)))
+
+    def _tie(self, i: int, j: int) -> None:
+        self.found.add((i, j) if i < j else (j, i))
+        self._friends[i].add(j)
+        self._friends[j].add(i)
+
+    def _has_room(self, i: int, share: float = 1.0) -> bool:
+        return len(self._friends[i]) < share * self._room[i]
+
+    def by_chance(self, weights: Mapping[tuple[int, int], float]) -> None:
+        """Tie pairs in an order drawn by their weights, as long as both have room."""
+        pairs = sorted(weights)
+        heat = self._rng.exponential(size=len(pairs)) / np.array([weights[pair] for pair in pairs])
+        for k in np.argsort(heat, kind="stable").tolist():
+            i, j = pairs[k]
+            if self._has_room(i, 1 - _CLOSURE) and self._has_room(j, 1 - _CLOSURE):
+                self._tie(i, j)
+
+    def friends_of_friends(self) -> None:
+        """Fill what room is left with friends of friends, the commoner the more friends two share."""
+        for i in self._rng.permutation(len(self._people)).tolist():
+            shared = Counter(k for j in sorted(self._friends[i]) for k in sorted(self._friends[j]))
+            options = [k for k in shared if k != i and k not in self._friends[i] and self._has_room(k)]
+            heat = {k: self._rng.exponential() / max(1e-9, shared[k] * self.fit(i, k)) for k in options}
+            for k in sorted(options, key=lambda k: heat[k]):
+                if not self._has_room(i):
+                    break
+                if self.fit(i, k) > 0:
+                    self._tie(i, k)
+
+    def lonely(self, weights: Mapping[tuple[int, int], float]) -> None:
+        """Give those without a friend the one who suits best of all whom they meet."""
+        best: dict[int, tuple[float, int]] = {}
+        for (i, j), weight in sorted(weights.items()):
+            for me, other in ((i, j), (j, i)):
+                best[me] = max(best.get(me, (0.0, -1)), (weight, other))
+        for i, friends in enumerate(self._friends):
+            if not friends and i in best:
+                self._tie(i, best[i][1])
+
 
 #: People whose homes are this near know each other at least by sight, metres.
 _NEXT_DOOR = 40.0
 
 _RANK = list(RelationKind)
 # Children have friends from this age, years; friends are of one age, to within so many years.
-_FRIENDS_FROM, _OF_ONE_AGE = 3, 2
+_FRIENDS_FROM, _SAME_AGE_YEARS = 3, 2
 # Of many at one workplace one knows so many to either side, this share of them across; pupils know so many teachers.
 _TEAM, _ACROSS, _TEACHERS = 3, 0.15, 2
 # How many one knows in a house, and next door; and the largest chance to know somebody next door.
@@ -185,7 +342,7 @@ def _pupils(people: Sequence[ResidentDraft]) -> tuple[list[tuple[int, int]], lis
             pupils.setdefault(s.workplace, []).append(k)
     pairs = [pair for members in pupils.values() for pair in combinations(members, 2)]
     same = [(i, j) for i, j in pairs if people[i].age == people[j].age]
-    near = [(i, j) for i, j in pairs if 0 < abs(people[i].age - people[j].age) <= _OF_ONE_AGE]
+    near = [(i, j) for i, j in pairs if 0 < abs(people[i].age - people[j].age) <= _SAME_AGE_YEARS]
     return same, near
 
 
@@ -295,9 +452,127 @@ def _describe_family(household: Household, draft: ResidentDraft) -> str:
         parts += [f"{draft.her} partner {name}" for name in adults]
         told = [f"{child.first} ({child.age})" for child in children]
         one = "daughter" if children[0].gender == "female" else "son"
-        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {_listed(told)}")
-    return f"with {_listed(parts)}"
+        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {_enumerate_names(told)}")
+    return f"with {_enumerate_names(parts)}"
 
 
-def _listed(parts: Sequence[str]) -> str:
+def _enumerate_names(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+@dataclass(frozen=True)
+class NetworkMeasures:
+    """Measures of an undirected network without weights.
+
+    Attributes
+    ----------
+    people, ties
+        Nodes and edges.
+    mean_degree, median_degree, most_degree
+        Ties of a person.
+    degree_skew
+        Third standardised moment of the degrees: 0 where they lie evenly about the mean, positive where a few have
+        many.
+    alone
+        Share of people without any tie.
+    clustering
+        Mean over those with two ties or more of the share of their pairs of neighbours that are tied (Watts and
+        Strogatz).
+    transitivity
+        Three times the triangles over the connected triples.
+    degree_assortativity, age_assortativity
+        Pearson correlation over the ties of the degrees, and of the ages, at their two ends.
+    largest
+        Share of people in the largest connected component.
+    mean_path
+        Mean number of ties between two people of the largest component.
+    """
+
+    people: int
+    ties: int
+    mean_degree: float
+    median_degree: float
+    most_degree: int
+    degree_skew: float
+    alone: float
+    clustering: float
+    transitivity: float
+    degree_assortativity: float
+    age_assortativity: float
+    largest: float
+    mean_path: float
+
+
+def network_measures(
+    community: Community, kinds: Collection[RelationKind] = tuple(RelationKind), *, adults_only: bool = False
+) -> NetworkMeasures:
+    """Measure the network of the relations of some kinds.
+
+    Parameters
+    ----------
+    kinds
+        Relations that count.
+    adults_only
+        Leave out whoever is younger than 18.
+
+    Returns
+    -------
+    NetworkMeasures
+        A measure that is not defined, as the correlation of equal numbers, is 0.
+    """
+    people = [r for r in community.residents if r.age >= 18 or not adults_only]
+    row = {r.id: k for k, r in enumerate(people)}
+    pairs = [
+        (row[a], row[b])
+        for (a, b), kind in ((r.between, r.kind) for r in community.relations)
+        if kind in kinds and a in row and b in row
+    ]
+    return measures_of(len(people), np.array(pairs, np.int64).reshape(-1, 2), np.array([r.age for r in people], float))
+
+
+def measures_of(people: int, pairs: NDArray[np.int64], ages: NDArray[np.float64]) -> NetworkMeasures:
+    """Measure a network given by its edges.
+
+    Parameters
+    ----------
+    pairs
+        The two ends of every edge, each edge once; shape ``(edges, 2)``.
+    ages
+        Of the nodes, years; shape ``(people,)``.
+    """
+    from scipy.sparse import coo_matrix  # slow to import, and most who import this measure nothing
+    from scipy.sparse.csgraph import connected_components, shortest_path
+
+    ends = np.concatenate([pairs, pairs[:, ::-1]])
+    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(people, people)).tocsr()
+    degrees = np.asarray(graph.sum(axis=1)).ravel()
+    triangles = np.asarray((graph @ graph).multiply(graph).sum(axis=1)).ravel() / 2.0
+    triples = degrees * (degrees - 1.0) / 2.0
+    some = triples > 0
+    _, labels = connected_components(graph, directed=False)
+    sizes = np.bincount(labels, minlength=1)
+    members = np.flatnonzero(labels == int(np.argmax(sizes)))
+    steps = shortest_path(graph[members][:, members], unweighted=True, directed=False)
+    apart = len(members) * (len(members) - 1)
+    spread = float(degrees.std())
+    return NetworkMeasures(
+        people=people,
+        ties=len(pairs),
+        mean_degree=float(degrees.mean()),
+        median_degree=float(np.median(degrees)),
+        most_degree=int(degrees.max()),
+        degree_skew=float(((degrees - degrees.mean()) ** 3).mean() / spread**3) if spread else 0.0,
+        alone=float((degrees == 0).mean()),
+        clustering=float((triangles[some] / triples[some]).mean()) if some.any() else 0.0,
+        transitivity=float(triangles.sum() / triples.sum()) if some.any() else 0.0,
+        degree_assortativity=_correlation(degrees[ends[:, 0]], degrees[ends[:, 1]]),
+        age_assortativity=_correlation(ages[ends[:, 0]], ages[ends[:, 1]]),
+        largest=float(sizes.max() / people),
+        mean_path=float(steps.sum() / apart) if apart else 0.0,
+    )
+
+
+def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    if len(a) < 2 or a.std() == 0 or b.std() == 0:
+        return 0.0
+    return float(np.corrcoef(a, b)[0, 1])

@@ -1,17 +1,30 @@
-"""Where children go to school, and who takes the small ones there and fetches them."""
+"""Schools of children: where they go, who takes the small ones there and fetches them, and their days.
+
+What is fixed between getting up and lying down is written here: lessons, lunch at school, waiting to be fetched.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from vico.community.childhood import ALONE_FROM, ESCORT_FROM, School, childhood, schools
-from vico.community.hours import staffed
-from vico.community.people import Duty, Household, Lessons, ResidentDraft
-from vico.community.place_index import PlaceIndex, kind_of
+from vico.community.day import MIDNIGHT, Block, Day, in_fives
+from vico.community.model import ActivityTag, ItemType
+from vico.community.people import (
+    ALONE_FROM,
+    ESCORT_FROM,
+    Duty,
+    Household,
+    Lessons,
+    ResidentDraft,
+    School,
+    childhood,
+    schools,
+)
+from vico.community.place_index import PlaceIndex, kind_of, staffed_spans
 from vico.world.model import Place
 from vico.world.opening_hours import Span
 
@@ -24,9 +37,9 @@ _AT_THE_GATE = 5
 # Until when all small children are fetched, and how long one sees them in at home then, minutes.
 _LAST_FETCH, _SEEING_IN = 17 * 60 + 10, 10
 # When those who learn at home do, minutes of the day.
-_AT_HOME = (9 * 60, 14 * 60 + 30)
+_HOME_LESSONS = (9 * 60, 14 * 60 + 30)
 # Until when children go out alone, and when they are back from meetings, minutes of the day by age.
-_AGES, _OUT, _BACK = (10, 13, 17), (18 * 60, 19 * 60, 21 * 60), (19 * 60 + 15, 20 * 60, 21 * 60 + 30)
+_CURFEW_AGES, _OUT, _BACK = (10, 13, 17), (18 * 60, 19 * 60, 21 * 60), (19 * 60 + 15, 20 * 60, 21 * 60 + 30)
 # How long work beside children is at least, minutes.
 _PART_TIME = 4 * 60
 # When a parent who is alone with small children is back for the evening.
@@ -55,7 +68,7 @@ def assign_schools(rng: np.random.Generator, index: PlaceIndex, households: Sequ
     for household in households:
         for child in household.children:
             _to_school(rng, index, child, offers, begins)
-            child.out_until, child.home_by = (int(np.interp(child.age, _AGES, at)) for at in (_OUT, _BACK))
+            child.out_until, child.home_by = (int(np.interp(child.age, _CURFEW_AGES, at)) for at in (_OUT, _BACK))
             if child.age < ALONE_FROM:
                 child.out_until = 0
         adults = household.adults
@@ -93,7 +106,7 @@ def _to_school(
 def learn_at_home(index: PlaceIndex, child: ResidentDraft) -> None:
     """Let a child learn at home."""
     child.occupation, child.workplace, child.shift = childhood().home_school.title, None, None
-    child.lessons = Lessons(None, None, *_AT_HOME) if index.weekday in SCHOOL_DAYS else None
+    child.lessons = Lessons(None, None, *_HOME_LESSONS) if index.weekday in SCHOOL_DAYS else None
 
 
 def lessons_on(index: PlaceIndex, child: ResidentDraft) -> Lessons | None:
@@ -133,10 +146,12 @@ def _beside(index: PlaceIndex, care: Care) -> tuple[int, int] | None:
     carer = care.carer
     if carer.shift is None or carer.workplace is None or not care.stops:
         return None  # with children at home nobody goes to work
-    return between(index, care, carer.workplace, carer.shift)
+    return hours_between_school_runs(index, care, carer.workplace, carer.shift)
 
 
-def between(index: PlaceIndex, care: Care, workplace: str, shift: tuple[int, int]) -> tuple[int, int] | None:
+def hours_between_school_runs(
+    index: PlaceIndex, care: Care, workplace: str, shift: tuple[int, int]
+) -> tuple[int, int] | None:
     """Return what of working hours at a place lies between bringing and fetching children; None for too little."""
     free, until = care.free
     there, back = index.minutes(care.stops[-1], workplace), index.minutes(workplace, care.stops[0])
@@ -207,7 +222,7 @@ def plan_care(rng: np.random.Generator, index: PlaceIndex, households: Sequence[
 def _doors(index: PlaceIndex, place: Place) -> list[Span]:
     """Return when parents find somebody at a school, minutes: as it says, else somewhat longer than is usual."""
     given = index.given_hours(place)
-    return staffed(index.hours(place)) if given is None else given
+    return staffed_spans(index.hours(place)) if given is None else given
 
 
 def _plan_stops(index: PlaceIndex, care: Care) -> bool:
@@ -271,3 +286,77 @@ def settle_care(index: PlaceIndex, care: Care) -> None:
             child.shift = care.bring[care.stops.index(child.workplace)], child.shift[1]
     # Alone the carer goes out only while the children are at school.
     carer.out_until = fetch[0]
+
+
+# Sleep that children need by age, minutes (American Academy of Sleep Medicine, 2016, middle of the ranges).
+_SLEEP_AGES, _SLEEP = (5, 9, 13, 17), (650, 610, 560, 510)
+# When they wake by themselves, minutes of the day, by age.
+_WAKE = (405, 410, 425, 450)
+# Around when lunch is, and how long it takes, minutes.
+_NOON, _LUNCH = 11 * 60 + 50, 30
+# Stretches of lessons at home, minutes of the day.
+_HOME_SCHOOL_HOURS = ((9 * 60, 12 * 60), (13 * 60, 16 * 60))
+
+
+class SchoolDays:
+    """Writes children's days at school, or at home where there is none.
+
+    Parameters
+    ----------
+    rng
+        Decides what is left open.
+    put
+        Puts a block into a day in which it fits.
+    """
+
+    def __init__(self, rng: np.random.Generator, index: PlaceIndex, put: Callable[[Day, Block], None]) -> None:
+        self._rng, self._index, self._put = rng, index, put
+
+    @staticmethod
+    def sleep(rng: np.random.Generator, draft: ResidentDraft) -> tuple[float, float]:
+        """Return when a child wakes by itself, minute of the day, and how long it sleeps, minutes."""
+        natural = float(np.interp(draft.age, _SLEEP_AGES, _WAKE)) + 40 * (1 - draft.early)
+        return natural, float(np.interp(draft.age, _SLEEP_AGES, _SLEEP))
+
+    def write(self, draft: ResidentDraft, day: Day) -> None:
+        """Put a child's school day in; there may be none."""
+        lessons = draft.lessons
+        if lessons is None:
+            return
+        if lessons.place is None:
+            self._at_home(day)
+        elif draft.shift is not None:
+            self._at_school(draft, day, lessons)
+
+    def _at_school(self, draft: ResidentDraft, day: Day, lessons: Lessons) -> None:
+        assert lessons.school is not None
+        assert lessons.place is not None
+        assert draft.shift is not None
+        rng, school, (start, end) = self._rng, lessons.school, draft.shift
+        words = childhood()
+        over = min(end, max(lessons.end, lessons.start + 60))
+        noon = int(np.clip(in_fives(_NOON + float(rng.integers(-2, 5)) * 5), start + 60, over - _LUNCH))
+        study = ActivityTag.STUDY
+        lunch = words.at_home.at_school[int(rng.integers(len(words.at_home.at_school)))]
+        blocks = [Block(start, noon, ItemType.MAIN, school.morning, lessons.place, "work", study)]
+        blocks.append(Block(noon, noon + _LUNCH, ItemType.MEAL, lunch, lessons.place, "lunch"))
+        if over - noon - _LUNCH >= 10:
+            blocks.append(Block(noon + _LUNCH, over, ItemType.MAIN, school.afternoon, lessons.place, "work", study))
+        else:
+            blocks[-1].end = over
+        if end > over:
+            blocks.append(Block(over, end, ItemType.MAIN, school.club, lessons.place, "work", ActivityTag.LEISURE))
+        for block in blocks:
+            self._put(day, block)
+
+    def _at_home(self, day: Day) -> None:
+        words = childhood().home_school
+        for window, text in zip(_HOME_SCHOOL_HOURS, (words.morning, words.afternoon), strict=True):
+            for minutes in (150, 120, 90, 60):
+                starts = day.starts(day.home, minutes, window, [(0, MIDNIGHT)])
+                if starts:
+                    block = Block(
+                        starts[0], starts[0] + minutes, ItemType.MAIN, text, day.home, "work", ActivityTag.STUDY
+                    )
+                    if day.add(block):
+                        break

@@ -1,24 +1,118 @@
-"""Homes, workplaces and working hours: where everybody belongs, drawn from the places that there are."""
+"""Homes, workplaces and working hours: where everybody belongs, drawn from the places that there are.
+
+Trades say in which kinds of places people work. How many people a place can employ is data of
+``vico/data/community/staff.toml`` and of a user's own files.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
-from vico.community.catalogue import Job, trades, ways_of_life
+from vico.community.catalogue import Job, fallback_trades, trades, ways_of_life
 from vico.community.day import MIDNIGHT
-from vico.community.hours import staffed_stretches
-from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
-from vico.community.place_index import PlaceIndex, kind_of
-from vico.community.schooling import Care, between
-from vico.community.staff import staff_capacity
+from vico.community.place_index import PlaceIndex, kind_of, staffed_stretches
+from vico.community.schooling import Care, hours_between_school_runs
 from vico.errors import EmptyInputError
+from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Category, Place
 from vico.world.opening_hours import Span
+
+
+def jobs_at(place: Place) -> list[Job]:
+    """Return the trades that a place employs; empty for places where nobody works."""
+    kind = kind_of(place)
+    if kind in _kinds():
+        return [job for job in trades() if kind in job.kinds]
+    fallback = fallback_trades()
+    return [fallback[place.category]] if place.category in fallback else []
+
+
+def job_of(occupation: str) -> Job | None:
+    """Return the trade that an occupation names, e.g. ``barista`` or ``senior barista``; None if it is none we know."""
+    words = occupation.lower()
+    found = [job for title, job in _by_title().items() if words == title or words.endswith(" " + title)]
+    return max(found, key=lambda job: len(job.title), default=None)
+
+
+def works_at(occupation: str, place: Place) -> bool:
+    """Whether somebody of this occupation may work at a place; an unknown occupation may work where anybody does."""
+    job = job_of(occupation)
+    if job is None:
+        return place.category not in (Category.TRANSIT,)
+    return job in jobs_at(place)
+
+
+@cached_data
+def _by_title() -> dict[str, Job]:
+    return {job.title.lower(): job for job in (*trades(), *fallback_trades().values())}
+
+
+@cached_data
+def _kinds() -> frozenset[str]:
+    return frozenset(kind for job in trades() for kind in job.kinds)
+
+
+_GUIDE = "docs/adding_people.md"
+# Who works alone cannot have a day off.
+_LEAST = 2
+
+
+class _Staff(DataRecord):
+    square_metres: Annotated[float, Field(gt=0.0)]
+    kinds: tuple[str, ...]
+
+
+class _StaffFile(DataRecord):
+    otherwise: Annotated[float, Field(gt=0.0)] | None = None
+    unknown: Annotated[int, Field(ge=1)] | None = None
+    open: Annotated[int, Field(ge=1)] | None = None
+    staff: tuple[_Staff, ...] = ()
+
+
+@dataclass(frozen=True)
+class StaffRules:
+    """Square metres for each member of staff by kind or category of place; how many in places without rooms."""
+
+    by_kind: Mapping[str, float]
+    otherwise: float
+    unknown: int
+    open: int
+
+
+@cached_data
+def staff_rules() -> StaffRules:
+    """Return how many people places employ; a kind has the entry that named it last.
+
+    Raises
+    ------
+    SchemaError
+        If a file can't be used.
+    """
+    files = [read_record(path, _StaffFile, guide=_GUIDE) for path in data_files("community", "staff")]
+    return StaffRules(
+        by_kind={kind: entry.square_metres for file in files for entry in file.staff for kind in entry.kinds},
+        otherwise=[file.otherwise for file in files if file.otherwise is not None][-1],
+        unknown=[file.unknown for file in files if file.unknown is not None][-1],
+        open=[file.open for file in files if file.open is not None][-1],
+    )
+
+
+def staff_capacity(index: PlaceIndex, place: Place) -> int:
+    """Return how many people a place can employ, all shifts together."""
+    rules = staff_rules()
+    if not place.rooms:
+        return rules.unknown if place.building is not None else rules.open
+    metres = rules.by_kind.get(kind_of(place)) or rules.by_kind.get(place.category.value, rules.otherwise)
+    return max(_LEAST, round(index.floor_area(place) / metres))
+
 
 # From this share of the beds on homes are chosen that leave few free; so many can be filled with households.
 _CROWDED, _FILLED = 0.5, 0.9
@@ -220,7 +314,7 @@ class _JobMarket:
             place = self._place(draft, job)
             shift = self._hours(draft, job, place)
             if care is not None and care.stops:
-                left = between(self._index, care, place.id, shift)
+                left = hours_between_school_runs(self._index, care, place.id, shift)
                 if left is None:
                     continue
                 shift = left

@@ -1,27 +1,215 @@
-"""Ground heights around a point, from one elevation file or from several together."""
+"""Ground heights around a point, from one elevation file or several together, rasters and point clouds.
+
+Point clouds are LAZ or LAS: what is classed as ground is averaged on a grid around the window. Points are read in
+chunks, and none is kept: only sums and counts of the grid's cells are in memory, however large the file. Holes (under
+buildings and trees) stay void in the grid and are filled where several files are joined. Where no file reaches, the
+ground is flat, without a step where the files end.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial import QhullError, cKDTree
 
-from vico.errors import EmptyInputError, InputError
-from vico.geo.beyond import flat_beyond
-from vico.geo.frame import LocalFrame
-from vico.geo.lidar import ground_of_points, is_point_cloud
-from vico.geo.raster_cuts import FINEST, RasterCut, cut_of, pixels_of
-from vico.geo.rasters import Raster, read_raster
-from vico.geo.reference_systems import split_crs
+from vico.errors import EmptyInputError, InputError, MissingExtraError, MissingFileError, SchemaError
+from vico.geo.frame import LocalFrame, crs_named, split_crs
+from vico.geo.raster_windows import FINEST, RasterCut, cut_of, pixels_of
+from vico.geo.rasters import GridArray, Raster, read_raster
 from vico.io.files import sha256_of
+
+_CELL = 8.0  # metres between points
+_FADE = 120.0  # metres over which the height at a file's edge gives way to the flat
+
+
+def flat_beyond(
+    points: NDArray[np.float64], cuts: Sequence[RasterCut], frame: LocalFrame, reach: float
+) -> tuple[NDArray[np.float64], float]:
+    """Return points where no file reaches, and the height they flatten out to.
+
+    Parameters
+    ----------
+    points
+        Heights where files do reach, ENU metres, shape ``(n, 3)``.
+    cuts
+        What the files cover.
+    frame, reach
+        Centre and half side of the square to fill, metres.
+
+    Returns
+    -------
+    tuple
+        Points, shape ``(m, 3)``, and metres above sea level: the median height along the edge of the files.
+    """
+    side = np.arange(-reach + _CELL / 2, reach, _CELL)
+    grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    bare = np.ones(len(grid), bool)
+    for cut in cuts:
+        bare &= ~cut.holds(frame, grid)
+    grid = grid[bare]
+    if not len(grid):
+        return np.zeros((0, 3)), float(np.median(points[:, 2]))
+    distance, nearest = cKDTree(points[:, :2]).query(grid)
+    edge = points[nearest, 2]
+    level = float(np.median(edge))
+    away = np.clip(distance / _FADE, 0.0, 1.0)
+    fade = away * away * (3.0 - 2.0 * away)
+    return np.column_stack([grid, edge + (level - edge) * fade]), level
+
+
+GROUND = 2
+"""The class of ground in the standard's list (ASPRS LAS 1.4, table 17)."""
+
+_CHUNK = 1_000_000
+_COMMAND = "pip install 'virtual-community[lidar]'"
+_ENDINGS = (".laz", ".las")
+
+
+def is_point_cloud(path: Path) -> bool:
+    """Whether a file is a point cloud by its name."""
+    return path.name.lower().endswith(_ENDINGS)
+
+
+def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = "") -> Raster:
+    """Return the ground that a point cloud has around the frame's origin, on a grid of 2 m.
+
+    Parameters
+    ----------
+    path
+        ``.laz`` or ``.las`` with points of class 2.
+    frame, reach
+        Centre, and half side of the square that is read, metres.
+    crs
+        Its reference system where the file does not say it, such as ``EPSG:25833``.
+
+    Returns
+    -------
+    Raster
+        Metres, in the local frame's own projection; cells without ground are NaN. Without a row where the file has
+        nothing in the square.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file.
+    MissingExtraError
+        If the library that reads it is not installed.
+    SchemaError
+        If it is broken, or does not say its reference system.
+    EmptyInputError
+        If it has points there, but none is classed as ground.
+    """
+    if not path.is_file():
+        raise MissingFileError(f"{path}: no such elevation file; give a point cloud, or leave it out for flat ground")
+    laspy = _library(path)
+    side = int(np.ceil(reach / FINEST))
+    total, count = np.zeros((2 * side) ** 2), np.zeros((2 * side) ** 2, np.int64)
+    inside = 0
+    try:
+        with laspy.open(path) as reader:
+            system = crs_named(crs, str(path))[0] if crs else _system(reader.header, path)
+            unit = _vertical_unit(reader.header, system)
+            transformer = Transformer.from_crs(system, frame.proj4, always_xy=True)
+            if not _reaches(reader.header, transformer, reach):
+                return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
+            for xyz, ground in _chunks(reader):
+                x, y = transformer.transform(xyz[:, 0], xyz[:, 1])
+                column, row = np.floor(x / FINEST) + side, np.floor(-y / FINEST) + side
+                near = (column >= 0) & (column < 2 * side) & (row >= 0) & (row < 2 * side)
+                inside += int(near.sum())
+                used = near & ground
+                cell = (row[used] * 2 * side + column[used]).astype(np.int64)
+                total += np.bincount(cell, xyz[used, 2] * unit, minlength=len(total))
+                count += np.bincount(cell, minlength=len(count))
+    except (SchemaError, MissingExtraError):
+        raise
+    except Exception as error:  # laspy and its unpacker meet broken files with errors of many kinds
+        words = " ".join(str(error).split())[:160]
+        raise SchemaError(
+            f"{path}: not a readable point cloud ({type(error).__name__}: {words}); download it again"
+        ) from None
+    if inside and not count.any():
+        raise EmptyInputError(
+            f"{path}: none of its {inside:,} points in the window is classed as ground (class {GROUND}); classify it, "
+            "as with pdal ground, or give a terrain GeoTIFF"
+        )
+    with np.errstate(invalid="ignore"):
+        heights = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(2 * side, 2 * side)
+    return _crop_to_ground(heights, frame, side)
+
+
+def _library(path: Path) -> Any:
+    try:
+        import laspy
+    except ImportError:
+        raise MissingExtraError(f"{path}: point clouds need laspy; install it with: {_COMMAND}") from None
+    if path.name.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
+        raise MissingExtraError(f"{path}: packed point clouds need lazrs; install it with: {_COMMAND}")
+    return laspy
+
+
+def _system(header: Any, path: Path) -> CRS:
+    """Return the horizontal reference system that a header says."""
+    try:
+        found = header.parse_crs()
+    except Exception:  # whatever is written there
+        found = None
+    if found is None:
+        return crs_named("", str(path))[0]  # says that it is missing, and how to give it
+    return found.sub_crs_list[0] if found.is_compound else found
+
+
+def _vertical_unit(header: Any, horizontal: CRS) -> float:
+    """Metres in the heights' unit: as the vertical system says, else the horizontal one's, else metres."""
+    try:
+        found = header.parse_crs()
+    except Exception:
+        found = None
+    vertical = [crs for crs in (found.sub_crs_list if found is not None else []) if crs.is_vertical]
+    axes = vertical[0].axis_info if vertical else () if horizontal.is_geographic else horizontal.axis_info
+    return float(axes[0].unit_conversion_factor) if axes else 1.0
+
+
+def _reaches(header: Any, transformer: Transformer, reach: float) -> bool:
+    """Whether a file's box touches the square."""
+    (west, south, _), (east, north, _) = header.mins, header.maxs
+    side = np.linspace(0.0, 1.0, 9)
+    x, y = np.meshgrid(west + (east - west) * side, south + (north - south) * side)
+    there = np.column_stack(transformer.transform(x.ravel(), y.ravel()))
+    if not np.isfinite(there).all():
+        return True  # the points will tell
+    return bool((there.min(axis=0) < reach).all() and (there.max(axis=0) > -reach).all())
+
+
+def _chunks(reader: Any) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
+    """Coordinates of points, and which are ground."""
+    for points in reader.chunk_iterator(_CHUNK):
+        xyz = np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
+        yield xyz, np.asarray(points.classification) == GROUND
+
+
+def _crop_to_ground(heights: NDArray[np.float64], frame: LocalFrame, side: int) -> Raster:
+    """Return the part of the grid in which there is ground: beyond it the file does not reach."""
+    rows, columns = np.flatnonzero(np.isfinite(heights).any(axis=1)), np.flatnonzero(np.isfinite(heights).any(axis=0))
+    if not len(rows):
+        return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
+    part = heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return _raster(part, frame, (columns[0] - side + 0.5) * FINEST, (side - rows[0] - 0.5) * FINEST)
+
+
+def _raster(heights: NDArray[np.float64], frame: LocalFrame, west: float, north: float) -> Raster:
+    affine = np.array([[FINEST, 0.0, west], [0.0, -FINEST, north]])
+    return Raster(GridArray(heights), affine, CRS.from_proj4(frame.proj4))
+
 
 _MOST_VOID = 0.5
 _BLEND = 8.0  # grid cells over which a coarse file is brought to the level of a fine one beside it
@@ -116,7 +304,7 @@ def read_elevation(
         raise InputError("elevation: no file given; give a GeoTIFF or HGT, or leave it out for flat ground")
     reach = half + margin
     systems = [split_crs(path) for path in given]
-    rasters = [_opened(path, frame, reach + 2 * FINEST, crs) for path, crs in systems]
+    rasters = [_open_raster(path, frame, reach + 2 * FINEST, crs) for path, crs in systems]
     given = [path for path, _ in systems]
     cuts = [cut for path, raster in zip(given, rasters, strict=True) if (cut := cut_of(path, raster, frame, reach))]
     if finest_first:
@@ -124,7 +312,7 @@ def read_elevation(
     covered = _coverage(cuts, frame, half)
     if not cuts or covered <= 0.0:
         _refuse(given, rasters, frame, half)
-    points, filled, counts = _together(cuts, frame, half)
+    points, filled, counts = _merge_cuts(cuts, frame, half)
     beyond = ""
     if covered < 1.0:
         more, level = flat_beyond(points, cuts, frame, reach)
@@ -152,7 +340,7 @@ def read_elevation(
     return HeightSamples(points, spacing, name, total, filled, files, covered, beyond, outliers, voids, doubtful)
 
 
-def _opened(path: Path, frame: LocalFrame, reach: float, crs: str) -> Raster:
+def _open_raster(path: Path, frame: LocalFrame, reach: float, crs: str) -> Raster:
     if is_point_cloud(path):
         return ground_of_points(path, frame, reach, crs=crs)
     if crs:
@@ -202,7 +390,9 @@ def _extents(paths: Sequence[Path], rasters: Sequence[Raster]) -> str:
     return "; ".join(extents)
 
 
-def _together(cuts: Sequence[RasterCut], frame: LocalFrame, half: float) -> tuple[NDArray[np.float64], int, list[int]]:
+def _merge_cuts(
+    cuts: Sequence[RasterCut], frame: LocalFrame, half: float
+) -> tuple[NDArray[np.float64], int, list[int]]:
     """All cuts as one set of points, the finest file where there are several; voids filled."""
     pieces: list[NDArray[np.float64]] = []
     voids: list[NDArray[np.float64]] = []
@@ -235,7 +425,7 @@ def _together(cuts: Sequence[RasterCut], frame: LocalFrame, half: float) -> tupl
             f"{frame.lat}, {frame.lon}; give another elevation file"
         )
     if len(empty):
-        points = np.concatenate([points, np.column_stack([empty, _filled(points, empty)])])
+        points = np.concatenate([points, np.column_stack([empty, _fill_voids(points, empty)])])
     return points, len(empty), counts
 
 
@@ -253,7 +443,7 @@ def _offset(
     return np.median((finer - own)[both][nearest], axis=1) * away * away * (3.0 - 2.0 * away)
 
 
-def _filled(points: NDArray[np.float64], empty: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fill_voids(points: NDArray[np.float64], empty: NDArray[np.float64]) -> NDArray[np.float64]:
     """Heights in voids: linear between the points around them, of the nearest where there are none around."""
     nearest = NearestNDInterpolator(points[:, :2], points[:, 2])(empty)
     try:

@@ -16,11 +16,9 @@ from shapely import LineString, MultiPolygon, Polygon
 
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.geo.multipolygons import GAP, MemberWay, area_of_members, role_meant
 from vico.geo.osm_editing import FIRST_DRAFT, deleted_objects, draft_places, overpass_remark, own_id, places_in_ways
-from vico.geo.outlines import check_size, mended, simplified
+from vico.geo.outlines import GAP, MemberWay, area_of_members, check_size, repair_outline, role_meant, simplify_outline
 from vico.geo.overlay import OverlayError
-from vico.geo.overlay import polygons_of as polygons_of
 from vico.geometry import distance
 from vico.io.files import sha256_of
 
@@ -399,7 +397,7 @@ def read_osm(
         # libosmium reports everything from a cut block to a bad tag as one of these.
         raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
     _check_whole(path)
-    data = _assembled(reader, half, margin, sha256_of(path))
+    data = _build_osm_data(reader, half, margin, sha256_of(path))
     window = f"the {2 * half:.0f} m square around {frame.lat}, {frame.lon}"
     if not (data.ways or data.nodes or data.areas):
         if reader.objects and reader.unlocated and not reader.way_rows:
@@ -463,7 +461,7 @@ def _elsewhere(path: Path, frame: LocalFrame) -> str:
     return f"{where}: check the coordinates, or use another extract"
 
 
-def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmData:
+def _build_osm_data(reader: _Reader, half: float, margin: float, digest: str) -> OsmData:
     """Turn rows of degrees into lines, areas and relations in metres."""
     reach = reader.reach
     nodes = _nodes(reader)
@@ -483,7 +481,7 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
             continue
         way = OsmWay(way_id, refs, line, len(refs) > 3 and refs[0] == refs[-1], tags)
         if not way.closed and _is_building(tags):
-            way = _closed(way, reader, window, broken)
+            way = _close_outline(way, reader, window, broken)
         if way.closed and means_area(tags):
             area = _area_of_way(way, window, reader.partial.get(way_id, 0), broken)
             if area is not None:
@@ -510,7 +508,7 @@ def _is_building(tags: Mapping[str, str]) -> bool:
     return any(tags.get(key, "no") != "no" for key in ("building", "building:part"))
 
 
-def _closed(way: OsmWay, reader: _Reader, window: Polygon, broken: list[tuple[str, str]]) -> OsmWay:
+def _close_outline(way: OsmWay, reader: _Reader, window: Polygon, broken: list[tuple[str, str]]) -> OsmWay:
     """Return a building's outline that is no ring, closed if its ends nearly meet; say so, or why it is no building."""
     if not np.isfinite(way.line).all() or not window.intersects(LineString(way.line)):
         return way
@@ -572,7 +570,7 @@ def _area_of_way(way: OsmWay, window: shapely.Polygon, missing: int, broken: lis
         Told what is wrong with it.
     """
     try:
-        polygon, fault = mended(Polygon(way.line))
+        polygon, fault = repair_outline(Polygon(way.line))
     except OverlayError as error:
         broken.append((f"w{way.id}", f"its ring can't be made into an area ({error})"))
         return None
@@ -602,7 +600,7 @@ def _plain(area: OsmArea, broken: list[tuple[str, str]]) -> OsmArea:
     if "building" not in area.tags and "building:part" not in area.tags:
         return area
     try:
-        shape, what = simplified(area.polygon)
+        shape, what = simplify_outline(area.polygon)
     except OverlayError as error:
         broken.append((area.id, f"its outline stays as it is: it can't be simplified ({error})"))
         return area

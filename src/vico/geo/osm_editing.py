@@ -49,11 +49,11 @@ def deleted_objects(path: Path) -> frozenset[tuple[str, int]]:
     if path.name.lower().endswith(".pbf"):
         return frozenset()
     try:
-        with _unpacked(path) as file:
+        with _open_unpacked(path) as file:
             if not _is_marked(file):
                 return frozenset()
         found: set[tuple[str, int]] = set()
-        with _unpacked(path) as file:
+        with _open_unpacked(path) as file:
             elements = iterparse(file, events=("start", "end"), forbid_dtd=True)
             _, root = next(elements)
             for event, element in elements:
@@ -72,7 +72,7 @@ def overpass_remark(path: Path) -> str:
     if path.name.lower().endswith(".pbf"):
         return ""
     try:
-        with _unpacked(path) as file:
+        with _open_unpacked(path) as file:
             end = b""
             while block := file.read(_BLOCK):
                 end = (end + block)[-_END:]
@@ -86,7 +86,7 @@ def places_in_ways(path: Path) -> bool:
     """Whether ways carry the places of their nodes themselves, as Overpass writes them for ``out geom``."""
     if path.name.lower().endswith(".pbf"):
         return False
-    with _unpacked(path) as file:
+    with _open_unpacked(path) as file:
         return _NODE_WITH_PLACE.search(file.read(_BLOCK)) is not None
 
 
@@ -99,7 +99,7 @@ def draft_places(path: Path) -> dict[int, tuple[float, float]]:
     return found
 
 
-def _unpacked(path: Path) -> BinaryIO:
+def _open_unpacked(path: Path) -> BinaryIO:
     name = path.name.lower()
     if name.endswith(".gz"):
         return gzip.open(path)  # type: ignore[return-value]

@@ -13,7 +13,8 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmData
+from vico.geo.overlay import polygons_of
 
 
 class OsmParts:
@@ -50,10 +51,11 @@ class OsmParts:
         inside = np.flatnonzero(np.abs(self._nodes - shift).max(axis=1, initial=0.0) <= reach)
         nodes = [replace(whole.nodes[k], xy=whole.nodes[k].xy - shift) for k in inside.tolist()]
         areas = [
-            replace(whole.areas[k], polygon=_moved(whole.areas[k].polygon, shift)) for k in _met(self._areas, window)
+            replace(whole.areas[k], polygon=_translate(whole.areas[k].polygon, shift))
+            for k in _touching_shapes(self._areas, window)
         ]
         here = {area.id for area in areas}
-        lines = set(_met(self._ways, window)).difference(self._outlines.values())
+        lines = set(_touching_shapes(self._ways, window)).difference(self._outlines.values())
         lines.update(self._outlines[key] for key in here if key in self._outlines)
         ways = [replace(whole.ways[k], line=whole.ways[k].line - shift) for k in sorted(lines)]
         kept = {("w", way.id) for way in ways} | {("n", node.id) for node in nodes}
@@ -75,7 +77,7 @@ class OsmParts:
         )
 
 
-def _met(tree: shapely.STRtree, window: Polygon) -> list[int]:
+def _touching_shapes(tree: shapely.STRtree, window: Polygon) -> list[int]:
     """Return the numbers of the shapes that touch a window, in their order."""
     return sorted(tree.query(window, predicate="intersects").tolist())
 
@@ -83,8 +85,8 @@ def _met(tree: shapely.STRtree, window: Polygon) -> list[int]:
 def _parts_in(shapes: Sequence[Polygon], window: Polygon, shift: NDArray[np.float64]) -> list[Polygon]:
     """Return what of shapes lies in a window, told from another middle."""
     parts = [part for shape in shapes for part in polygons_of(overlay.intersection(shape, window))]
-    return [_moved(part, shift) for part in parts]
+    return [_translate(part, shift) for part in parts]
 
 
-def _moved(shape: BaseGeometry, shift: NDArray[np.float64]) -> BaseGeometry:
+def _translate(shape: BaseGeometry, shift: NDArray[np.float64]) -> BaseGeometry:
     return shapely.transform(shape, lambda points: points - shift)

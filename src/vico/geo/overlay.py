@@ -108,19 +108,19 @@ def union_all(shapes: Iterable[BaseGeometry], *, grid: float | None = GRID) -> B
         return _EMPTY[2]
     wanted = int(shapely.get_dimensions(given).max())
     try:
-        return _rounded(_only(shapely.union_all(given), wanted), grid)
+        return _round_to_grid(_only(shapely.union_all(given), wanted), grid)
     except GEOSException:
         return _only(_union_of_each(given, wanted, grid), wanted)
 
 
 def common_area(first: Any, second: Any) -> Any:
     """Return the area that geometries share, square metres: a measure alone, so on no grid, at a fifth of the cost."""
-    return _measured(first, second, shapely.area)
+    return _measure(first, second, shapely.area)
 
 
 def common_length(first: Any, second: Any) -> Any:
     """Return the length that lines share with lines or areas, metres: a measure alone, so on no grid."""
-    return _measured(first, second, shapely.length)
+    return _measure(first, second, shapely.length)
 
 
 def buffer(shape: Any, distance: Any, **style: Any) -> Any:
@@ -158,10 +158,10 @@ def on_grid(shape: Any, *, grid: float = GRID) -> Any:
     OverlayError
         If the engine refuses it even mended.
     """
-    return _robust(_snapped, "rounding", shape, grid)
+    return _robust(_snap, "rounding", shape, grid)
 
 
-def mended(shape: Any) -> Any:
+def make_valid(shape: Any) -> Any:
     """Return a valid geometry of the same dimension: rings that cross themselves become what they enclose.
 
     Raises
@@ -173,11 +173,11 @@ def mended(shape: Any) -> Any:
         try:
             return shape if shape.is_valid else _only(shape, int(shapely.get_dimensions(shape)))
         except GEOSException as error:
-            raise _refused("mending", error, shape) from None
+            raise _overlay_error("mending", error, shape) from None
     made = np.array(shape, object)
     for k in np.flatnonzero(~shapely.is_valid(made)).tolist():
         try:
-            made.flat[k] = mended(made.flat[k])
+            made.flat[k] = make_valid(made.flat[k])
         except OverlayError as error:
             error.at = k
             raise
@@ -199,7 +199,7 @@ def polygonize(lines: Iterable[BaseGeometry], *, grid: float | None = GRID) -> l
     try:
         return [face for face in shapely.get_parts(shapely.polygonize(shapely.get_parts(cut))) if face.is_valid]
     except GEOSException as error:
-        raise _refused("polygonize", error, cut) from None
+        raise _overlay_error("polygonize", error, cut) from None
 
 
 def faces_between(lines: Iterable[BaseGeometry], *, grid: float = GRID) -> list[shapely.Polygon]:
@@ -256,17 +256,17 @@ def _overlay(
             odd = (shapely.get_dimensions(made) != wanted) | (shapely.get_type_id(made) == _COLLECTION)
             for k in np.argwhere((odd & (wanted >= 0)) | ~shapely.is_valid(made)):
                 made[tuple(k)] = _only(made[tuple(k)], int(wanted[tuple(k)]))
-            return made if grid is None else _snapped(made, grid)
+            return made if grid is None else _snap(made, grid)
         except GEOSException:
             return _each(lambda a, b: _overlay(operation, a, b, grid, dimension), one, two)
     wanted = int(dimension(shapely.get_dimensions(first), shapely.get_dimensions(second)))
     try:
-        return _rounded(_only(operation(first, second), wanted), grid)
+        return _round_to_grid(_only(operation(first, second), wanted), grid)
     except GEOSException:
         return _only(_once_more(operation, first, second, grid), wanted)
 
 
-def _snapped(shape: Any, grid: float) -> Any:
+def _snap(shape: Any, grid: float) -> Any:
     """Round geometries to a grid, and forget it: overlays of what remembers a grid differ from those of a copy of it.
 
     A file does not keep it, so what was read would be overlaid otherwise than what was computed.
@@ -274,13 +274,13 @@ def _snapped(shape: Any, grid: float) -> Any:
     return shapely.set_precision(shapely.set_precision(shape, grid), 0.0)
 
 
-def _rounded(shape: BaseGeometry, grid: float | None) -> BaseGeometry:
+def _round_to_grid(shape: BaseGeometry, grid: float | None) -> BaseGeometry:
     """Round a geometry to the grid. What lies there already, as whatever was cut before does, costs next to nothing."""
     if grid is None:
         return shape
     scale = round(1 / grid)
     points = shapely.get_coordinates(shape)
-    return shape if bool((np.rint(points * scale) / scale == points).all()) else _snapped(shape, grid)
+    return shape if bool((np.rint(points * scale) / scale == points).all()) else _snap(shape, grid)
 
 
 def _once_more(
@@ -293,13 +293,13 @@ def _once_more(
             return operation(_clean(first, size), _clean(second, size), grid_size=size)
         except GEOSException as error:
             refused = error
-    raise _refused(operation.__name__, refused, first, second) from None
+    raise _overlay_error(operation.__name__, refused, first, second) from None
 
 
 def _clean(shape: BaseGeometry, grid: float) -> BaseGeometry:
     """Make a geometry valid, of its highest dimension alone, and on the grid."""
     made = _only(shape, int(shapely.get_dimensions(shape)))
-    return _only(_snapped(made, grid), int(shapely.get_dimensions(made)))
+    return _only(_snap(made, grid), int(shapely.get_dimensions(made)))
 
 
 def _union_of_each(shapes: Shapes, wanted: int, grid: float | None) -> BaseGeometry:
@@ -309,7 +309,7 @@ def _union_of_each(shapes: Shapes, wanted: int, grid: float | None) -> BaseGeome
         try:
             clean.append(_clean(shape, finest))
         except GEOSException as error:
-            raise _refused("union", error, shape, at=k) from None
+            raise _overlay_error("union", error, shape, at=k) from None
     kept = [(k, shape) for k, shape in enumerate(clean) if int(shapely.get_dimensions(shape)) == wanted]
     for size in (finest, finest * _COARSER):
         try:
@@ -326,7 +326,7 @@ def _union_of_each(shapes: Shapes, wanted: int, grid: float | None) -> BaseGeome
     return made
 
 
-def _measured(first: Any, second: Any, measure: Callable[[Any], Any]) -> Any:
+def _measure(first: Any, second: Any, measure: Callable[[Any], Any]) -> Any:
     try:
         return measure(shapely.intersection(first, second))
     except GEOSException:
@@ -347,7 +347,7 @@ def _robust(operation: Callable[..., Any], name: str, shape: Any, amount: Any) -
             return operation(_clean(shape, size), amount)
         except GEOSException as error:
             refused = error
-    raise _refused(name, refused, shape) from None
+    raise _overlay_error(name, refused, shape) from None
 
 
 def _each(function: Callable[[Any, Any], Any], one: NDArray[Any], two: NDArray[Any]) -> Shapes:
@@ -381,7 +381,7 @@ def _leaves(shape: BaseGeometry) -> list[BaseGeometry]:
     return [leaf for part in parts for leaf in (_leaves(part) if hasattr(part, "geoms") else [part])]
 
 
-def _refused(what: str, error: Exception, *shapes: BaseGeometry, at: int | None = None) -> OverlayError:
+def _overlay_error(what: str, error: Exception, *shapes: BaseGeometry, at: int | None = None) -> OverlayError:
     named: Sequence[str] = [
         f"a {shape.geom_type} of {int(shapely.get_num_coordinates(shape))} corners at "
         + ", ".join(f"{value:.2f}" for value in shape.bounds[:2])

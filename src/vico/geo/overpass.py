@@ -128,14 +128,14 @@ class Overpass:
             raise InputError(
                 f"radius: {half:g} m; Overpass is asked for at most {_MOST_HALF:g} m: clip a planet extract instead"
             )
-        boxes = [_rounded(box) for box in LocalFrame(lat, lon).boxes(half + MARGIN)]
+        boxes = [_round_box(box) for box in LocalFrame(lat, lon).boxes(half + MARGIN)]
         digest = sha256(f"{self.endpoint}\n{query(boxes)}".encode()).hexdigest()[:12]
         stem = f"overpass_{lat:.5f}_{lon:.5f}_{half:.0f}m_{digest}_"
         kept = sorted(path for path in self.cache.glob(f"{stem}*.osm.pbf") if path.is_file())
         if kept and not self.refresh:
             return kept[-1]
         answers = self._ask(boxes, 0)
-        elements = merged(answers)
+        elements = merge_answers(answers)
         if not elements:
             raise EmptyInputError(
                 f"{self.endpoint}: nothing is mapped in the {2 * half:.0f} m square around {lat}, {lon}; "
@@ -168,7 +168,7 @@ class Overpass:
                     body = self._web.post(
                         self.endpoint, data={"data": query(boxes)}, cached=False, max_bytes=_MOST_ANSWER
                     )
-                    return parsed(body)
+                    return parse_answer(body)
                 except _BusyError as error:
                     if attempt == _BACKOFF.retries:
                         raise SourceError(f"{self.endpoint}: {error}, {attempt + 1} times; try again later") from None
@@ -235,7 +235,7 @@ def seconds_to_a_slot(page: str) -> float:
     return max(1.0, min(waits) + 1.0) if waits else 0.0
 
 
-def parsed(body: bytes) -> _Answer:
+def parse_answer(body: bytes) -> _Answer:
     """Read an answer; its elements are checked one by one.
 
     Raises
@@ -316,7 +316,7 @@ def _fault(element: Any) -> str | None:
     return None
 
 
-def merged(answers: Iterable[_Answer]) -> list[Element]:
+def merge_answers(answers: Iterable[_Answer]) -> list[Element]:
     """All elements, each once, sorted by kind and id; of two the one from newer data."""
     found: dict[tuple[int, int], Element] = {}
     order = {"node": 0, "way": 1, "relation": 2}
@@ -365,7 +365,7 @@ def _write(writer: osmium.SimpleWriter, element: Mapping[str, Any]) -> None:
         writer.add_relation(osmium.osm.mutable.Relation(id=number, tags=tags, members=members))
 
 
-def _rounded(box: Box) -> Box:
+def _round_box(box: Box) -> Box:
     """Return the box in OpenStreetMap's own steps of 1e-7 degrees, grown to them."""
     west, south, east, north = (value * 1e7 for value in box)
     return math.floor(west) / 1e7, math.floor(south) / 1e7, math.ceil(east) / 1e7, math.ceil(north) / 1e7

@@ -227,7 +227,7 @@ class _Tiff:
                 f"{self.path}: block {index} holds {len(raw):,} of {expected:,} bytes: the file is truncated or "
                 "broken; download it again"
             )
-        values = _unpredicted(raw[:expected], rows, wide, self.dtype, self.predictor)
+        values = _undo_predictor(raw[:expected], rows, wide, self.dtype, self.predictor)
         heights = values.astype(np.float64)
         if self.void is not None:
             heights[values == np.asarray(self.void).astype(values.dtype)] = np.nan
@@ -273,7 +273,9 @@ def _by_pillow(packed: bytes, rows: int, width: int, compression: int, reversed_
             return picture.tobytes()
 
 
-def _unpredicted(raw: bytes, rows: int, wide: int, dtype: np.dtype[np.generic], predictor: int) -> NDArray[np.generic]:
+def _undo_predictor(
+    raw: bytes, rows: int, wide: int, dtype: np.dtype[np.generic], predictor: int
+) -> NDArray[np.generic]:
     """Undo TIFF's predictors: differences between neighbours (2), or between bytes of floats sorted by place (3)."""
     if predictor == 3:
         planes = np.cumsum(np.frombuffer(raw, np.uint8).reshape(rows, -1), axis=1, dtype=np.uint8)

@@ -12,7 +12,7 @@ from vico.render.lamps.found import LAMP_KINDS, lamps_placed, shop_lamps, with_l
 from vico.render.lighting import Lighting
 from vico.render.records import GROUND_WINDOWS, UPPER_WINDOWS
 from vico.render.scene import Scene
-from vico.world.far_windows import WINDOWS
+from vico.world.far_colours import WINDOWS
 from vico.world.mesh import Surface
 
 if TYPE_CHECKING:

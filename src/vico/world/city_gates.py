@@ -1,14 +1,17 @@
-"""Where one walks from a city's tiles into others, and what walks between these places cost.
+"""Gates between the tiles of a city, the walks between them, and the cheapest ways over them.
 
 Where two tiles meet there are gates: the middle of each stretch of the border that can be walked over. Each tile knows
-the walks between its own, cell by cell.
+the walks between its own, cell by cell. `GateGraph` searches the gates of the whole city in compiled code: a large city
+has thousands of them.
 """
 
 from __future__ import annotations
 
+import heapq
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.io.compiled import compiled
 from vico.io.npz import read_npz
 from vico.world.grid_search import (
     CELL,
+    DIAGONAL,
     EVERYWHERE,
     RING,
     STRAIGHT,
@@ -27,9 +32,9 @@ from vico.world.grid_search import (
     backtrack,
     goal_at,
     goals_at,
-    pull,
     search,
     steps_of,
+    string_pull,
 )
 from vico.world.routing import WEIGHTS
 from vico.world.walkable import ROADWAY
@@ -104,7 +109,7 @@ class Gates:
         return cls(**whole, metres=np.ascontiguousarray(arrays["metres"], np.float64), steps=steps)
 
 
-class Reached(NamedTuple):
+class ReachedCells(NamedTuple):
     """Walks from a cell to others, an entry each.
 
     Attributes
@@ -138,7 +143,7 @@ class Scratch:
         self.generation += 2
 
 
-class Window:
+class WindowSearch:
     """Searches the cells of a rectangle of a map.
 
     Parameters
@@ -174,7 +179,7 @@ class Window:
 
     def reached(
         self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float, *, steps: bool = False
-    ) -> Reached:
+    ) -> ReachedCells:
         """Return what walks from a cell of the map to others cost, and how long they are, pulled straight.
 
         Parameters
@@ -198,7 +203,7 @@ class Window:
                 metres[k], corners[k] = self._length(cells, costs, clearance, cell)
                 if steps:
                     told[k] = steps_of(cells, self._cost.shape[1])
-        return Reached(cost, metres, corners, told)
+        return ReachedCells(cost, metres, corners, told)
 
     def length(self, start: int, goal: int, clearance: NDArray[np.float32], cell: float) -> tuple[float, int] | None:
         """Return how long the cheapest walk between two cells of the map is, and its corners; None if there is none."""
@@ -247,7 +252,7 @@ class Window:
     def _length(self, cells: Ints, costs: Ints, clearance: NDArray[np.float32], cell: float) -> tuple[float, int]:
         side = self._cost.shape[1]
         points = np.column_stack([cells % side, cells // side]) + 0.5
-        kept = points[pull(self._cost, clearance, _NOTHING, False, points, costs)]
+        kept = points[string_pull(self._cost, clearance, _NOTHING, False, points, costs)]
         return float(np.hypot(*np.diff(kept, axis=0).T).sum()) * cell, max(0, len(kept) - 2)
 
 
@@ -302,7 +307,7 @@ def tile_gates(
     walks: list[tuple[int, int, int, float, int]] = []
     steps: list[NDArray[np.uint8]] = []
     for (rows, columns), (up, aside) in sides:
-        there = tuple(_shifted(part, by) for part, by in ((rows, up), (columns, aside)))
+        there = tuple(_shift_slice(part, by) for part, by in ((rows, up), (columns, aside)))
         if not all(_within(part, size) for part, size in zip(there, (height, width), strict=True)):
             continue
         mine, theirs = cost[rows, columns], cost[there]
@@ -315,7 +320,7 @@ def tile_gates(
                 walks.append((own[-1], other, STRAIGHT * (int(mine[k]) + int(theirs[k])) // 2, cell, 0))
                 steps.append(steps_of(np.array([own[-1], other], np.int64), width))
     cells = np.unique(np.array(own, np.int64))
-    window = Window(np.ascontiguousarray(cost[square], np.int32), bottom, left, width)
+    window = WindowSearch(np.ascontiguousarray(cost[square], np.int32), bottom, left, width)
     room = np.ascontiguousarray(clearance[square], np.float32)
     for k, first in enumerate(cells.tolist()):
         rest = cells[k + 1 :]
@@ -333,9 +338,257 @@ def tile_gates(
     return Gates(cells, start, end, far, metres, corners, count, np.concatenate([_NO_STEP, *steps]))
 
 
-def _shifted(part: slice | int, by: int) -> slice | int:
+def _shift_slice(part: slice | int, by: int) -> slice | int:
     return slice(part.start + by, part.stop + by) if isinstance(part, slice) else part + by
 
 
 def _within(part: slice | int, size: int) -> bool:
     return part.start >= 0 and part.stop <= size if isinstance(part, slice) else 0 <= part < size
+
+
+_FAR = np.int64(1) << 60
+
+
+class WaysToGoal(NamedTuple):
+    """The cheapest ways from gates to a goal.
+
+    Attributes
+    ----------
+    cost
+        Of that from each gate by number, int64; -1 where none was found.
+    then
+        The next gate on it, int64; -1 where it leads to the goal itself.
+    """
+
+    cost: Ints
+    then: Ints
+
+    def gates(self, first: int) -> list[int]:
+        """Return the gates of the way that begins in one."""
+        way = [first]
+        while self.then[way[-1]] >= 0:
+            way.append(int(self.then[way[-1]]))
+        return way
+
+
+class GateGraph:
+    """Which gates lead to which, and at what cost.
+
+    Parameters
+    ----------
+    gates
+        Of a city.
+    width
+        Of its map, cells.
+    side
+        Cells along a tile's side.
+
+    Attributes
+    ----------
+    cells
+        The gates, number of the cell of each, rising.
+    steps
+        Of all walks, as in `Gates`.
+    """
+
+    def __init__(self, gates: Gates, width: int, side: int) -> None:
+        self.cells = np.unique(np.concatenate([gates.cells, gates.start, gates.end]))
+        self._width, self._side = width, side
+        first, last = (np.searchsorted(self.cells, part) for part in (gates.start, gates.end))
+        starts, ends = np.concatenate([first, last]), np.concatenate([last, first])
+        order = np.lexsort((ends, starts))
+        self._ends = ends[order]
+        self._costs = np.tile(gates.cost, 2)[order]
+        self._metres = np.tile(gates.metres, 2)[order]
+        self._corners = np.tile(gates.corners, 2)[order]
+        self._first = np.searchsorted(starts[order], np.arange(len(self.cells) + 1))
+        # Of an edge: the walk as it is kept, and where the steps of each begin; walks are kept in one direction.
+        self._walk = order.astype(np.int32)
+        self._begin = np.concatenate([[0], np.cumsum(gates.count)])
+        self.steps = gates.steps
+
+    @cached_property
+    def _by_tile(self) -> dict[tuple[int, int], Ints]:
+        tiles = np.column_stack([self.cells // self._width, self.cells % self._width]) // self._side
+        found: dict[tuple[int, int], list[int]] = {}
+        for number, (row, column) in enumerate(tiles.tolist()):
+            found.setdefault((row, column), []).append(number)
+        return {tile: np.array(numbers, np.int64) for tile, numbers in found.items()}
+
+    def of_tile(self, tile: tuple[int, int]) -> Ints:
+        """Return the numbers of the gates of a tile, given by its row and column."""
+        return self._by_tile.get(tile, np.zeros(0, np.int64))
+
+    def edge(self, a: int, b: int) -> int:
+        """Return the number of the walk from gate to gate; -1 if there is none."""
+        begin, end = self._first[a : a + 2].tolist()
+        k = begin + int(np.searchsorted(self._ends[begin:end], b))
+        return k if k < end and self._ends[k] == b else -1
+
+    def cost(self, a: int, b: int) -> int:
+        """Return what the walk from gate to gate costs; -1 if there is none."""
+        k = self.edge(a, b)
+        return -1 if k < 0 else int(self._costs[k])
+
+    def walk(self, a: int, b: int) -> tuple[NDArray[np.uint8], bool] | None:
+        """Return the steps of the walk from the cell of a gate to that of another; None if none is kept.
+
+        Returns
+        -------
+        steps
+            As in `Gates`.
+        backwards
+            Whether they lead from the second to the first.
+        """
+        gates = np.searchsorted(self.cells, (a, b)).tolist()
+        if max(gates) >= len(self.cells) or self.cells[gates].tolist() != [a, b]:
+            return None
+        k = self.edge(*gates)
+        if k < 0:
+            return None
+        backwards, number = divmod(int(self._walk[k]), len(self._begin) - 1)
+        return self.steps[self._begin[number] : self._begin[number + 1]], bool(backwards)
+
+    def length(self, a: int, b: int) -> tuple[float, int]:
+        """Return how long the walk from gate to gate is, metres, and its corners."""
+        k = self.edge(a, b)
+        return float(self._metres[k]), int(self._corners[k])
+
+    def _costs_with(self, changed: Mapping[tuple[int, int], int]) -> Ints:
+        costs = self._costs.copy() if changed else self._costs
+        for (a, b), cost in changed.items():
+            k = self.edge(a, b)
+            if k >= 0:
+                costs[k] = cost
+        return costs
+
+    def cheapest(
+        self,
+        leaving: tuple[Ints, Ints],
+        arriving: tuple[Ints, Ints],
+        goal: int,
+        changed: Mapping[tuple[int, int], int] | None = None,
+    ) -> list[int]:
+        """Return the gates of the cheapest way.
+
+        Parameters
+        ----------
+        leaving, arriving
+            Gates by number that lie in the tile of the start and of the goal, and the costs from the one and to the
+            other; below 0 where there is no walk.
+        goal
+            Its cell.
+        changed
+            What walks from gate to gate cost instead; below 0 if there is none now.
+
+        Returns
+        -------
+        list of int
+            Empty if there is no way.
+        """
+        graph = self.cells, self._first, self._ends, self._costs_with(changed or {})
+        found: NDArray[np.int64] = _cheapest(graph, *leaving, *arriving, goal, self._width)
+        return found.tolist()
+
+    def onward(
+        self,
+        start: int,
+        leaving: Ints,
+        arriving: tuple[Ints, Ints],
+        changed: Mapping[tuple[int, int], int] | None = None,
+    ) -> WaysToGoal:
+        """Return what it costs from the gates of one tile to a goal.
+
+        Parameters
+        ----------
+        start
+            A cell among the gates `leaving`, by which the search is led.
+        leaving
+            Gates by number.
+        arriving, changed
+            As in `cheapest`.
+        """
+        graph = self.cells, self._first, self._ends, self._costs_with(changed or {})
+        costs, then = _search_from_goal(graph, *arriving, leaving, start, self._width)
+        return WaysToGoal(costs, then)
+
+
+@compiled
+def _least(cell, goal, width):  # type: ignore[no-untyped-def]
+    """Return a cost that no walk between two cells is below."""
+    dx, dy = abs(cell % width - goal % width), abs(cell // width - goal // width)
+    return 100 * (STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy))
+
+
+@compiled
+def _relax_neighbours(node, graph, known, queue, aim, width):  # type: ignore[no-untyped-def]
+    """Reach the neighbours of a gate that is done; `known` are costs so far, by which gate, and what is done."""
+    cells, first, ends, costs = graph
+    best, by, done = known
+    for k in range(first[node], first[node + 1]):
+        other = ends[k]
+        if costs[k] < 0 or done[other]:
+            continue
+        value = best[node] + costs[k]
+        if value < best[other]:
+            best[other], by[other] = value, node
+            heapq.heappush(queue, (value + _least(cells[other], aim, width), other))
+
+
+@compiled
+def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # type: ignore[no-untyped-def]
+    """Run A* over the gates; of ways that cost the same, the gates with the lower numbers are taken first."""
+    cells = graph[0]
+    count = len(cells)
+    best, came = np.full(count, _FAR), np.full(count, -1)
+    onward, done = np.full(count, -1), np.zeros(count, np.bool_)
+    for k in range(len(arrive)):
+        onward[arrive[k]] = arrive_costs[k]
+    queue = [(np.int64(0), np.int64(-1))]
+    queue.pop()
+    for k in range(len(leave)):
+        if 0 <= leave_costs[k] < best[leave[k]]:
+            best[leave[k]] = leave_costs[k]
+            heapq.heappush(queue, (leave_costs[k] + _least(cells[leave[k]], goal, width), leave[k]))
+    total, last = _FAR, np.int64(-1)
+    while len(queue) > 0:
+        bound, node = heapq.heappop(queue)
+        if bound >= total:
+            break
+        if done[node]:
+            continue
+        done[node] = True
+        if onward[node] >= 0 and best[node] + onward[node] < total:
+            total, last = best[node] + onward[node], node
+        _relax_neighbours(node, graph, (best, came, done), queue, goal, width)
+    way = [np.int64(0)]
+    way.pop()
+    while last >= 0:
+        way.append(np.int64(last))
+        last = came[last]
+    return np.array(way[::-1], np.int64)
+
+
+@compiled
+def _search_from_goal(graph, arrive, arrive_costs, leave, start, width):  # type: ignore[no-untyped-def]
+    """Run A* from the goal to all gates of a tile; of ways that cost the same, those over lower numbers are taken."""
+    cells = graph[0]
+    count = len(cells)
+    best, then = np.full(count, _FAR), np.full(count, -1)
+    done, wanted = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    wanted[leave] = True
+    left = len(leave)
+    queue = [(np.int64(0), np.int64(-1))]
+    queue.pop()
+    for k in range(len(arrive)):
+        if 0 <= arrive_costs[k] < best[arrive[k]]:
+            best[arrive[k]] = arrive_costs[k]
+            heapq.heappush(queue, (arrive_costs[k] + _least(cells[arrive[k]], start, width), arrive[k]))
+    while len(queue) > 0 and left > 0:
+        _, node = heapq.heappop(queue)
+        if done[node]:
+            continue
+        done[node] = True
+        left -= wanted[node]
+        _relax_neighbours(node, graph, (best, then, done), queue, start, width)
+    return np.where(done, best, -1), then

@@ -1,8 +1,8 @@
-"""Walks through a whole city: from gate to gate of its tiles, then cell by cell within each.
+"""Walks through a whole city, and how long they are: from gate to gate of its tiles, then cell by cell within each.
 
 A long walk is looked for on the gates first (`vico.world.city_gates`); only the cells of the tiles it leads through are
 looked at. A walk that stays within some hundred metres is looked for on all cells around its ends, as in a world of one
-tile.
+tile. Lengths alone are measured on the gates, and on cells of a metre at both ends.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from vico.errors import SchemaError
 from vico.io.arrays import drop_pages
 from vico.io.recent import Recent
-from vico.world.city_files import STEPS
-from vico.world.city_gates import Gates, Ints, Scratch, Window
-from vico.world.gate_graph import GateGraph
-from vico.world.grid_search import STRAIGHT, followed, nearest_free
-from vico.world.routing import SNAP, Router
+from vico.world.city import STEPS
+from vico.world.city_gates import GateGraph, Gates, Ints, ReachedCells, Scratch, WindowSearch
+from vico.world.grid_search import STRAIGHT, cells_along, nearest_free
+from vico.world.model import Point2
+from vico.world.routing import SNAP, Router, walking_costs
+from vico.world.walk_lengths import Walk, walk_of
 from vico.world.walkable import WalkableMap
 
 # Cells: walks between ends so near are looked for at once, so far around them.
@@ -115,7 +116,7 @@ class CityRouter(Router):
         finally:
             self._is_closing = False
 
-    def _end_near(self, ask: _Ask, point: NDArray[np.float64]) -> int:
+    def _end_near(self, ask: _WalkQuery, point: NDArray[np.float64]) -> int:
         """Return the nearest cell within reach that this walk may begin or end in; -1 if there is none."""
         cell, n, reach = self.walkable.cell, self.walkable.n, math.ceil(SNAP / self.walkable.cell)
         x, y = ((float(k) + self.walkable.half) / cell for k in point)
@@ -132,7 +133,7 @@ class CityRouter(Router):
         away = math.hypot(left + column + 0.5 - x, below + row + 0.5 - y) * cell
         return (row + below) * n + column + left if away <= SNAP else -1
 
-    def _near(self, ask: _Ask, first: int, last: int) -> tuple[Ints, Ints] | None:
+    def _near(self, ask: _WalkQuery, first: int, last: int) -> tuple[Ints, Ints] | None:
         """Look for a walk on all cells around its ends, if these are near each other."""
         n = self.walkable.n
         rows, columns = zip(divmod(first, n), divmod(last, n), strict=True)
@@ -143,9 +144,9 @@ class CityRouter(Router):
 
     def _ask(
         self, blocked: NDArray[np.bool_] | None, room: float, closed: Sequence[tuple[float, float, float]]
-    ) -> _Ask:
+    ) -> _WalkQuery:
         tiles = self._tiles_of(closed)
-        return _Ask(self._cost, self._clearance, blocked, room, self._side, tiles, self._scratch, self._open)
+        return _WalkQuery(self._cost, self._clearance, blocked, room, self._side, tiles, self._scratch, self._open)
 
     def _open(self, tiles: set[tuple[int, int]]) -> None:
         """Note which tiles are read: with time all of a city's map would come to be in memory.
@@ -162,7 +163,7 @@ class CityRouter(Router):
         """Return the rows and columns of the tiles in which squares lie."""
         return set().union(*(_tiles_in(self._square(x, y, reach), self._side) for x, y, reach in closed))
 
-    def _far(self, ask: _Ask, first: int, last: int, *, often: bool) -> tuple[Ints, Ints] | None:
+    def _far(self, ask: _WalkQuery, first: int, last: int, *, often: bool) -> tuple[Ints, Ints] | None:
         """Look for a walk from gate to gate; where what is closed makes one dearer than it was, anew."""
         leaving, arriving = self.graph.of_tile(ask.tile(first)), self._to_gates(ask, last)
         changed: dict[tuple[int, int], int] = {}
@@ -190,7 +191,7 @@ class CityRouter(Router):
                 return np.concatenate([cells, more[1:]]), np.concatenate([costs, dearer[1:] + costs[-1]])
         return None
 
-    def _cheapest_exit(self, ask: _Ask, first: int, exits: Ints, onward: Ints) -> int:
+    def _cheapest_exit(self, ask: _WalkQuery, first: int, exits: Ints, onward: Ints) -> int:
         """Return the gate by which it is cheapest to leave the tile of a cell; -1 if there is none."""
         gates, known = self._to_gates(ask, first)
         costs = known[np.searchsorted(gates, exits)]
@@ -198,7 +199,7 @@ class CityRouter(Router):
         return int(exits[costs.argmin()]) if len(costs) and costs.min() < _FAR else -1
 
     def _from_gate(
-        self, ask: _Ask, gates: list[int], last: int, changed: dict[tuple[int, int], int]
+        self, ask: _WalkQuery, gates: list[int], last: int, changed: dict[tuple[int, int], int]
     ) -> tuple[Ints, Ints] | None:
         """Return the walk over gates to a cell; None, and `changed`, where a part of it costs more than was thought."""
         cells = [*self.graph.cells[gates].tolist(), last]
@@ -222,7 +223,7 @@ class CityRouter(Router):
             so_far += int(found[1][-1])
         return np.concatenate(parts).astype(np.int64), np.concatenate(costs)
 
-    def _to_gates(self, ask: _Ask, cell: int) -> tuple[Ints, Ints]:
+    def _to_gates(self, ask: _WalkQuery, cell: int) -> tuple[Ints, Ints]:
         """Return the gates of the tile that a cell lies in, and what walks from the cell to them cost."""
         gates, usual = self.graph.of_tile(ask.tile(cell)), ask.is_usual(cell)
         known = self._ends.get((ask.room, cell)) if usual else None
@@ -232,14 +233,14 @@ class CityRouter(Router):
                 self._ends.keep((ask.room, cell), known)
         return gates, known
 
-    def _leg(self, ask: _Ask, a: int, b: int) -> tuple[Ints, Ints] | None:
+    def _leg(self, ask: _WalkQuery, a: int, b: int) -> tuple[Ints, Ints] | None:
         """Return the walk from a cell to another of its tile, one of them a gate, and keep it for others."""
         if not ask.is_usual(a):
             return ask.window(ask.square(a)).walk(a, b)
         kept = None if ask.room else self.graph.walk(a, b)
         if kept is not None:
             self._open({ask.tile(a)})
-            cells, costs = followed(self._cost, a, *kept)
+            cells, costs = cells_along(self._cost, a, *kept)
             if not len(cells) or cells[-1] != b:
                 raise SchemaError(f"{STEPS}: the walk from cell {a} to {b} is damaged; build the city anew")
             return cells, costs
@@ -273,7 +274,7 @@ def _tiles_in(part: tuple[slice, slice], side: int) -> set[tuple[int, int]]:
     return set(product(rows, columns))
 
 
-class _Ask:
+class _WalkQuery:
     """One search for a walk: what may be walked on, window by window.
 
     Attributes
@@ -297,7 +298,7 @@ class _Ask:
         self._scratch, self._opened = scratch, opened
         # Whether what is found in a tile is found again: nothing is closed there.
         self._usual = dict.fromkeys(closed, False)
-        self._windows: dict[tuple[int, int, int, int], Window] = {}
+        self._windows: dict[tuple[int, int, int, int], WindowSearch] = {}
 
     def tile(self, cell: int) -> tuple[int, int]:
         """Return the row and column of the tile that a cell lies in."""
@@ -325,11 +326,137 @@ class _Ask:
             cost = np.where(self._clearance[part] < self.room, np.int32(0), cost)
         return cost
 
-    def window(self, part: tuple[slice, slice]) -> Window:
+    def window(self, part: tuple[slice, slice]) -> WindowSearch:
         """Return what searches a part of the map."""
         rows, columns = part
         key = rows.start, rows.stop, columns.start, columns.stop
         if key not in self._windows:
             self._opened(_tiles_in(part, self._side))
-            self._windows[key] = Window(self.costs(part), rows.start, columns.start, self._cost.shape[1], self._scratch)
+            self._windows[key] = WindowSearch(
+                self.costs(part), rows.start, columns.start, self._cost.shape[1], self._scratch
+            )
         return self._windows[key]
+
+
+# Cells of a metre: walks between ends so near are looked for at once, so far around them; gates lie so far off at most.
+_NEAR_METRES, _AROUND_METRES, _OFF = 400, 150, 3
+# So many ends are remembered with their walks to the gates around them, some 600 bytes each, and so many tiles' cells.
+_LENGTH_ENDS, _LENGTH_TILES = 32_768, 24
+
+
+class CityWalkLengths:
+    """Measures walks in a city: long ones by those between gates, which are known, and those at either end.
+
+    Where cells of a metre leave no way through, the walk is found on the city's own.
+
+    Parameters
+    ----------
+    router
+        Of the city.
+    side
+        Cells of the city's map along a tile's side.
+    """
+
+    def __init__(self, router: CityRouter, side: int) -> None:
+        self._router, self._side = router, side // 2
+        self._fine = router.walkable
+        self._n, self._cell = self._fine.n // 2, 2 * self._fine.cell
+        self._cost, self._room = self._coarse()
+        self._free = self._cost > 0
+        self._ends: Recent[int, tuple[Ints, ReachedCells]] = Recent(_LENGTH_ENDS)
+        self._windows: Recent[tuple[int, int], WindowSearch] = Recent(_LENGTH_TILES)
+
+    def _coarse(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Return what walking costs on cells of a metre, and their room to walls, tile by tile."""
+        cost, room = np.zeros((self._n, self._n), np.int32), np.zeros((self._n, self._n), np.float32)
+        for row in range(0, self._n, self._side):
+            for column in range(0, self._n, self._side):
+                own = slice(row, row + self._side), slice(column, column + self._side)
+                fine = tuple(slice(2 * part.start, 2 * part.stop) for part in own)
+                four = np.ascontiguousarray(self._fine.cls[fine])
+                if not four.any():
+                    continue
+                coarse = WalkableMap(four, 1.0, self._fine.cell).coarser().cls
+                joined = np.asarray(self._fours(self._fine.connected[fine]).all(axis=(1, 3)))
+                room[own] = self._fours(self._fine.clearance[fine]).min(axis=(1, 3))
+                cost[own] = walking_costs(coarse, room[own], joined)
+        return cost, room
+
+    @staticmethod
+    def _fours(cells: NDArray[Any]) -> NDArray[Any]:
+        """Return cells as fours: a row, two in it, a column, two in it."""
+        rows, columns = cells.shape
+        return np.asarray(cells).reshape(rows // 2, 2, columns // 2, 2)
+
+    def learn(self, point: Point2) -> None:
+        """Do nothing: what is known of the ends of long walks is kept anyhow."""
+
+    def between(self, start: Point2, goal: Point2) -> Walk:
+        """Return the walk between two points, ENU metres."""
+        first, last = self._nearest(start), self._nearest(goal)
+        walk = None
+        if first >= 0 and last >= 0:
+            walk = self._near(first, last) if self._is_near(first, last) else self._far(first, last)
+        return walk_of(self._router, start, goal) if walk is None else walk
+
+    def _nearest(self, point: Point2) -> int:
+        x, y = ((k + self._fine.half) / self._cell for k in point)
+        found = int(nearest_free(self._free, x, y, int(SNAP / self._cell)))
+        row, column = divmod(found, self._n)
+        return found if math.hypot(column + 0.5 - x, row + 0.5 - y) * self._cell <= SNAP else -1
+
+    def _is_near(self, first: int, last: int) -> bool:
+        (row, column), (other_row, other_column) = divmod(first, self._n), divmod(last, self._n)
+        return max(abs(row - other_row), abs(column - other_column)) <= _NEAR_METRES
+
+    def _near(self, first: int, last: int) -> Walk | None:
+        ends = zip(divmod(first, self._n), divmod(last, self._n), strict=True)
+        rows, columns = (slice(max(0, min(k) - _AROUND_METRES), max(k) + _AROUND_METRES + 1) for k in ends)
+        window = WindowSearch(np.ascontiguousarray(self._cost[rows, columns]), rows.start, columns.start, self._n)
+        found = window.length(first, last, np.ascontiguousarray(self._room[rows, columns]), self._cell)
+        return None if found is None else Walk(*found)
+
+    def _far(self, first: int, last: int) -> Walk | None:
+        graph = self._router.graph
+        (leave, leaving), (arrive, arriving) = self._to_gates(first), self._to_gates(last)
+        row, column = divmod(last, self._n)
+        gates = graph.cheapest((leave, leaving.cost), (arrive, arriving.cost), 2 * row * self._fine.n + 2 * column)
+        if not gates:
+            return None
+        ends = [(leaving, leave.tolist().index(gates[0])), (arriving, arrive.tolist().index(gates[-1]))]
+        parts = [(float(one.metres[k]), int(one.corners[k])) for one, k in ends]
+        parts += [graph.length(a, b) for a, b in pairwise(gates)]
+        return Walk(sum(metres for metres, _ in parts), sum(corners for _, corners in parts))
+
+    def _to_gates(self, cell: int) -> tuple[Ints, ReachedCells]:
+        """Return the gates of the tile that a cell lies in, and the walks there, at what they cost on finer cells."""
+        known = self._ends.get(cell)
+        if known is None:
+            row, column = (k // self._side for k in divmod(cell, self._n))
+            numbers, cells = self._gates((row, column))
+            square = tuple(slice(k * self._side, (k + 1) * self._side) for k in (row, column))
+            window = self._windows.get((row, column))
+            if window is None:
+                cost = np.ascontiguousarray(self._cost[square])
+                window = WindowSearch(cost, square[0].start, square[1].start, self._n)
+                self._windows.keep((row, column), window)
+            reached = window.reached(cell, cells, np.ascontiguousarray(self._room[square]), self._cell)
+            known = numbers, reached._replace(cost=np.where(reached.cost < 0, -1, 2 * reached.cost))
+            self._ends.keep(cell, known)
+        return known
+
+    def _gates(self, tile: tuple[int, int]) -> tuple[Ints, Ints]:
+        """Return a tile's gates that lie beside free cells of a metre, and these."""
+        found: list[tuple[int, int]] = []
+        for number in self._router.graph.of_tile(tile).tolist():
+            row, column = (k // 2 for k in divmod(int(self._router.graph.cells[number]), self._fine.n))
+            rows, columns = (
+                slice(max(k - _OFF, low * self._side), min(k + _OFF + 1, (low + 1) * self._side))
+                for k, low in zip((row, column), tile, strict=True)
+            )
+            free = np.argwhere(self._free[rows, columns]) + np.array([rows.start, columns.start])
+            if len(free):
+                near = free[np.argmin(((free - (row, column)) ** 2).sum(axis=1))]
+                found.append((number, int(near[0]) * self._n + int(near[1])))
+        both = np.array(found, np.int64).reshape(-1, 2)
+        return both[:, 0].copy(), both[:, 1].copy()

@@ -1,42 +1,292 @@
-"""A city as one world: what its tiles have, told in its own frame, and the streets that are the city's."""
+"""A city as one world: what its tiles have, in the frame of the city, and the streets that are the city's.
+
+Rooms (there are hundreds of thousands) and names of entities (there are millions) are read from the tiles when they are
+asked for.
+"""
 
 from __future__ import annotations
 
+import mmap
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from hashlib import blake2b
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
+from pydantic_core import from_json
 
+from vico.errors import MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.io.arrays import drop_pages, mapped_array
+from vico.io.arrays import drop_map, drop_pages, mapped_array
 from vico.io.files import sha256_of
-from vico.world.city import CITY, City, CityTile
-from vico.world.city_entities import CityEntities
-from vico.world.city_files import COST, GATES, STEPS, WHOLE
+from vico.io.recent import Recent
+from vico.world.city import (
+    CITY,
+    COST,
+    GATES,
+    STEPS,
+    WHOLE,
+    City,
+    CityTile,
+    TileShift,
+    release_pages,
+    whole_ground,
+    whole_walkable,
+)
 from vico.world.city_gates import Gates
-from vico.world.city_ground import give_back, whole_ground, whole_walkable
-from vico.world.city_rooms import CityRooms, RoomsById
-from vico.world.city_routing import CityRouter
-from vico.world.city_walk_lengths import CityWalkLengths
+from vico.world.city_routing import CityRouter, CityWalkLengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
-from vico.world.model import Building, Entrance, Manifest, Place, Room
-from vico.world.moving import Shift
+from vico.world.model import FIRST_ROOM, FIRST_STOP, Building, Entrance, Manifest, ParkingSpot, Place, Room
 from vico.world.objects import Objects
-from vico.world.street_model import ParkingSpot
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walk_lengths import CoarseWalkLengths, WalkLengths
 from vico.world.walkable import WalkableMap
-from vico.world.world import World, named_ground, named_stops
+from vico.world.world import World, invalid, named_buildings, named_ground, named_rooms, named_stops
 
 if TYPE_CHECKING:
     from vico.world.lanes import LaneGraph
+# Tiles whose names are kept: some 60 bytes a thing, where a dictionary of dictionaries would take 400.
+_TILES_KEPT = 32
+_TEXT = np.dtypes.StringDType()
+
+
+class CityEntities(Mapping[int, dict[str, str]]):
+    """Kind and name of everything in a city that segmentation images can show, by entity.
+
+    What a tile has is read when the first of its things is asked for, and kept as long as no others are used more.
+
+    Parameters
+    ----------
+    city
+        The city.
+    of_all
+        What is no tile's: kinds of ground, stops and stations.
+    """
+
+    def __init__(self, city: City, of_all: Mapping[int, dict[str, str]]) -> None:
+        self._city = city
+        self._of_all = of_all
+        self._tiles: Recent[tuple[int, int], _Named] = Recent(_TILES_KEPT)
+
+    def __getitem__(self, entity: int) -> dict[str, str]:
+        known = self._of_all.get(entity)
+        if known is not None:
+            return known
+        if FIRST_STOP <= entity < FIRST_ROOM:
+            return self._at_stops[entity]
+        tile = TileShift.tile_of(self._city, entity)
+        if tile is None or tile not in self._city:
+            raise KeyError(entity)
+        return self._of_tile(tile)[entity]
+
+    def __iter__(self) -> Iterator[int]:
+        """Yield all entities; every tile is read for that."""
+        tiles = (self._of_tile(tile).entity.tolist() for tile in self._places())
+        return chain(self._of_all, self._at_stops, *tiles)
+
+    def __len__(self) -> int:
+        """How many there are; every tile is read for that."""
+        return len(self._of_all) + len(self._at_stops) + sum(len(self._of_tile(t).entity) for t in self._places())
+
+    def _places(self) -> list[tuple[int, int]]:
+        return [(tile.column, tile.row) for tile in self._city.manifest.tiles]
+
+    def _of_tile(self, tile: tuple[int, int]) -> _Named:
+        known = self._tiles.get(tile)
+        if known is None:
+            known = _Named(self._city, tile)
+            self._tiles.keep(tile, known)
+        return known
+
+    @cached_property
+    def _at_stops(self) -> dict[int, dict[str, str]]:
+        """Objects that have a number among those of stops, but are none: those of all tiles, the first of a number."""
+        found: dict[int, dict[str, str]] = {}
+        for tile in self._places():
+            objects = self._city.world(tile).objects
+            at_stops = np.flatnonzero((objects.entity >= FIRST_STOP) & (objects.entity < FIRST_ROOM))
+            there = TileShift.of(self._city, tile).objects(objects.where(at_stops))
+            for entity, kind, name in zip(there.entity.tolist(), there.kind, there.id, strict=True):
+                if entity not in self._of_all:
+                    found.setdefault(entity, {"kind": str(kind), "name": str(name)})
+        return found
+
+
+class _Named:
+    """What the things of one tile are.
+
+    Parameters
+    ----------
+    city
+        The city.
+    tile
+        Column and row.
+    """
+
+    def __init__(self, city: City, tile: tuple[int, int]) -> None:
+        world, shift = city.world(tile), TileShift.of(city, tile)
+        objects = shift.objects(world.objects)
+        built = {
+            shift.entity(n): one for n, one in (named_buildings(world.buildings) | named_rooms(world.rooms)).items()
+        }
+        entity = np.concatenate([np.array([*built], np.int32), objects.entity])
+        kind = np.concatenate([np.array([one["kind"] for one in built.values()], _TEXT), objects.kind])
+        name = np.concatenate([np.array([one["name"] for one in built.values()], _TEXT), objects.id])
+        # The first of a number is taken; numbers that are not shifted are those of stops, which are the city's.
+        self.entity, first = np.unique(entity, return_index=True)
+        own = self.entity >= FIRST_ROOM
+        self.entity, self._kind, self._name = self.entity[own], kind[first[own]], name[first[own]]
+
+    def __getitem__(self, entity: int) -> dict[str, str]:
+        row = int(np.searchsorted(self.entity, entity))
+        if row == len(self.entity) or self.entity[row] != entity:
+            raise KeyError(entity)
+        return {"kind": str(self._kind[row]), "name": str(self._name[row])}
+
+
+# Rooms that are kept: those that a community is in, and more.
+_ROOMS_KEPT = 8192
+
+
+class CityRooms(Sequence[Room]):
+    """The rooms of all tiles, in the order of the tiles.
+
+    Parameters
+    ----------
+    files
+        Each tile's ``rooms.json``, one room a line, and how its things become the city's.
+
+    Raises
+    ------
+    MissingFileError
+        If one of the files is not there.
+    """
+
+    def __init__(self, files: Sequence[tuple[Path, TileShift]]) -> None:
+        self._files = list(files)
+        self._maps = [_map_file(path) for path, _ in files]
+        self._ends = [_line_ends(content) for content in self._maps]
+        self._first = np.cumsum([0, *map(_rows, self._ends)])
+        self._kept = lru_cache(maxsize=_ROOMS_KEPT)(self._read)
+
+    def __len__(self) -> int:
+        return int(self._first[-1])
+
+    @overload
+    def __getitem__(self, number: int) -> Room: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> list[Room]: ...
+
+    def __getitem__(self, number: int | slice) -> Room | list[Room]:
+        if isinstance(number, slice):
+            return [self[k] for k in range(*number.indices(len(self)))]
+        k = int(number) + (len(self) if number < 0 else 0)
+        if not 0 <= k < len(self):
+            raise IndexError(f"room {number} of {len(self)}")
+        return self._kept(k)
+
+    def __iter__(self) -> Iterator[Room]:
+        """Yield all rooms, without keeping them."""
+        return map(self._read, range(len(self)))
+
+    def numbers_in(self, files: Sequence[int]) -> NDArray[np.int64]:
+        """Return the numbers of the rooms in some of the files, given by their places in the list."""
+        ranges = [np.arange(*self._first[k : k + 2], dtype=np.int64) for k in files]
+        return np.concatenate([np.zeros(0, np.int64), *ranges])
+
+    def drop_pages(self) -> None:
+        """Give back the memory that the files are read into; they are read again where somebody asks."""
+        for content in self._maps:
+            if isinstance(content, mmap.mmap):
+                drop_map(content)
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Number of each room by its id."""
+        return {name: k for k, name in enumerate(self._ids())}
+
+    def _ids(self) -> Iterator[str]:
+        for number in range(len(self)):
+            tile, line = self._line(number)
+            try:
+                # Not the whole room: what it holds takes ten times as long to read.
+                yield from_json(line)["id"]
+            except (ValueError, TypeError, KeyError) as error:
+                raise SchemaError(f"{self._files[tile][0]}: room {number}: {error}; build the city anew") from None
+
+    def _line(self, number: int) -> tuple[int, bytes]:
+        """Return the tile that a room is in, and what its file says of it."""
+        tile = int(np.searchsorted(self._first, number, side="right")) - 1
+        row = number - int(self._first[tile])
+        start, end = self._ends[tile][row : row + 2].tolist()
+        return tile, self._maps[tile][start + 1 : end].rstrip(b",")
+
+    def _read(self, number: int) -> Room:
+        tile, line = self._line(number)
+        path, shift = self._files[tile]
+        try:
+            return shift.room(Room.model_validate_json(line))
+        except ValidationError as error:
+            raise invalid(path, error) from None
+
+
+def numbers_of(rooms: Sequence[Room]) -> Mapping[str, int]:
+    """Return the number of each of some rooms by its id."""
+    return rooms.numbers if isinstance(rooms, CityRooms) else {room.id: k for k, room in enumerate(rooms)}
+
+
+class RoomsById(Mapping[str, Room]):
+    """Rooms of a city by their ids.
+
+    Parameters
+    ----------
+    rooms
+        The rooms.
+    """
+
+    def __init__(self, rooms: CityRooms) -> None:
+        self._rooms = rooms
+        self._numbers = rooms.numbers
+
+    def __getitem__(self, key: str) -> Room:
+        return self._rooms[self._numbers[key]]
+
+    def __contains__(self, key: object) -> bool:
+        """Whether there is such a room; it is not read for that."""
+        return key in self._numbers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+
+def _map_file(path: Path) -> bytes | mmap.mmap:
+    try:
+        with path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the city anew") from None
+
+
+def _rows(ends: np.ndarray) -> int:
+    """Return how many rooms a file has: a line each between its brackets, and an empty one where there is none."""
+    return 0 if len(ends) < 3 or ends[1] - ends[0] == 1 else len(ends) - 2
+
+
+def _line_ends(content: bytes | mmap.mmap) -> np.ndarray:
+    """Return where lines end."""
+    return np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
+
 
 T = TypeVar("T")
 
@@ -47,7 +297,7 @@ _NOT_A_SUM = ("kinds", "roads", "walkways")
 class CityWorld(World):
     """A city of tiles as one world.
 
-    Entities of a tile's things are those it gave them, shifted by a number of its own (`vico.world.moving`); ids that
+    Entities of a tile's things are those it gave them, shifted by a number of its own (`vico.world.city`); ids that
     only a tile knew apart begin with its name.
 
     Parameters
@@ -80,13 +330,13 @@ class CityWorld(World):
         """SHA-256 of ``city.json``, which holds the digests of all tiles: the city's identity."""
         return sha256_of(self.city.path / CITY)
 
-    def _joined(self, read: Callable[[World, Shift], Iterable[T]]) -> list[T]:
+    def _joined(self, read: Callable[[World, TileShift], Iterable[T]]) -> list[T]:
         """Return what all tiles have, in their order."""
         return [one for tile in self._own for one in read(*self._tile(tile))]
 
-    def _tile(self, tile: CityTile) -> tuple[World, Shift]:
+    def _tile(self, tile: CityTile) -> tuple[World, TileShift]:
         place = tile.column, tile.row
-        return self.city.world(place), Shift.of(self.city, place)
+        return self.city.world(place), TileShift.of(self.city, place)
 
     def part(self, tiles: Collection[tuple[int, int]]) -> CityPart:
         """Return what is in some of the tiles, as a world of its own in the city's frame."""
@@ -163,7 +413,7 @@ class CityWorld(World):
         opened = self.__dict__
         arrays: list[NDArray[Any]] = []
         if "height" in opened:
-            give_back(self.height)
+            release_pages(self.height)
         if "walkable" in opened:
             arrays.append(self.walkable.cls)
         if "router" in opened:

@@ -1,22 +1,285 @@
-"""Houses from afar: walls of simplified outlines and plain roofs, in the mean colours of what their meshes show."""
+"""Houses from afar: prisms over simplified outlines with plain roofs, in the mean colours of what their meshes show.
+
+A building is divided by the heights of its roofs. Roofs are flat, have a ridge, or slope to all sides.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from vico.exact import each
-from vico.world.far_parts import FarPart, far_outline, parts_by_height
-from vico.world.far_roofs import roof_over
-from vico.world.far_windows import SHOWN, WINDOWS, has_windows, places_of
-from vico.world.mean_colours import LINEAR, Looks, looks_from_afar, spread_points, srgb, sums_by
+from vico.geo import overlay
+from vico.world.far_colours import (
+    LINEAR,
+    WINDOWS,
+    WINDOWS_MEAN,
+    ColouredTriangles,
+    coloured_triangles,
+    has_windows,
+    spread_points,
+    srgb,
+    sums_by,
+    window_uv,
+)
 from vico.world.mesh import Material, Surface
-from vico.world.model import Building
+from vico.world.model import OPEN_KINDS, Building
 from vico.world.world import World
+
+CELL = 2.0
+"""Metres; the side of the cells in which a roof's height is looked at."""
+
+_HIDDEN = 4.0  # metres; how far below a roof floors are hidden
+_FOOT = 0.6  # metres that walls reach below the ground
+_TOLERANCES = (1.5, 3.0, 4.5)  # metres; the first after which an outline has few enough corners
+_CORNERS, _PER_CORNER = 6, 1000.0  # corners that an outline may have, and square metres for each one more
+_YARD = 150.0  # square metres; smaller yards are roofed over
+_SLAB = 0.6  # metres; of roofs that are open below
+_LEAST = 24.0  # square metres of what is drawn higher than the rest
+_HUT = 50.0  # square metres; smaller outlines have four corners
+_STEP, _PITCHED_STEP = 3.0, 5.0  # metres between the heights of roofs that are drawn as two
+_TALL, _TOWER = 8.0, 6  # ... between those of a tower and the rest; cells that it has at least
+_BLUNT = frozenset({"flat", "dome"})  # shapes of roofs that have no eaves
+
+
+class FarPart(NamedTuple):
+    """A prism of a building, and what is known of the roof on it.
+
+    Attributes
+    ----------
+    outline
+        Metres; counter-clockwise, yards clockwise.
+    foot
+        Height of the walls' lower edge, metres.
+    cells
+        Middles of the roof's cells, `CELL` wide, metres, shape ``(n, 2)``.
+    heights, lows
+        Of the highest and the lowest points of the roof in each cell, metres, shape ``(n,)``.
+    """
+
+    outline: Polygon
+    foot: float
+    cells: NDArray[np.float64]
+    heights: NDArray[np.float64]
+    lows: NDArray[np.float64]
+
+    def cut(self, outline: Polygon, foot: float, chosen: NDArray[np.bool_]) -> FarPart:
+        """Return a prism with some of the cells: a mask, shape ``(n,)``."""
+        return FarPart(outline, foot, self.cells[chosen], self.heights[chosen], self.lows[chosen])
+
+
+def far_outline(building: Building) -> Polygon:
+    """Return a building's outline with few corners, without its small yards.
+
+    Parameters
+    ----------
+    building
+        Any; its footprint may cross itself.
+
+    Returns
+    -------
+    Polygon
+        Metres; counter-clockwise, yards clockwise. Empty where the footprint has no area.
+    """
+    rings = [ring for ring in building.footprint if len(ring) >= 3]
+    if not rings:
+        return Polygon()
+    holes = [ring for ring in rings[1:] if Polygon(ring).area > _YARD]
+    return _with_few_corners(_largest(overlay.make_valid(Polygon(rings[0], holes))))
+
+
+def parts_by_height(world: World, building: Building, outline: Polygon, places: NDArray[np.float64]) -> list[FarPart]:
+    """Divide a building by the heights of its roofs: a house with a tower is not as high as that everywhere.
+
+    Parameters
+    ----------
+    world
+        The world that it stands in, for the height of the ground.
+    building
+        The building.
+    outline
+        Its outline, as `far_outline` returns it; not empty.
+    places
+        Points on its roofs, a square metre apart or so, metres, shape ``(p, 3)``.
+
+    Returns
+    -------
+    list of FarPart
+        The lower ones first.
+    """
+    corners = shapely.get_coordinates(outline)
+    foot = min(float(world.height(corners).min()), building.base) - _FOOT
+    part = FarPart(outline, foot, *_roof_cells(outline, places))
+    if not len(part.cells):
+        top = np.array([building.base + building.height])
+        part = FarPart(outline, foot, np.array([outline.representative_point().coords[0]]), top, top)
+    if building.tags.get("building") in OPEN_KINDS:
+        return [part._replace(foot=max(foot, float(np.median(part.heights)) - _SLAB))]
+    return list(_levels(part, _STEP if building.roof_shape in _BLUNT else _PITCHED_STEP, 3))
+
+
+def _with_few_corners(shape: Polygon) -> Polygon:
+    most = _CORNERS + int(shape.area / _PER_CORNER)
+    if shape.area < _HUT and shapely.get_num_coordinates(shape) > 5:
+        return shapely.orient_polygons(shape.oriented_envelope)
+    simple = shape
+    for tolerance in _TOLERANCES:
+        candidate = _largest(overlay.simplify(shape, tolerance))
+        if candidate.area < 0.8 * shape.area:
+            break
+        simple = candidate
+        if shapely.get_num_coordinates(simple) <= most:
+            break
+    return shapely.orient_polygons(simple)
+
+
+def _largest(shape: Any) -> Polygon:
+    pieces = [piece for piece in shapely.get_parts(shape).tolist() if isinstance(piece, Polygon)]
+    return max(pieces, key=lambda piece: piece.area, default=Polygon())
+
+
+def _roof_cells(
+    outline: Polygon, places: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the middles of cells within an outline, and the heights of what is highest and lowest there.
+
+    Floors far below another roof are not seen, and not counted.
+    """
+    cell = np.floor(places[:, :2] / CELL).astype(np.int64)
+    keys, which = np.unique(cell[:, 0] * 1_000_003 + cell[:, 1], return_inverse=True)
+    heights, lows = np.full(len(keys), -np.inf), np.full(len(keys), np.inf)
+    np.maximum.at(heights, which, places[:, 2])
+    seen = places[:, 2] > heights[which] - _HIDDEN
+    np.minimum.at(lows, which[seen], places[seen, 2])
+    first = np.zeros(len(keys), np.int64)
+    first[which] = np.arange(len(which))
+    middles = (cell[first] + 0.5) * CELL
+    inside = shapely.contains_xy(outline, middles[:, 0], middles[:, 1])
+    return middles[inside], heights[inside], lows[inside]
+
+
+def _levels(part: FarPart, step: float, more: int) -> Iterator[FarPart]:
+    """Yield a part, or the lower one and the higher ones on it where its roof has two heights."""
+    high = _is_high(part.heights, step) if more else np.zeros(len(part.heights), bool)
+    above: list[Polygon] = []
+    if high.any():
+        middles = part.cells[high]
+        boxes = shapely.box(*(middles - CELL / 2.0).T, *(middles + CELL / 2.0).T)
+        shape: Any = overlay.union_all(boxes, grid=None)
+        # Together across gaps of a cell, and without what is thinner than one.
+        for wider in (CELL, -1.5 * CELL, 0.5 * CELL):
+            shape = overlay.buffer(shape, wider, join_style="mitre")
+        shape = overlay.intersection(shape, part.outline, grid=None)
+        above = [p for p in shapely.get_parts(shape).tolist() if isinstance(p, Polygon) and p.area > _LEAST]
+    if not above:
+        yield part
+        return
+    yield part.cut(part.outline, part.foot, ~high)
+    floor = float(np.median(part.heights[~high])) - 0.5
+    for shape in above:
+        outline = _with_few_corners(Polygon(shape.exterior, [h for h in shape.interiors if Polygon(h).area > _YARD]))
+        inside = high & shapely.contains_xy(outline, part.cells[:, 0], part.cells[:, 1])
+        if not outline.is_empty and inside.any():
+            yield from _levels(part.cut(outline, floor, inside), step, more - 1)
+
+
+def _is_high(heights: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
+    """Tell which heights are those of the higher of two roofs; none where one roof explains them."""
+    n = len(heights)
+    if n < 8:
+        return np.zeros(n, bool)
+    ordered = np.sort(heights)
+    count = np.arange(1, n)
+    sums = np.cumsum(ordered)
+    low, high = sums[:-1] / count, (sums[-1] - sums[:-1]) / (n - count)
+    best = int(np.argmax(count * (n - count) * (high - low) ** 2))
+    share, apart = (best + 1) / n, high[best] - low[best]
+    usual = apart > step and 0.1 < share < 0.9
+    if not (usual or (apart > _TALL and n - best - 1 >= _TOWER)):
+        return np.zeros(n, bool)
+    return heights > (ordered[best] + ordered[best + 1]) / 2.0
+
+
+_PARAPET = 0.6  # metres of a flat roof's rim above it, where the building is as high as that
+
+
+def roof_over(building: Building, part: FarPart) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Make the roof over a part of a building.
+
+    Parameters
+    ----------
+    building
+        The building, for the shape of its roof and its height.
+    part
+        The part.
+
+    Returns
+    -------
+    eaves, roof, gables
+        How high the walls end, metres; the roof's triangles, and those of the walls between its slopes, which face
+        outward, metres, shape ``(n, 3, 3)`` each.
+    """
+    limit = building.base + building.height
+    none = np.zeros((0, 3, 3))
+    level = min(float(np.median(part.heights)), limit)
+    depth = shapely.distance(part.outline.boundary, shapely.points(part.cells))
+    near = part.lows[depth < 0.75 * CELL]
+    eaves = float(np.quantile(near, 0.25)) if len(near) else level
+    ridge = min(float(np.quantile(part.heights, 0.95)), limit)
+    if building.roof_shape == "flat" or ridge - eaves < 1.0 or len(part.cells) < 4:
+        level = min(level + _PARAPET, limit)
+        return level, _lying(part.outline, level), none
+    corners = shapely.get_coordinates(part.outline.exterior)[:-1]
+    if len(corners) == 4 and not part.outline.interiors and building.roof_shape not in ("mansard", "dome"):
+        ridge = min(float(np.quantile(part.heights, 0.99)) + 0.2, limit)
+        return eaves, *_ridge_roof(corners, eaves, ridge, hipped=building.roof_shape not in ("gabled", "gambrel"))
+    widest = float(depth.max())
+    inset = min(0.45 * widest, 3.0) if building.roof_shape in ("mansard", "dome") else 0.8 * widest
+    flat = overlay.simplify(overlay.buffer(part.outline, -inset, join_style="mitre", mitre_limit=2.0), 0.5 * inset)
+    deep = part.heights[depth >= inset]
+    top = min(float(np.median(deep)), limit) if len(deep) else ridge
+    if flat.is_empty or top - eaves < 0.5:
+        level = min(level, limit)
+        return level, _lying(part.outline, level), none
+    slopes = _lying(overlay.difference(part.outline, flat, grid=None), eaves)
+    inner = shapely.distance(part.outline.boundary, shapely.points(slopes[..., :2])) > 0.35 * inset
+    slopes[..., 2] = np.where(inner, top, eaves)
+    return eaves, np.concatenate([slopes, _lying(flat, top)]), none
+
+
+def _lying(shape: Any, height: float) -> NDArray[np.float64]:
+    """Return triangles that cover a shape at a height, counter-clockwise from above."""
+    flat = shapely.get_coordinates(shapely.get_parts(shapely.constrained_delaunay_triangles(shape)))
+    corners = np.full((len(flat) // 4, 3, 3), height)
+    corners[..., :2] = flat.reshape(-1, 4, 2)[:, :3]
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T[:2], (corners[:, 2] - corners[:, 0]).T[:2]
+    clockwise = ax * by - ay * bx < 0.0
+    corners[clockwise] = corners[clockwise][:, ::-1]
+    return corners
+
+
+def _ridge_roof(
+    corners: NDArray[np.float64], eaves: float, ridge: float, *, hipped: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the roof over four corners with a ridge along the longer sides, and its gables."""
+    if np.linalg.norm(corners[1] - corners[0]) > np.linalg.norm(corners[2] - corners[1]):
+        corners = np.roll(corners, -1, axis=0)  # the first side is a short one
+    a, b, c, d = np.c_[corners, np.full(4, eaves)]
+    first, last = np.r_[(a + b)[:2] / 2.0, ridge], np.r_[(c + d)[:2] / 2.0, ridge]
+    if hipped:
+        length = np.linalg.norm((last - first)[:2])
+        pulled = min(float(np.linalg.norm(b - a)) / 2.0 / max(float(length), 1e-9), 0.49) * (last - first)
+        first, last = first + pulled, last - pulled
+    slopes = np.array([(b, c, last), (b, last, first), (d, a, first), (d, first, last)])
+    ends = np.array([(a, b, first), (c, d, last)])
+    return (np.concatenate([slopes, ends]), ends[:0]) if hipped else (slopes, ends)
+
 
 _SECTORS = 8  # of directions that a building's walls have colours of their own for
 _GLAZED = 0.01  # share of its light that a wall with windows gives of its own by night, at least
@@ -36,13 +299,13 @@ def far_houses(world: World, material: Material) -> Iterator[Surface]:
     Returns
     -------
     iterator of Surface
-        One of all roofs and blind walls, one of all walls with windows (`vico.world.far_windows`), flat-shaded, in the
+        One of all roofs and blind walls, one of all walls with windows (`vico.world.far_colours`), flat-shaded, in the
         world's frame; vertices have the entities of their buildings. None where there are no houses.
     """
     buildings = world.buildings
     if not buildings:
         return
-    walls, roofs = looks_from_afar(world.surfaces("buildings")), looks_from_afar(world.surfaces("roofs"))
+    walls, roofs = coloured_triangles(world.surfaces("buildings")), coloured_triangles(world.surfaces("roofs"))
     known = np.array([b.entity for b in buildings])
     order = np.argsort(known)
 
@@ -128,7 +391,7 @@ def _rgb(colour: str) -> tuple[int, int, int]:
 
 
 def _wall_colours(
-    walls: Looks, of: NDArray[np.int64], own: NDArray[np.float64], buildings: Sequence[Building]
+    walls: ColouredTriangles, of: NDArray[np.int64], own: NDArray[np.float64], buildings: Sequence[Building]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return colours of walls at their foot and at their head, by building and direction, ``(n, _SECTORS, 2, 3)``.
 
@@ -165,7 +428,7 @@ def _sector(normals: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.round(turn).astype(np.int64) % _SECTORS
 
 
-def _roof_colours(roofs: Looks, of: NDArray[np.int64], own: NDArray[np.float64]) -> NDArray[np.float64]:
+def _roof_colours(roofs: ColouredTriangles, of: NDArray[np.int64], own: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return colours of what lies and of what slopes, ``(n, 2, 3)``: slates around gravel are not both grey."""
     count = len(own)
     upward = (roofs.normals[:, 2] > 0.0) & (of >= 0)
@@ -197,8 +460,8 @@ def _add_walls(
         colours = facades[sector][:, [0, 0, 1, 1]]
         length, base = np.hypot(*along.T), max(part.foot, building.base)
         glazed = has_windows(length, eaves - base) & (shines[sector] > _GLAZED)
-        places = places_of(length, part.foot, min(base, eaves - 0.1), eaves, building.entity + number)
-        for chosen, into, shown in ((~glazed, pieces[0], 1.0), (glazed, pieces[1], SHOWN)):
+        places = window_uv(length, part.foot, min(base, eaves - 0.1), eaves, building.entity + number)
+        for chosen, into, shown in ((~glazed, pieces[0], 1.0), (glazed, pieces[1], WINDOWS_MEAN)):
             for corners in ([0, 1, 2], [0, 2, 3]):
                 found = quads[chosen][:, corners], colours[chosen][:, corners] / shown
                 into.add(*found, building.entity, places[chosen][:, corners] if into is pieces[1] else None)

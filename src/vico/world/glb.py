@@ -88,7 +88,7 @@ def glb_bytes(layers: dict[str, Sequence[Surface]]) -> bytes:
     pictures = dict(zip(used, in_order(_picture, used.values()), strict=True))
     for name, surfaces in layers.items():
         primitives = []
-        for surface in (_welded(_sound(given)) for given in surfaces):
+        for surface in (_weld_vertices(_sound(given)) for given in surfaces):
             if not len(surface.triangles):
                 continue
             material = surface.material
@@ -164,7 +164,7 @@ def _sound(surface: Surface) -> Surface:
     return replace(surface, normals=np.where(wrong[:, None], found, surface.normals).astype(np.float32))
 
 
-def _welded(surface: Surface) -> Surface:
+def _weld_vertices(surface: Surface) -> Surface:
     """Return the same surface with equal vertices once, in the order first met."""
     count = len(surface.positions)
     if count < _FEW:
@@ -294,7 +294,7 @@ def glb_bounds(path: Path) -> NDArray[np.float64] | None:
 _DECODED: WeakValueDictionary[bytes, NDArray[np.uint8]] = WeakValueDictionary()
 
 
-def _decoded(packed: memoryview) -> NDArray[np.uint8]:
+def _decode_picture(packed: memoryview) -> NDArray[np.uint8]:
     """Return the picture of a PNG or JPEG file, not writable; the same one as long as somebody has it."""
     key = blake2b(packed, digest_size=16).digest()
     picture = _DECODED.get(key)
@@ -332,7 +332,7 @@ def _surfaces_of(document: dict[str, Any], binary: memoryview, only: str | None 
         pixels, photo = None, False
         if texture is not None:
             image = document["images"][document["textures"][texture["index"]]["source"]]
-            pixels = _decoded(bytes_of(image["bufferView"]))
+            pixels = _decode_picture(bytes_of(image["bufferView"]))
             photo = image.get("mimeType") == "image/jpeg"
         return Material(
             entry["name"],

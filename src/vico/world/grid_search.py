@@ -182,7 +182,7 @@ def _open_sides(flat, node, x, y, width, height):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _look(other, x, y, length, here, flat, work, aim):  # type: ignore[no-untyped-def]
+def _relax(other, x, y, length, here, flat, work, aim):  # type: ignore[no-untyped-def]
     """Reach a cell from a neighbour, if that is cheaper; return 1 if it was not seen before, else 0."""
     so_far, cost, generation = here
     near = work.cells[other]
@@ -241,26 +241,26 @@ def search(cost, work, start, goals, generation, landmarks):  # type: ignore[no-
         east, west, north, south = _open_sides(flat, node, x, y, width, height)
         here = cell.g, np.int64(flat[node]), generation
         if east:
-            left += _look(node + 1, x + 1, y, STRAIGHT, here, flat, work, aim)
+            left += _relax(node + 1, x + 1, y, STRAIGHT, here, flat, work, aim)
             if north and flat[node + width + 1] != 0:
-                left += _look(node + width + 1, x + 1, y + 1, DIAGONAL, here, flat, work, aim)
+                left += _relax(node + width + 1, x + 1, y + 1, DIAGONAL, here, flat, work, aim)
             if south and flat[node - width + 1] != 0:
-                left += _look(node - width + 1, x + 1, y - 1, DIAGONAL, here, flat, work, aim)
+                left += _relax(node - width + 1, x + 1, y - 1, DIAGONAL, here, flat, work, aim)
         if west:
-            left += _look(node - 1, x - 1, y, STRAIGHT, here, flat, work, aim)
+            left += _relax(node - 1, x - 1, y, STRAIGHT, here, flat, work, aim)
             if north and flat[node + width - 1] != 0:
-                left += _look(node + width - 1, x - 1, y + 1, DIAGONAL, here, flat, work, aim)
+                left += _relax(node + width - 1, x - 1, y + 1, DIAGONAL, here, flat, work, aim)
             if south and flat[node - width - 1] != 0:
-                left += _look(node - width - 1, x - 1, y - 1, DIAGONAL, here, flat, work, aim)
+                left += _relax(node - width - 1, x - 1, y - 1, DIAGONAL, here, flat, work, aim)
         if north:
-            left += _look(node + width, x, y + 1, STRAIGHT, here, flat, work, aim)
+            left += _relax(node + width, x, y + 1, STRAIGHT, here, flat, work, aim)
         if south:
-            left += _look(node - width, x, y - 1, STRAIGHT, here, flat, work, aim)
+            left += _relax(node - width, x, y - 1, STRAIGHT, here, flat, work, aim)
     return met
 
 
 @compiled
-def _entered(flat, costs, node, width, height, last):  # type: ignore[no-untyped-def]
+def _entry_direction(flat, costs, node, width, height, last):  # type: ignore[no-untyped-def]
     """Return the direction in which a cheapest walk enters a cell: straight on if it can, else the first that does."""
     g, stamp, final = costs
     for k in range(-1, 8):
@@ -290,7 +290,7 @@ def backtrack(cost, costs, start, goal):  # type: ignore[no-untyped-def]
     cells = [goal]
     node, direction = goal, -1
     while node != start:
-        direction = _entered(flat, costs, node, width, height, direction)
+        direction = _entry_direction(flat, costs, node, width, height, direction)
         step_x, step_y = _step(direction)
         node -= step_y * width + step_x
         cells.append(node)
@@ -311,7 +311,7 @@ def steps_of(cells, width):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def followed(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
+def cells_along(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
     """Return the cells of a walk, int64, and what it costs up to each; none where it leaves what may be walked on.
 
     Parameters
@@ -375,7 +375,7 @@ def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: i
 
 
 @compiled
-def pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyped-def]
+def string_pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyped-def]
     """Return the points to keep (indices): straight walks that cost no more than the grid's path between their ends."""
     count = len(points)
     keep = np.empty(count, np.int64)

@@ -192,7 +192,7 @@ def surface_of_quads(
     )
 
 
-def joined(surfaces: Iterable[Surface]) -> list[Surface]:
+def merge_surfaces(surfaces: Iterable[Surface]) -> list[Surface]:
     """Merge surfaces that share a material's name: one surface a material, in the order first met."""
     groups: dict[str, list[Surface]] = {}
     for surface in surfaces:

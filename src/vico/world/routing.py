@@ -23,8 +23,8 @@ from vico.world.grid_search import (
     backtrack,
     goal_at,
     nearest_free,
-    pull,
     search,
+    string_pull,
 )
 from vico.world.walkable import CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
 
@@ -194,7 +194,7 @@ class Router:
         n = self.walkable.n
         points = np.column_stack([cells % n, cells // n]) + 0.5
         checks = shut is not None
-        kept = pull(self._cost, self._clearance, self._nothing if shut is None else shut, checks, points, g)
+        kept = string_pull(self._cost, self._clearance, self._nothing if shut is None else shut, checks, points, g)
         route = points[kept] * self.walkable.cell - self.walkable.half
         # The exact ends, where they lie in the cells the search began and ended in.
         if self._flat(a) == first:

@@ -1,35 +1,136 @@
-"""A world: what one reads of it, whichever way it is stored."""
+"""A world: what one reads of it, and its folder on disk.
+
+::
+
+    world.json            manifest, written last: a folder that has it is whole
+    build.json            seconds per stage and the machine; not hashed, differs every time
+    report.html           what was built, for a person: map, views, counts, what was left out; not hashed
+    .stages/              what the stages made, to run one again; no part of the world, may be deleted
+    terrain.npz           height field
+    buildings.json places.json entrances.json rooms.json roads.json transit.json
+    objects.parquet       things that stand around, one row each; parked cars among them
+    parking.json          parking spots, those with a car and free ones; older worlds have none
+    detections.json       things that photos show, and what became of them; in worlds built with detections
+    roads.net.xml roads.xodr
+    walkable.npz
+    meshes/{ground,buildings,roofs,rooms,collision,prototypes}.glb
+    map.png previews/*.png
+
+Records are JSON, one record a line; `read_records` and `write_records` know nothing of what they hold.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import json
+import os
+import zipfile
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 
-from vico.errors import MissingFileError
+from vico.errors import MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.io.files import sha256_of
+from vico.io.files import read_json, sha256_of, write_bytes, write_json
+from vico.io.folders import FolderKind, listed_in, mistaken
+from vico.io.npz import npz_bytes, read_npz
+from vico.version import __version__
 from vico.world import model
 from vico.world.glb import glb_bounds, read_glb
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import Building, Entrance, Manifest, Place, Room
+from vico.world.model import Building, Entrance, Manifest, ParkingSpot, Place, Point2, Record, Roads, Room
 from vico.world.objects import Objects, read_objects
-from vico.world.records import manifest_bytes, read_record, read_records, read_terrain
 from vico.world.routing import Router
-from vico.world.street_model import ParkingSpot, Roads
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.trips import Trips
 from vico.world.walk_lengths import CoarseWalkLengths, WalkLengths
 from vico.world.walkable import WalkableMap, read_walkable
 
 if TYPE_CHECKING:
     from vico.world.lanes import LaneGraph
+R = TypeVar("R", bound=Record)
+
+
+def write_records(path: Path, records: Iterable[Record]) -> None:
+    """Write a list of records as JSON, one record a line."""
+    rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, separators=(",", ":")) for r in records]
+    write_bytes(path, ("[\n" + ",\n".join(rows) + "\n]\n").encode())
+
+
+def write_record(path: Path, record: Record) -> None:
+    """Write one record as JSON: a line for every entry of its lists."""
+    parts = []
+    for key, value in record.model_dump(mode="json").items():
+        if isinstance(value, list):
+            rows = [json.dumps(v, ensure_ascii=False, separators=(",", ":")) for v in value]
+            text = "[\n" + ",\n".join(rows) + "\n]" if rows else "[]"
+        else:
+            text = json.dumps(value, ensure_ascii=False, sort_keys=True)
+        parts.append(f"{json.dumps(key)}: {text}")
+    write_bytes(path, ("{\n" + ",\n".join(parts) + "\n}\n").encode())
+
+
+def read_records(path: Path, kind: type[R]) -> list[R]:
+    """Read what `write_records` wrote.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If the file is not there, or a record is not valid; the message gives the path within the file.
+    """
+    try:
+        return TypeAdapter(list[kind]).validate_json(_text(path))  # type: ignore[valid-type]
+    except ValidationError as error:
+        raise invalid(path, error) from None
+
+
+def read_record(path: Path, kind: type[R]) -> R:
+    """Read what `write_record` wrote; errors as in `read_records`."""
+    try:
+        return kind.model_validate_json(_text(path))
+    except ValidationError as error:
+        raise invalid(path, error) from None
+
+
+def _text(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the world anew") from None
+
+
+def invalid(path: Path, error: ValidationError) -> SchemaError:
+    """Return what is wrong with a file whose content does not fit a record."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the whole file"
+    return SchemaError(f"{path}: {where}: {first['msg']}; build the world anew")
+
+
+def write_terrain(path: Path, height: HeightField) -> None:
+    """Write a height field as ``.npz``."""
+    write_bytes(path, npz_bytes(height.arrays()))
+
+
+def read_terrain(path: Path) -> HeightField:
+    """Read what `write_terrain` wrote."""
+    try:
+        return HeightField.from_arrays(read_npz(path.read_bytes()))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the world anew") from None
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise SchemaError(f"{path}: not a readable height field ({error}); build the world anew") from None
+
+
+def manifest_bytes(manifest: Manifest) -> bytes:
+    """Return the bytes of ``world.json``."""
+    return (json.dumps(manifest.model_dump(mode="json"), indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode()
+
 
 T = TypeVar("T")
 
@@ -178,7 +279,7 @@ class World:
     @cached_property
     def lanes(self) -> LaneGraph:
         """The lane graph of the road network."""
-        from vico.world.lane_reader import read_lanes
+        from vico.world.lanes import read_lanes
 
         return read_lanes(self.file("roads.net.xml"))
 
@@ -286,3 +387,167 @@ def named_stops(transit: Transit) -> dict[int, dict[str, str]]:
     found = {stop.entity: {"kind": "bus_stop", "name": stop.name} for stop in transit.stops}
     found |= {stop.entity: {"kind": "tram_stop", "name": stop.name} for stop in transit.tram_stops}
     return found | {station.entity: {"kind": "bike_station", "name": station.name} for station in transit.bike_stations}
+
+
+#: Files that are no part of a world's identity.
+UNHASHED = ("world.json", "build.json", "report.html")
+#: Folder of what the stages of a build made, so that one can be run again.
+STAGES = ".stages"
+
+
+def read_stored(path: Path) -> World:
+    """Open a folder of one world.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no finished world at `path`.
+    SchemaError
+        If its manifest is damaged, of another kind, or of another version.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise MissingFileError(f"{folder}: no such folder; make one with vico world build")
+    if not (folder / "world.json").exists():
+        raise MissingFileError(mistaken(folder, "world", "vico world build"))
+    content = read_json(folder / "world.json")
+    if not isinstance(content, dict) or content.get("schema_name") != model.SCHEMA:
+        found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__
+        raise SchemaError(f"{folder}/world.json: schema {found!r} is not {model.SCHEMA!r}; give a world folder")
+    if content.get("version") != model.VERSION:
+        raise SchemaError(
+            f"{folder}/world.json: version {content.get('version')!r} of {model.SCHEMA}, but vico {__version__} reads "
+            f"version {model.VERSION}; build the world anew"
+        )
+    try:
+        manifest = Manifest.model_validate_json(json.dumps(content))
+    except ValidationError as error:
+        raise invalid(folder / "world.json", error) from None
+    return World(manifest, folder)
+
+
+#: Files that every world has.
+REQUIRED = (
+    "terrain.npz",
+    "walkable.npz",
+    "buildings.json",
+    "entrances.json",
+    "places.json",
+    "rooms.json",
+    "objects.parquet",
+    "roads.json",
+    "roads.net.xml",
+    "roads.xodr",
+    "transit.json",
+    "meshes/ground.glb",
+    "meshes/buildings.glb",
+    "meshes/roofs.glb",
+    "meshes/rooms.glb",
+    "meshes/collision.glb",
+    "meshes/prototypes.glb",
+    "map.png",
+)
+
+
+#: What a build makes.
+WORLD_FOLDER = FolderKind(
+    "world", "world.json", lambda folder: {*listed_in("world.json")(folder), *UNHASHED, f"{STAGES}/**"}
+)
+
+
+def world_files(folder: Path) -> list[str]:
+    """Files that belong to the world in `folder`, relative paths in order."""
+    found = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()]
+    return sorted(
+        name for name in found if name not in UNHASHED and not any(part.startswith(".") for part in Path(name).parts)
+    )
+
+
+def seal(folder: Path, manifest: Manifest, *, seconds: dict[str, float], without: Collection[str] = ()) -> Manifest:
+    """Finish a world: hash every file, then write ``build.json`` and, last, ``world.json``.
+
+    Parameters
+    ----------
+    without
+        Files that this one need not have.
+
+    Raises
+    ------
+    MissingFileError
+        If a file that every world has is not there: it was taken away while the others were written.
+    """
+    files = {name: sha256_of(folder / name) for name in world_files(folder)}
+    if gone := [name for name in REQUIRED if name not in files and name not in without]:
+        raise MissingFileError(f"{folder / gone[0]}: taken away while the world was built; build it anew")
+    sealed = manifest.model_copy(update={"files": files})
+    write_json(
+        folder / "build.json",
+        {
+            "seconds": {k: round(v, 3) for k, v in seconds.items()},
+            "processors": os.cpu_count(),
+            "producer": __version__,
+        },
+    )
+    write_bytes(folder / "world.json", manifest_bytes(sealed))
+    return sealed
+
+
+def stage_seconds(world: World) -> dict[str, float]:
+    """Seconds each stage of the build took, from ``build.json``; empty if it is not there."""
+    path = world.file("build.json")
+    content: dict[str, float] = read_json(path)["seconds"] if path.exists() else {}
+    return content
+
+
+FILE = "detections.json"
+
+
+class DetectedObject(Record):
+    """A thing that photos show, and what became of it.
+
+    Attributes
+    ----------
+    object
+        Id of the object in the world.
+    name
+        Class of the detections.
+    model
+        Of the object; "" for what the map knows already.
+    seen_at
+        Where photos show it, ENU metres.
+    photos
+        Ids of the photos.
+    score
+        Mean of the detections.
+    spread
+        How far the photos' rays pass it, root of the mean square, metres; None where one photo or the file placed it.
+    how
+        ``triangulated``, ``on the ground`` (by one photo) or ``located`` (the file told its place).
+    decision
+        ``new``: the map lacks it; ``map wins``: it stands where the map has it; ``moved``: where photos show it.
+    off_map
+        How far the map has it from there, metres; None for a new one.
+    """
+
+    object: str
+    name: str
+    model: str
+    seen_at: Point2
+    photos: tuple[str, ...]
+    score: float
+    spread: float | None
+    how: Literal["triangulated", "on the ground", "located"]
+    decision: Literal["new", "map wins", "moved"]
+    off_map: float | None
+
+
+def detected_objects(world: World) -> list[DetectedObject]:
+    """Return what detections placed in a world; nothing for a world that was built without.
+
+    Raises
+    ------
+    SchemaError
+        If the file is damaged.
+    """
+    path = world.file(FILE)
+    return read_records(path, DetectedObject) if path.exists() else []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData, Tags
 from vico.geo.quantities import QUANTITIES, Kind, Range, read
 from vico.world.model import Dropped, Place
-from vico.world.opening_hours import how_read, respelled
+from vico.world.opening_hours import how_read, standard_spelling
 
 _UNITS = {
     Kind.LENGTH: " m",
@@ -59,7 +59,9 @@ def hours_as_typed(places: Sequence[Place]) -> tuple[dict[str, int], list[Droppe
         if text is None or (how := how_read(text)) == "as typed":
             continue
         counts["not_read" if how == "not read" else "by_rule"] += 1
-        read_as = f"was read as {respelled(text)!r}" if how == "respelled" else "can't be read: usual hours hold"
+        read_as = (
+            f"was read as {standard_spelling(text)!r}" if how == "respelled" else "can't be read: usual hours hold"
+        )
         told.append(Dropped(id=place.id, reason=f"opening_hours={text!r} {read_as}"))
     return (counts if told else {}), told
 

@@ -24,8 +24,7 @@ from vico.io.files import read_json, sha256_of, write_json
 from vico.io.memory import give_back_memory
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.version import __version__
-from vico.world.city import CITY, TILES, City, CityManifest, CityTile, read_city
-from vico.world.city_files import COST, REACHED, ROOM, SURFACES, WHOLE
+from vico.world.city import CITY, COST, REACHED, ROOM, SURFACES, TILES, WHOLE, City, CityManifest, CityTile, read_city
 from vico.world.heights import HeightField
 from vico.world.model import Origin
 from vico.worldgen.city_map import RegionMap

@@ -15,16 +15,13 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
 from vico.io.memory import give_back_memory
-from vico.world.city_files import EDGE, HIGH, LOW, NET, ROADS, SMOOTH, TRANSIT, WHOLE, XODR
-from vico.world.city_files import LEVELS as LEVELS_OF_CITY
-from vico.world.city_ground import give_back, whole_ground
+from vico.world.city import EDGE, HIGH, LOW, NET, ROADS, SMOOTH, TRANSIT, WHOLE, XODR, release_pages, whole_ground
+from vico.world.city import LEVELS as LEVELS_OF_CITY
 from vico.world.heights import HeightField
-from vico.world.lane_reader import read_lanes
-from vico.world.lanes import LaneGraph
-from vico.world.model import Point2, Point3, StageReport
-from vico.world.records import write_record
-from vico.world.street_model import Roads
-from vico.world.transit_model import Transit
+from vico.world.lanes import LaneGraph, read_lanes
+from vico.world.model import Point2, Point3, Roads, StageReport
+from vico.world.transit import Transit
+from vico.world.world import write_record
 from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.facts.site import site_facts
@@ -139,15 +136,15 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     ways = stages.run(STREETS, streets_from_osm, site, solids, usable)
     roads = stages.run("roads", roads_from_osm, site, ways)
     kerbs = given(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
-    give_back(levels)
+    release_pages(levels)
     network = stages.run("network", road_network, site, ways, levels, kerbs)
-    give_back(levels)  # half a gigabyte in 27 km²
+    release_pages(levels)  # half a gigabyte in 27 km²
     write_record(whole / ROADS, roads)
     write_bytes(whole / NET, network.net_xml)
     write_bytes(whole / XODR, network.xodr or b"")
     lanes = given(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
     mapped = stages.run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=request.seed)
-    give_back(levels)
+    release_pages(levels)
     with stages.timed("waiting"):
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write_record(whole / TRANSIT, transit)

@@ -13,16 +13,12 @@ import numpy as np
 from vico.errors import VicoError, sentence_of
 from vico.io.arrays import mapped_array
 from vico.io.files import read_json, write_json
-from vico.world.borders import Side, profile_of
-from vico.world.city import TILES
-from vico.world.city_files import COST, ROOM, WHOLE
+from vico.world.city import COST, ROOM, TILES, WHOLE, Side, TileShift, profile_of
 from vico.world.city_gates import tile_gates
 from vico.world.glb import write_glb
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 from vico.world.model import Building
-from vico.world.moving import Shift
-from vico.world.stored import STAGES, read_stored, seal, stage_seconds
-from vico.world.world import World
+from vico.world.world import STAGES, World, read_stored, seal, stage_seconds
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.city_streets import LEVELS, SHAPE
 from vico.worldgen.evidence import Evidence, gather
@@ -155,11 +151,11 @@ def _fit(request: CityRequest, tile: Tile, there: Mapping[int, Path], around: Se
     for axis, folder in there.items():
         ground = conformed(ground, Side(axis, -half), profile_of(_drawn(folder), Side(axis, half)))
     wires: list[Surface] = kept_product(out / STAGES, "wires")[0]
-    write_glb(out / "meshes" / "ground.glb", {"ground": joined([*ground, *wires])})
+    write_glb(out / "meshes" / "ground.glb", {"ground": merge_surfaces([*ground, *wires])})
     houses: list[Building] = []
     for one in around:
         east, north = ((a - b) * request.grid.size for a, b in zip(one, tile, strict=True))
-        shift = Shift(east, north, 0, tile_name(one))
+        shift = TileShift(east, north, 0, tile_name(one))
         houses += map(shift.building, read_stored(request.out / TILES / tile_name(one)).buildings)
     write_map(World(world.manifest, out, buildings=houses), out)
     seal(out, world.manifest, seconds=stage_seconds(world), without=OF_A_CITY)

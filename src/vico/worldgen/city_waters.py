@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely.affinity import translate
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.world.heights import HeightField
 from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_request import CityRequest

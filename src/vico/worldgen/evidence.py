@@ -9,24 +9,21 @@ from datetime import date
 from pathlib import Path
 
 from vico.errors import EmptyInputError, InputError
-from vico.geo.buildings.files import checked_files, read_buildings
-from vico.geo.buildings.model import FoundBuildings
-from vico.geo.detections.model import Detections
-from vico.geo.detections.reader import read_detections
+from vico.geo.building_files import checked_files, read_buildings
+from vico.geo.buildings import FoundBuildings
+from vico.geo.detections import Detections, read_detections
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.gtfs.feed import NO_TIMETABLE, Feed
-from vico.geo.gtfs.reader import read_gtfs
+from vico.geo.gtfs import read_gtfs
+from vico.geo.gtfs_feed import NO_TIMETABLE, Feed
+from vico.geo.mapillary import Mapillary
 from vico.geo.osm import OsmData, read_osm
-from vico.geo.places.google import GooglePlaces, google_key
-from vico.geo.places.model import FoundPlace
-from vico.geo.places.overture import OverturePlaces
-from vico.geo.street_images.folder import FolderImages
-from vico.geo.street_images.mapillary import Mapillary
-from vico.geo.street_images.model import StreetImage, StreetImages
-from vico.geo.tiles3d.mesh import TileMesh
-from vico.geo.tiles3d.reader import read_tileset
-from vico.geo.tiles3d.source import tile_source
+from vico.geo.overture import OverturePlaces
+from vico.geo.places import FoundPlace, GooglePlaces, google_key
+from vico.geo.street_image_folder import FolderImages
+from vico.geo.street_images import StreetImage, StreetImages
+from vico.geo.tiles3d import TileMesh, read_tileset
+from vico.geo.tiles3d_files import tile_source
 from vico.io.cache import cache_folder
 from vico.io.files import sha256_of
 from vico.io.http import HttpClient

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 from vico.worldgen.buildings.stage import Cladding, clad
 from vico.worldgen.ground.backdrop import backdrop_of
 from vico.worldgen.ground.stage import APRON, ground_from_osm
@@ -56,9 +56,9 @@ def ground_in(
     )
     wires = run("wires", contact_wires, site, height, shape.solids, reach=request.half)
     if not _apron(request):
-        return joined([*ground, *wires])
+        return merge_surfaces([*ground, *wires])
     around = run("backdrop", backdrop_of, site, height, streets, shape.built.records, seed=request.seed)
-    return joined([*ground, *around, *wires])
+    return merge_surfaces([*ground, *around, *wires])
 
 
 def _apron(request: WorldRequest) -> float:

@@ -12,9 +12,8 @@ from vico.errors import VicoError
 from vico.io.stores import FolderStore, Store, store_at
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.jobs.shared import check_seen, seen_by_all
-from vico.world.folder import read_world
-from vico.world.remote import fetch_manifest
-from vico.world.stored import stage_seconds
+from vico.world.folder import fetch_manifest, read_world
+from vico.world.world import stage_seconds
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.place_tables import PlaceRow
 from vico.worldgen.sources import Sources

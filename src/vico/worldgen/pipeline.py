@@ -19,7 +19,7 @@ from vico.io.files import read_json, write_json
 from vico.io.folders import FolderKind, FolderLock, check_replaceable, folder_errors, new_folder, remove
 from vico.world.folder import read_world
 from vico.world.model import Manifest
-from vico.world.stored import STAGES, WORLD_FOLDER, seal
+from vico.world.world import STAGES, WORLD_FOLDER, seal
 from vico.worldgen.ahead import Ahead
 from vico.worldgen.evidence import gather
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor

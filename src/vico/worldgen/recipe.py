@@ -8,19 +8,16 @@ from pathlib import Path
 
 from vico.assets.things.pack import read_things
 from vico.geo.osm import OsmData
-from vico.geo.street_images.model import StreetImage
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.street_images import StreetImage
+from vico.geo.tiles3d import TileMesh
 from vico.io.files import sha256_of
-from vico.world.detected import FILE
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
-from vico.world.model import Building, Dropped, Entrance, Place
+from vico.world.model import Building, Dropped, Entrance, Place, Roads
 from vico.world.objects import Objects
-from vico.world.records import write_records
-from vico.world.street_model import Roads
-from vico.world.transit_model import Transit
-from vico.world.world import World
+from vico.world.transit import Transit
+from vico.world.world import FILE, World, write_records
 from vico.worldgen.ahead import Ahead
 from vico.worldgen.as_typed import hours_as_typed
 from vico.worldgen.buildings.stage import Cladding

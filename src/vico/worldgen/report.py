@@ -8,8 +8,7 @@ from html import escape
 
 from vico.io.files import write_bytes
 from vico.world.model import Dropped, StageReport
-from vico.world.stored import stage_seconds
-from vico.world.world import World
+from vico.world.world import World, stage_seconds
 
 _SHOWN_IDS = 200
 #: Style sheet of our reports.

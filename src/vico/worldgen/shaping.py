@@ -11,7 +11,7 @@ from shapely import Polygon
 from vico.errors import EmptyInputError
 from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.errors import InputError, MissingFileError
-from vico.geo.reference_systems import split_crs
+from vico.geo.frame import split_crs
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ class Sources:
 
     def __post_init__(self) -> None:
         for what, value, reader in (
-            ("tiles", self.tiles, "vico.geo.tiles3d.reader.read_tileset"),
-            ("photos", self.photos, "vico.geo.street_images.google.GoogleStreetView"),
+            ("tiles", self.tiles, "vico.geo.tiles3d.read_tileset"),
+            ("photos", self.photos, "vico.geo.google_street_view.GoogleStreetView"),
         ):
             if value == "google":
                 raise InputError(

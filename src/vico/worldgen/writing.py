@@ -13,16 +13,26 @@ from vico.io.files import sha256_of, write_bytes
 from vico.version import __version__
 from vico.world.glb import write_glb
 from vico.world.heights import HeightField
-from vico.world.lane_reader import read_lanes
-from vico.world.lanes import LaneGraph
+from vico.world.lanes import LaneGraph, read_lanes
 from vico.world.mesh import Surface
-from vico.world.model import FLAT_GROUND, Building, Dropped, Entrance, Manifest, Origin, Place, Room, Source
+from vico.world.model import (
+    FLAT_GROUND,
+    Building,
+    Dropped,
+    Entrance,
+    Manifest,
+    Origin,
+    ParkingSpot,
+    Place,
+    Road,
+    Roads,
+    Room,
+    Source,
+)
 from vico.world.objects import Objects, write_objects
-from vico.world.records import write_record, write_records, write_terrain
-from vico.world.street_model import ParkingSpot, Road, Roads
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walkable import WalkableMap, write_walkable
-from vico.world.world import World
+from vico.world.world import World, write_record, write_records, write_terrain
 from vico.worldgen.buildings.stage import BuildingsResult
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.indoor.stage import Indoors

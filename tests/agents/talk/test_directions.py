@@ -8,8 +8,7 @@ import pytest
 from vico.agents.talk.sentences import describe_way, read_sentences, round_distance, turn_between
 from vico.world.heights import HeightField
 from vico.world.model import Category
-from vico.world.public import PublicMap, PublicPlace
-from vico.world.streets import PublicStreet
+from vico.world.public import PublicMap, PublicPlace, PublicStreet
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 HALF = 100.0

@@ -26,8 +26,7 @@ from vico.rules import (
     WALK_SPEED,
 )
 from vico.world.public import PublicMap
-from vico.world.timetable import LineTimes, TramTimes
-from vico.world.transit_model import Stop, TramStop
+from vico.world.transit import LineTimes, Stop, TramStop, TramTimes
 
 #: Columns of the state of agents. Time, due and since are seconds of the day; positions ENU metres; heading radians
 #: counter-clockwise from east. Call and round are of the bus one rides; last is 1 on a day's last commute.

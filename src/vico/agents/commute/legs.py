@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from vico.rules import BIKE_SPEED, BUS_FARE, WALK_SPEED, ride_price
 from vico.world.model import Point2
 from vico.world.public import PublicMap
-from vico.world.transit_model import BikeStation
+from vico.world.transit import BikeStation
 from vico.world.trips.model import DISMOUNT, MOUNT, Leg, Trip
-from vico.world.trips.network import TripNetwork
-from vico.world.trips.ways import Way, find_way
+from vico.world.trips.network import TripNetwork, Way, find_way
 
 
 def nearest_point(here: Point2, points: Mapping[str, Point2], without: Collection[object] = ()) -> str | None:

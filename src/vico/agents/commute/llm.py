@@ -26,7 +26,7 @@ from vico.llm.prompts import read_prompt
 from vico.rules import BIKE_ASTRAY, BIKE_RATE, BUS_FARE, WALK_SPEED
 from vico.world.model import Point2
 from vico.world.public import PublicMap
-from vico.world.transit_model import Line, TramLine
+from vico.world.transit import Line, TramLine
 from vico.world.trips import Leg, Trip
 
 log = logging.getLogger(__name__)

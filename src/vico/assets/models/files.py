@@ -12,7 +12,7 @@ from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.data_files import read_record
 from vico.io.files import sha256_of
 from vico.world.glb import read_glb
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 GUIDE = "docs/adding_a_model.md"
 
@@ -103,6 +103,6 @@ class _Builder:
 
     def __call__(self) -> list[Surface]:
         try:
-            return joined(surfaces_of(self._parts, self._scope))
+            return merge_surfaces(surfaces_of(self._parts, self._scope))
         except InputError as error:
             raise SchemaError(f"{self._here}: {error}; see {GUIDE}") from None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import BED_WIDTH
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 
 @dataclass(frozen=True)
@@ -168,5 +168,5 @@ def model(
     foot: tuple[float, float] | None = None,
 ) -> Model:
     """Collect the parts of a thing; parts of one material become one surface."""
-    surfaces = joined(parts)
+    surfaces = merge_surfaces(parts)
     return Model(name, kind or name, group, lambda: surfaces, solid, foot)

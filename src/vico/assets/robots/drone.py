@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vico.assets.robots.control_settings import Quadrotor
 from vico.assets.robots.model import BUMP, BUMPER, TOUCH, ActionSpace, RobotModel, RotorModel, Sensors, flight_space
 from vico.assets.shapes import ball, box, cylinder, facing_x, pose_matrix, tube
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 ROTORS = ("front_right", "rear_left", "front_left", "rear_right")
 #: Of a rotor from the middle, along and across, and above the base's origin; its radius; metres.
@@ -106,7 +106,7 @@ def _propeller(turns: float) -> list[Surface]:
     for half, yaw in enumerate((0.0, np.pi)):
         blade = Surface.from_triangles(np.array(points), np.array(faces), colour=colours[half])
         parts.append(blade.moved(pose_matrix(0, 0, 0, yaw)))
-    return joined(parts)
+    return merge_surfaces(parts)
 
 
 def _frame() -> list[Surface]:
@@ -140,7 +140,7 @@ def _frame() -> list[Surface]:
     parts.append(_tilted(box((0.03, 0.05, 0.032), (0, 0, 0), colour=_ALLOY), (0.0, 1.0), -_CAMERA_PITCH, at))
     lens = cylinder(0.011, 0.012, sides=12, colour=_DARK).moved(facing_x(0.015, 0, 0))
     parts.append(_tilted(lens, (0.0, 1.0), -_CAMERA_PITCH, at))
-    return joined(parts)
+    return merge_surfaces(parts)
 
 
 @cache

@@ -25,7 +25,7 @@ from vico.assets.robots.model import (
 )
 from vico.assets.robots.packs import Go2Pack, go2_pack
 from vico.assets.shapes import ball, box, cylinder, extrusion
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 LEGS = ("FL", "FR", "RL", "RR")
 JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in ("hip", "thigh", "calf"))
@@ -144,13 +144,15 @@ def _own_shapes() -> dict[str, list[Surface]]:
     base.append(box((0.006, 0.024, 0.024), (0.339, 0, 0.022), colour=_LIGHT))  # its lamp
     base.append(_turned(cylinder(0.034, 0.04, sides=14, colour=_BLACK), "y", 2.6, (0.305, 0, -0.052)))  # lidar
     base.append(extrusion([(-0.13, 0.058), (0.13, 0.058), (0.1, 0.075), (-0.1, 0.075)], 0.1, colour=_DARK))  # the back
-    shapes = {"base": joined(base)}
+    shapes = {"base": merge_surfaces(base)}
     for leg in LEGS:
         s = 1 if leg[1] == "L" else -1
         front = 1 if leg[0] == "F" else -1
         motor = _turned(cylinder(0.046, 0.07, sides=18, colour=_DARK), "y", np.pi / 2, (-0.035, 0, 0))
         arm = _turned(cylinder(0.044, 0.075, sides=18, colour=_DARK), "x", -s * np.pi / 2, (0, s * 0.012, 0))
-        shapes[f"{leg}_hip"] = joined([motor, arm, box((0.05, 0.07, 0.06), (-front * 0.02, 0, 0), colour=_SHELL)])
+        shapes[f"{leg}_hip"] = merge_surfaces(
+            [motor, arm, box((0.05, 0.07, 0.06), (-front * 0.02, 0, 0), colour=_SHELL)]
+        )
         cap = _turned(cylinder(0.047, 0.045, sides=18, colour=_SHELL), "x", -s * np.pi / 2, (0, -s * 0.03, 0))
         disc = _turned(cylinder(0.03, 0.006, sides=14, colour=_LIGHT), "x", -s * np.pi / 2, (0, s * 0.015, 0))
         outline = [
@@ -164,7 +166,7 @@ def _own_shapes() -> dict[str, list[Surface]]:
             (0.038, 0.01),
         ]
         upper = extrusion(outline, 0.034, colour=_SHELL)
-        shapes[f"{leg}_thigh"] = joined([cap, disc, upper])
+        shapes[f"{leg}_thigh"] = merge_surfaces([cap, disc, upper])
         shin = [
             (-0.015, 0.012),
             (-0.008, -0.06),
@@ -175,7 +177,7 @@ def _own_shapes() -> dict[str, list[Surface]]:
             (0.016, 0.016),
         ]
         foot = ball((FOOT, 0.02, FOOT), (0, 0, -SHIN), colour=_BLACK, sides=12, rings=8)
-        shapes[f"{leg}_calf"] = joined([extrusion(shin, 0.022, colour=_DARK), foot])
+        shapes[f"{leg}_calf"] = merge_surfaces([extrusion(shin, 0.022, colour=_DARK), foot])
     return shapes
 
 

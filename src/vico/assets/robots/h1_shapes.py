@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.shapes import ball, box, cylinder, extrusion, tube
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 _BLACK, _DARK, _GREY, _LIGHT = (40, 41, 45), (66, 69, 74), (112, 116, 122), (226, 230, 234)
 
@@ -86,7 +86,7 @@ def own_shapes(arms: Mapping[str, NDArray[np.float64]]) -> dict[str, list[Surfac
     for s in (1.0, -1.0):
         base.append(_motor(0.066, 0.08, (0.0, s * 0.0875, -0.10), "z"))
         base += _arm(arms, "left" if s > 0 else "right")
-    shapes = {"base": joined(base)}
+    shapes = {"base": merge_surfaces(base)}
     for side, s in (("left", 1.0), ("right", -1.0)):
-        shapes |= {f"{side}_{link}": joined(parts) for link, parts in _leg(s).items()}
+        shapes |= {f"{side}_{link}": merge_surfaces(parts) for link, parts in _leg(s).items()}
     return shapes

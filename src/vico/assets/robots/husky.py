@@ -24,7 +24,7 @@ from vico.assets.robots.model import (
 )
 from vico.assets.robots.packs import husky_shapes
 from vico.assets.shapes import box, cylinder, extrusion
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 RADIUS, WIDTH = 0.165, 0.1143
 AXLE, TRACK, HUB = 0.256, 0.2854, 0.0328
@@ -109,7 +109,7 @@ def _wheel() -> list[Surface]:
         reach, side = RADIUS * 0.95, WIDTH * (0.23 if k % 2 else -0.23)
         turn = np.array([[c, 0, s, reach * s], [0, 1, 0, side], [-s, 0, c, reach * c], [0, 0, 0, 1]])
         parts.append(lug.moved(turn))
-    return joined(parts)
+    return merge_surfaces(parts)
 
 
 def _fittings() -> list[Surface]:
@@ -144,7 +144,7 @@ def _own_shapes() -> dict[str, list[Surface]]:
     base.append(cylinder(0.018, 0.02, sides=10, colour=(200, 30, 30), centre=(-0.35, 0.15, 0.23)))  # emergency stop
     base += _fittings()
     wheel = _wheel()
-    return {"base": joined(base)} | dict.fromkeys(WHEELS, wheel)
+    return {"base": merge_surfaces(base)} | dict.fromkeys(WHEELS, wheel)
 
 
 @cache
@@ -177,5 +177,5 @@ def husky(packs: bool = True) -> RobotModel:
         grade=0.5,
         lookahead=0.9,
         arrival=0.4,
-        shapes=_own_shapes() if meshes is None else {**meshes, "base": joined([*meshes["base"], *_fittings()])},
+        shapes=_own_shapes() if meshes is None else {**meshes, "base": merge_surfaces([*meshes["base"], *_fittings()])},
     )

@@ -23,7 +23,7 @@ from vico.assets.robots.model import (
     velocity_space,
 )
 from vico.assets.shapes import ball, box, cylinder, tube
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 ARM = ("torso", "shoulder", "bicep", "elbow", "forearm", "wrist", "gripper")
 FINGERS = ("right_finger", "left_finger")
@@ -152,11 +152,11 @@ def _link(k: int) -> list[Surface]:
     if k == len(ARM) - 1:
         parts.append(box((0.06, 0.36, 0.035), (0, 0, 0.045), colour=_DARK))
         parts.append(box((0.03, 0.03, 0.03), (0.045, 0, 0.05), colour=_BLUE))
-    return joined(parts)
+    return merge_surfaces(parts)
 
 
 def _finger(sign: float) -> list[Surface]:
-    return joined(
+    return merge_surfaces(
         [
             box((0.03, 0.012, 0.09), (0, sign * 0.006, 0.045), colour=_GREY),
             box((0.04, 0.016, 0.07), (0, sign * 0.004, 0.115), colour=_DARK),
@@ -175,12 +175,12 @@ def _body() -> list[Surface]:
     parts.append(box((0.02, 0.16, 0.05), (0.0, 0.05, 1.14), colour=_DARK))
     for y in (0.0, 0.1):
         parts.append(ball((0.012, 0.014, 0.014), (0.01, y, 1.14), colour=_BLUE, sides=10, rings=6))
-    return joined(parts)
+    return merge_surfaces(parts)
 
 
 def _wheel() -> list[Surface]:
     tyre = _turned_y(cylinder(WHEEL, 0.04, sides=24, colour=_DARK), (0, 0.02, 0))
-    return joined([tyre, _turned_y(cylinder(WHEEL * 0.6, 0.046, sides=16, colour=_GREY), (0, 0.023, 0))])
+    return merge_surfaces([tyre, _turned_y(cylinder(WHEEL * 0.6, 0.046, sides=16, colour=_GREY), (0, 0.023, 0))])
 
 
 @cache

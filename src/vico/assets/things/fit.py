@@ -20,7 +20,7 @@ from vico.assets.simplify import thinned
 from vico.assets.things.archive import ArchiveEntry
 from vico.assets.things.obj import ObjMaterial, ObjMesh
 from vico.assets.things.texturing import textured_again
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, merge_surfaces
 
 #: In place of a collection: one of our own models, as it is.
 OURS = "="
@@ -92,7 +92,7 @@ def fitted(
             parts += [surface.moved(pose_matrix(x, y)) for surface in models[piece.name].surfaces]
         else:
             parts += _placed(piece, models[name], *look(piece))
-    return joined(parts)
+    return merge_surfaces(parts)
 
 
 def _placed(piece: StandIn, ours: Model, entry: ArchiveEntry, solid: ObjMesh) -> list[Surface]:

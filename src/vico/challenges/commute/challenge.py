@@ -31,7 +31,7 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import recorded_in
 from vico.world.folder import kept_world
 from vico.world.public import PublicMap
-from vico.world.transit_model import Stop, TramStop
+from vico.world.transit import Stop, TramStop
 from vico.world.world import World
 
 _TINY = 1e-6

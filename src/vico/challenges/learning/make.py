@@ -108,10 +108,7 @@ def make_robot_work(world: World | Path | str, category: RobotCategory, **option
     options
         Those of `vico.challenges.learning.robot.RobotOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
     """
-    from vico.challenges.learning.robot import (
-        RobotOptions,
-        RobotWork,  # physics, slow to import
-    )
+    from vico.challenges.learning.robot import RobotOptions, RobotWork
 
     return _env(partial(RobotWork, *_robot_stage(world), category), RobotOptions, options)
 

@@ -22,10 +22,9 @@ from vico.seeds import rng
 from vico.version import __version__
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin, Point3
+from vico.world.model import ENTITY_GROUND, ENTITY_ROAD, Manifest, Origin, Point3, Roads
 from vico.world.objects import Objects
-from vico.world.street_model import Roads
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walkable import BLOCKED, OPEN, SIDEWALK, WalkableMap
 from vico.world.world import World
 

@@ -9,14 +9,18 @@ from itertools import pairwise
 from typing import Any
 
 from vico.clock import seconds_of_day
-from vico.community.authorship import AuthoredItem, Origin
-from vico.community.childhood import GROWN_UP
-from vico.community.llm.asking import Draft, ModelDesk
-from vico.community.llm.fitting import minute_of
-from vico.community.llm.lives import Lives
-from vico.community.llm.prose import faults_of
-from vico.community.llm.replies import GroupReply, SocialNetwork, TieReply, social_network_of
-from vico.community.model import ActivityTag, Group, Relation, RelationKind, Resident
+from vico.community.llm.lives import Lives, minute_of
+from vico.community.llm.prompting import (
+    GroupReply,
+    ModelDesk,
+    ModelDraft,
+    SocialNetwork,
+    TieReply,
+    faults_of,
+    social_network_of,
+)
+from vico.community.model import ActivityTag, AuthoredItem, Group, Origin, Relation, RelationKind, Resident
+from vico.community.people import GROWN_UP
 from vico.errors import InputError
 from vico.llm.prompts import Prompt
 from vico.world.model import Category
@@ -53,7 +57,7 @@ class Network:
 
 def write_network(
     desk: ModelDesk, prompt: Prompt, lives: Lives, *, unasked: frozenset[str] = frozenset()
-) -> tuple[Network, dict[str, Draft[SocialNetwork]]]:
+) -> tuple[Network, dict[str, ModelDraft[SocialNetwork]]]:
     """Have the model bring people together: grown-ups whose day does not go with a small child's.
 
     Of drafts that stay faulty the groups and ties without fault are taken, without members who can't be there.
@@ -87,7 +91,9 @@ def _in_parts(people: Sequence[str], most: int) -> list[list[str]]:
     return [list(people[a:b]) for a, b in pairwise(edges)]
 
 
-def network_items(lives: Lives, network: Network, drafts: Mapping[str, Draft[SocialNetwork]]) -> list[AuthoredItem]:
+def network_items(
+    lives: Lives, network: Network, drafts: Mapping[str, ModelDraft[SocialNetwork]]
+) -> list[AuthoredItem]:
     """Return whose everybody's groups are, in the order of the residents, and last whose the ties are."""
     items = []
     for resident in lives.cast.base.residents:
@@ -109,7 +115,7 @@ def network_items(lives: Lives, network: Network, drafts: Mapping[str, Draft[Soc
     return items
 
 
-def _relations_item(network: Network, drafts: Sequence[Draft[SocialNetwork]]) -> AuthoredItem:
+def _relations_item(network: Network, drafts: Sequence[ModelDraft[SocialNetwork]]) -> AuthoredItem:
     name = "community.relations"
     if not drafts:
         return AuthoredItem(item=name, origin=Origin.NOT_ASKED, detail="there is nobody to be tied")
@@ -123,23 +129,23 @@ def _relations_item(network: Network, drafts: Sequence[Draft[SocialNetwork]]) ->
     return AuthoredItem(item=name, origin=Origin.WRITTEN, detail=detail)
 
 
-def _question(prompt: Prompt, lives: Lives, batch: Sequence[str], number: int) -> Draft[SocialNetwork]:
+def _question(prompt: Prompt, lives: Lives, batch: Sequence[str], number: int) -> ModelDraft[SocialNetwork]:
     cast = lives.cast
     people = [lives.people[name] for name in batch]
     places = cast.near([person.home for person in people], _MEETING_PLACES, _PLACES)
     messages = prompt.messages(
         scene=cast.scene(),
-        people=[_told(lives, person) for person in people],
+        people=[_person_facts(lives, person) for person in people],
         places=[cast.place_facts(place) for place in places],
         day=cast.base.weekday,
         groups=max(1, round(len(people) / _A_GROUP)),
         year=cast.base.date.year,
     )
     reply = social_network_of(list(batch), [cast.labels[place] for place in places])
-    return Draft(f"groups_{number}", prompt, messages, reply)
+    return ModelDraft(f"groups_{number}", prompt, messages, reply)
 
 
-def _told(lives: Lives, person: Resident) -> dict[str, Any]:
+def _person_facts(lives: Lives, person: Resident) -> dict[str, Any]:
     working = [
         (stay.start, stay.end)
         for stay in lives.plain_stays(person.id)
@@ -171,16 +177,16 @@ class _NetworkJudge:
         self._batches = {f"groups_{k}": list(batch) for k, batch in enumerate(batches)}
         self._names = {group.name.casefold(): "" for group in lives.cast.base.groups}
 
-    def __call__(self, draft: Draft[SocialNetwork]) -> list[str]:
+    def __call__(self, draft: ModelDraft[SocialNetwork]) -> list[str]:
         findings: list[str] = []
         self._kept(draft, findings)
         return findings
 
-    def sound(self, draft: Draft[SocialNetwork]) -> Network:
+    def sound(self, draft: ModelDraft[SocialNetwork]) -> Network:
         """Return what is without fault in a draft."""
         return self._kept(draft, [])
 
-    def _kept(self, draft: Draft[SocialNetwork], findings: list[str]) -> Network:
+    def _kept(self, draft: ModelDraft[SocialNetwork], findings: list[str]) -> Network:
         assert draft.value is not None
         kept = Network()
         for k, reply in enumerate(draft.value.groups):
@@ -306,7 +312,7 @@ def with_old_groups(lives: Lives, network: Network) -> list[Group]:
             old.append(group.model_copy(update={"members": members}))
         if blocked is None:
             network.groups = groups
-            return _numbered([*old, *groups])
+            return _renumber([*old, *groups])
         groups.remove(blocked)
 
 
@@ -314,7 +320,7 @@ def _fits(lives: Lives, member: str, groups: Sequence[Group]) -> bool:
     return not lives.plain_day(member, groups).findings
 
 
-def _numbered(groups: Sequence[Group]) -> list[Group]:
+def _renumber(groups: Sequence[Group]) -> list[Group]:
     return [group.model_copy(update={"id": f"group_{k}"}) for k, group in enumerate(groups)]
 
 

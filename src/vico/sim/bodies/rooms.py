@@ -22,7 +22,7 @@ from vico.io.compiled import compiled
 from vico.io.recent import Recent
 from vico.sim.bodies.collisions import box_gap, gap_to, room_gap
 from vico.sim.bodies.state_arrays import RADIUS
-from vico.world.city_rooms import numbers_of
+from vico.world.city_world import numbers_of
 from vico.world.model import FLIGHT_STEPS, LANDING, Entrance, Place, Point3, Room
 from vico.world.objects import Objects
 

@@ -21,8 +21,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vico.errors import InputError
 from vico.sim.environment.city_events import CityEvent, Occurrence, kind_of_event
-from vico.world.model import Category, Place, Point2
-from vico.world.street_model import Road
+from vico.world.model import Category, Place, Point2, Road
 from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.world.world import World

@@ -32,8 +32,8 @@ from vico.sim.people.placement import (
     wrap_angle,
 )
 from vico.sim.state.simulation_state import SimulationState
-from vico.world.indoor_ways import lift_seconds
 from vico.world.model import LIFT, Place
+from vico.world.walk_lengths import lift_seconds
 
 #: People turn at doors so fast, radians a second.
 TURN_RATE = 2.0 * math.pi

@@ -32,8 +32,8 @@ from vico.assets.house_doors import (
     opening_of,
 )
 from vico.clock import DAY
-from vico.community.hours import hours_on
 from vico.community.model import Resident
+from vico.community.place_index import hours_on
 from vico.exact import apply_matrix
 from vico.render import Scene
 from vico.render.behind.fronts import OPEN_TO_SIGHT

@@ -22,8 +22,8 @@ from vico.sim.pictures.buildings import ScenePart
 from vico.sim.pictures.people import MovingBodies
 from vico.sim.pictures.scene import RenderedSimulation, SceneRenderer
 from vico.sim.state.simulation_state import SimulationState
-from vico.world.city_silhouettes import CitySilhouettes
 from vico.world.city_world import CityWorld
+from vico.world.silhouettes import CitySilhouettes
 
 _GIGABYTE = 2**30
 #: Metres around a camera that are drawn in full, at least; who flies above the houses sees so many times that more.

@@ -22,8 +22,8 @@ from vico.assets.house_doors import DOOR_MATERIAL, house_doors
 from vico.assets.models.furniture import furniture_models
 from vico.assets.models.street import street_models
 from vico.clock import DAY, seconds_of_day
-from vico.community.hours import given_hours
 from vico.community.model import ActivityTag, ItemType, Mode, Resident, ScheduleItem
+from vico.community.place_index import stated_hours
 from vico.errors import InputError
 from vico.rules import DOOR_REACH
 from vico.sim.bodies.rooms import Indoor
@@ -332,7 +332,7 @@ class OpeningHours:
         self._spans: dict[str, list[Span]] = {}
         self._weekday = date.weekday()
         for place in places:
-            spans = given_hours(place, date, coordinates) if place.rooms else None
+            spans = stated_hours(place, date, coordinates) if place.rooms else None
             if spans is not None:
                 self._spans[place.id] = spans
         belongs = {(i, place) for i, one in enumerate(residents) for place in (one.home, one.workplace) if place}

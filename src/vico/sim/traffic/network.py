@@ -19,10 +19,9 @@ from vico.assets.vehicles import vehicle_size
 from vico.sim.traffic.path import PATH_POINT
 from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, TRACK_CROSSING, WALKWAY, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
-from vico.world.kept_walkways import walkways_past
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
-from vico.world.walkways import CROSSING, Walkways
+from vico.world.walkways import CROSSING, Walkways, walkways_past
 
 Floats = NDArray[np.float64]
 

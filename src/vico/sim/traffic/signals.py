@@ -18,10 +18,9 @@ from vico.seeds import rng
 from vico.sim.bodies.arrays import Drawn
 from vico.sim.traffic.state import AMBER, DARK, GREEN, RED, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph
+from vico.world.lanes import LaneGraph, SignalProgram
 from vico.world.mesh import Surface
 from vico.world.objects import Objects
-from vico.world.signals import SignalProgram
 from vico.world.walkways import CROSSING, Walkways
 
 _ALL_RED = 2  # s between one way's amber and another one's green

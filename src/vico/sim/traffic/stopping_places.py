@@ -21,8 +21,7 @@ from vico.sim.traffic.parking import WAY_LEAD
 from vico.sim.traffic.path import PATH_POINT
 from vico.sim.traffic.state import NONE, SPOT, STOP, STOPPING_PLACE, TALK, WINDOW, LaneNetwork, Records, WalkwayNetwork
 from vico.world.lanes import LaneGraph
-from vico.world.model import Category, Point2
-from vico.world.street_model import ParkingSpot
+from vico.world.model import Category, ParkingSpot, Point2
 from vico.world.walkable import CROSSING as CROSSING_CLASS
 from vico.world.walkable import ROADWAY
 from vico.world.walkways import CROSSING, SIDEWALK, Walkways

@@ -20,7 +20,7 @@ from vico.rules import BIKE_REACH, STATION_REACH, ride_price
 from vico.sim.bodies.arrays import BICYCLE, Bodies, Drawn
 from vico.sim.bodies.state_arrays import RADIUS, RIDER_REACH
 from vico.sim.traffic import Traffic
-from vico.world.transit_model import BikeStation
+from vico.world.transit import BikeStation
 
 _SLOT = 0.75  # metres between bicycles in a station
 

@@ -21,8 +21,7 @@ from vico.errors import InputError
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.state import PRESENT, BusRoutes
 from vico.world.lanes import LaneGraph
-from vico.world.timetable import buses_needed, departure
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit, buses_needed, departure
 
 
 @dataclass(frozen=True)

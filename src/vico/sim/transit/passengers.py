@@ -22,7 +22,7 @@ from vico.sim.bodies.avatars import free_ground
 from vico.sim.traffic.drawing import Seating
 from vico.sim.traffic.population import Traffic
 from vico.sim.traffic.state import BOARD, NONE, STOP
-from vico.world.transit_model import Stop, TramStop, Transit
+from vico.world.transit import Stop, TramStop, Transit
 from vico.world.walkable import WalkableMap
 from vico.world.walkways import SIDEWALK
 

@@ -29,8 +29,7 @@ from vico.sim.transit.passengers import DOOR_TIME, Passengers, leaf_transforms, 
 from vico.sim.transit.tram_network import TramNetwork
 from vico.sim.transit.trams import AWAY, Trams
 from vico.world.mesh import Surface
-from vico.world.timetable import departure, next_departure
-from vico.world.transit_model import Line, Transit
+from vico.world.transit import Line, Transit, departure, next_departure
 from vico.world.walkable import WalkableMap
 
 _OUT_OF_SIGHT = -40.0  # metres above the ground

@@ -25,8 +25,7 @@ from vico.sim.bodies.arrays import Bodies
 from vico.sim.traffic import Traffic
 from vico.sim.traffic.state import DARK, GREEN, TRACK_CROSSING
 from vico.world.lanes import LaneGraph
-from vico.world.rails import ACROSS_REACH, STEP, TRAM_BRAKING, TRAM_LENGTH, Track
-from vico.world.transit_model import TramLine
+from vico.world.transit import ACROSS_REACH, STEP, TRAM_BRAKING, TRAM_LENGTH, Track, TramLine
 from vico.world.walkways import CORNER, CROSSING, Walkways
 
 if TYPE_CHECKING:

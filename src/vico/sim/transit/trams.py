@@ -38,7 +38,7 @@ from vico.sim.transit.tram_network import (
     section_outlines,
 )
 from vico.world.mesh import Surface
-from vico.world.rails import (
+from vico.world.transit import (
     ACROSS_REACH,
     STEP,
     TRAM_ACCELERATION,
@@ -46,8 +46,8 @@ from vico.world.rails import (
     TRAM_DOORS,
     TRAM_LENGTH,
     TRAM_SPEED,
+    TramLine,
 )
-from vico.world.transit_model import TramLine
 
 #: Where the front of a tram is that is not in the city.
 AWAY = -1.0

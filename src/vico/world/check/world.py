@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 from vico.errors import VicoError
 from vico.io.files import sha256_of
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated, outline_of
-from vico.world.check.finding import WorldFinding
-from vico.world.check.objects import check_clearances, check_objects
-from vico.world.check.opendrive import check_opendrive
-from vico.world.check.places import check_entrances, check_places
-from vico.world.check.rooms import check_containers, check_indoors, check_rooms
-from vico.world.check.streets import check_rails, check_roads, check_transit
-from vico.world.model import FAILED, FAULT, TRIED
-from vico.world.stored import world_files
-from vico.world.world import World
+from vico.world.check.indoors import check_containers, check_indoors, check_rooms
+from vico.world.check.outdoors import (
+    check_clearances,
+    check_entrances,
+    check_objects,
+    check_places,
+    check_rails,
+    check_roads,
+    check_transit,
+)
+from vico.world.model import FAILED, FAULT, TRIED, WorldFinding
+from vico.world.opendrive import check_opendrive
+from vico.world.world import World, world_files
 
 MOST_FAILED = 0.05
 """Share of the objects of any stage that may fail to be made."""
@@ -47,25 +51,25 @@ def check_world(world: World, *, part: bool = False) -> list[WorldFinding]:
     list of Finding
         Empty if all is well. A file that can't be read is a finding too, and ends the checks that need it.
     """
-    return _checked(world, _RULES if part else (*_RULES, *_STREET_RULES))
+    return _run_rules(world, _RULES if part else (*_RULES, *_STREET_RULES))
 
 
 def check_whole(world: World) -> list[WorldFinding]:
     """Check what a city has as a whole, and that its tiles' entities differ; as `check_world`."""
-    return _checked(world, (check_whole_files, *_STREET_RULES, check_entities, check_dropped))
+    return _run_rules(world, (check_whole_files, *_STREET_RULES, check_entities, check_dropped))
 
 
-def _checked(world: World, rules: Iterable[_Rule]) -> list[WorldFinding]:
+def _run_rules(world: World, rules: Iterable[_Rule]) -> list[WorldFinding]:
     findings: list[WorldFinding] = []
     for rule in rules:
         try:
             findings += rule(world)
         except VicoError as error:
             findings.append(WorldFinding("readable", rule.__name__.removeprefix("check_"), str(error)))
-    return _located(world, findings) if findings else findings
+    return _with_locations(world, findings) if findings else findings
 
 
-def _located(world: World, findings: list[WorldFinding]) -> list[WorldFinding]:
+def _with_locations(world: World, findings: list[WorldFinding]) -> list[WorldFinding]:
     """Return the findings with the places of the things they name, as far as the world can be read."""
     at: dict[str, tuple[float, float]] = {}
     with contextlib.suppress(VicoError):

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.exact import apply_matrix, dot
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.worldgen.buildings.roofs.eaves import edges_of
 from vico.worldgen.buildings.solids import Mesh
 from vico.worldgen.facts.outlines.plans import PartPlan

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from shapely import Polygon
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
-from vico.geo.overlay import OverlayError
+from vico.geo.overlay import OverlayError, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building, BuildingSources, Dropped

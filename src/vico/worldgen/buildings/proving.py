@@ -18,8 +18,7 @@ from shapely import Polygon
 
 from vico.geo import overlay
 from vico.geo.overlay import OverlayError
-from vico.world.check.buildings import open_edges_of, overlapping_faces, unseated, volumes_of
-from vico.world.check.solids import open_edges
+from vico.world.check.buildings import open_edges, open_edges_of, overlapping_faces, seating_findings, volumes_of
 from vico.world.heights import HeightField
 from vico.world.model import FAILED, Dropped
 from vico.worldgen.buildings.drafts import Draft, drafted, record_of, standing_parts
@@ -136,7 +135,7 @@ def _faults(standing: Mapping[str, Draft], blocks: set[str], mesh: SolidMesh, te
         if not volume.get(k, 0.0) > 0.0:
             yield _Fault(names[k], None, "building inside out", "it encloses nothing")
         low = min((float(body.positions[:, 2].min()) for body in draft.bodies), default=math.inf)
-        for finding in unseated(record_of(draft, 1), low, terrain):
+        for finding in seating_findings(record_of(draft, 1), low, terrain):
             yield _Fault(names[k], None, finding.id, finding.what)
     for pairs in overlapping_faces(corners, owner).values():
         area = float(pairs.area.sum())

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.exact import apply_matrix
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.world.model import Dropped
 from vico.worldgen.buildings.chimneys import party_wall_stacks, ridge_chimneys
 from vico.worldgen.buildings.solids import Mesh

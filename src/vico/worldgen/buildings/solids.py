@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
-from vico.world.check.solids import open_edges
+from vico.geo.overlay import polygons_of
+from vico.world.check.buildings import open_edges
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.worldgen.buildings.roofs.solid import building_solid

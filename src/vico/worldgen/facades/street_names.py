@@ -11,9 +11,8 @@ import shapely
 
 from vico.geometry import distance
 from vico.world.heights import HeightField
-from vico.world.model import Building
+from vico.world.model import Building, Road, Roads
 from vico.world.objects import Objects
-from vico.world.street_model import Road, Roads
 from vico.worldgen.facades.lettering import spelled
 from vico.worldgen.facades.pieces import Face, Pieces
 from vico.worldgen.facades.signs import Boards, Lettering

@@ -13,7 +13,8 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmArea, OsmData, polygons_of
+from vico.geo.osm import OsmArea, OsmData
+from vico.geo.overlay import polygons_of
 from vico.geo.quantities import quantity
 from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.site import SiteFacts

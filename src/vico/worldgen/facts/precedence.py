@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from vico.errors import InputError
-from vico.geo.buildings.model import CITY_MODELS, KINDS
+from vico.geo.buildings import CITY_MODELS, KINDS
 from vico.io.data_files import PACKAGED, DataRecord, read_record
 
 _GUIDE = "docs/sources.md"

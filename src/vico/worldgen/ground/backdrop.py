@@ -19,7 +19,7 @@ from vico.geo import overlay
 from vico.geometry import distance
 from vico.seeds import rng
 from vico.world.heights import HeightField
-from vico.world.mesh import Material, Surface, joined, quad_triangles
+from vico.world.mesh import Material, Surface, merge_surfaces, quad_triangles
 from vico.world.model import ENTITY_BACKDROP, Building
 from vico.worldgen.facts.expendable import united
 from vico.worldgen.facts.ground_kinds import mapped_areas
@@ -108,7 +108,7 @@ def backdrop_of(
             parts += _house(slot, near, pattern, terrain, random)
         else:
             parts += _trees(slot, near, terrain, random)
-    return joined([part.of_entity(ENTITY_BACKDROP) for part in parts])
+    return merge_surfaces([part.of_entity(ENTITY_BACKDROP) for part in parts])
 
 
 def _taken(ground: shapely.Polygon, shapes: NDArray[np.object_]) -> bool:

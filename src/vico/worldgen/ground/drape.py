@@ -14,7 +14,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.geometry import distances
 from vico.world.heights import HeightField
 from vico.world.mesh import quad_triangles

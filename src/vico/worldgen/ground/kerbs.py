@@ -11,7 +11,7 @@ from shapely import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.geometry import distance
 from vico.io.compiled import compiled
 from vico.world.heights import EDGE_RANGE, HeightField, Steps

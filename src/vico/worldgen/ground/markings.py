@@ -13,7 +13,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.geometry import distance
 from vico.worldgen.facts.bays import bay_borders, free_pieces, junction_zones, lot_rows, stands_across
 from vico.worldgen.facts.expendable import NamedShape, expendable, widened

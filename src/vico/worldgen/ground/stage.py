@@ -17,9 +17,10 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmData
+from vico.geo.overlay import polygons_of
 from vico.world.heights import HeightField
-from vico.world.mesh import Material, Surface, joined, quad_triangles
+from vico.world.mesh import Material, Surface, merge_surfaces, quad_triangles
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, pieces_in
@@ -165,7 +166,7 @@ def ground_from_osm(
     quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), yards.green(), window)}, bearing)
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
-    return joined(surfaces)
+    return merge_surfaces(surfaces)
 
 
 def _thinned(plan: PlanMesh, laid: Sequence[_Piece], terrain: HeightField) -> PlanMesh:
@@ -294,7 +295,7 @@ def _hidden(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
     deep = changed(built, lambda shapes: overlay.buffer(shapes, -1.5, join_style="mitre"))
     mapped = united([one for one in deep if not one.shape.is_empty], grid=0.01)
     # Not every building of the map is built whole, or at all: people walk on what is left of its ground.
-    whole = united(changed(named_parts("buildings", standing), overlay.mended), grid=0.01)
+    whole = united(changed(named_parts("buildings", standing), overlay.make_valid), grid=0.01)
     both = overlay.intersection(mapped, overlay.buffer(whole, -1.5, join_style="mitre"), grid=0.01)
     return shapely.MultiPolygon(polygons_of(both))
 

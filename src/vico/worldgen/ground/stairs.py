@@ -13,9 +13,8 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmWay
 from vico.geo.quantities import quantity
-from vico.world.heights import HeightField
+from vico.world.heights import HeightField, Stairs
 from vico.world.mesh import Surface, surface_of_quads
-from vico.world.stairs import Stairs
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import on_the_ground

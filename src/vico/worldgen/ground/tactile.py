@@ -8,7 +8,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.geometry import distance
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.streets import Crossing, StreetPolygons

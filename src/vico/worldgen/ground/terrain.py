@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from vico.errors import EmptyInputError
 from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.ground.tile_ground import ground_samples, on_ground

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.world.mesh import Surface
 from vico.worldgen.ground.conform import PlanMesh
 from vico.worldgen.ground.drape import Curtain, Heights

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.world.objects import Objects
 from vico.world.walkable import (
     BLOCKED,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo import overlay
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmData
+from vico.geo.overlay import polygons_of
 from vico.world.heights import HeightField
 from vico.worldgen.facts.expendable import NamedShape, changed, named_parts, united
 from vico.worldgen.facts.site import SiteFacts

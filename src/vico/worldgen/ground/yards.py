@@ -12,7 +12,8 @@ from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmArea, OsmData, polygons_of
+from vico.geo.osm import OsmArea, OsmData
+from vico.geo.overlay import polygons_of
 from vico.worldgen.facts.expendable import NamedShape, united
 from vico.worldgen.facts.ground_kinds import mapped_areas
 from vico.worldgen.facts.site import SiteFacts

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vico.assets.models.furniture import furniture_models
 from vico.assets.models.model import Model
 from vico.assets.shapes import pose_matrix
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 from vico.world.model import FIRST_FURNITURE, FIRST_ROOM, Category, Container, Doorway, Place, Room
 from vico.world.objects import Objects
 from vico.worldgen.facts.expendable import expendable
@@ -93,7 +93,7 @@ def assembled(places: Sequence[Place], slots: dict[int, tuple[Slot, FloorPlan]])
             rows += own_rows
             surfaces += shell
             furnished.append(place.model_copy(update={"rooms": [room.id for room in own_rooms]}))
-    return Indoors(furnished, rooms, Objects.from_rows(rows), joined(surfaces))
+    return Indoors(furnished, rooms, Objects.from_rows(rows), merge_surfaces(surfaces))
 
 
 def _put(

@@ -23,8 +23,8 @@ from vico.geo import overlay
 from vico.geometry import distance, distances
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
+from vico.world.model import ParkingSpot, WayIntoSpot, WaysOfSpot
 from vico.world.objects import Objects
-from vico.world.street_model import ParkingSpot, WayIntoSpot, WaysOfSpot
 from vico.worldgen.facts.streets import StreetPolygons
 
 Floats = NDArray[np.float64]

@@ -23,10 +23,9 @@ from vico.geo.osm import OsmData, Tags
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import FIRST_OBJECT, FIRST_STOP
+from vico.world.model import FIRST_OBJECT, FIRST_STOP, ParkingSpot
 from vico.world.objects import Objects
-from vico.world.street_model import ParkingSpot
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.worldgen.facts.bays import Bay, junction_zones, kerb_bays, lot_bays, stands_across
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts

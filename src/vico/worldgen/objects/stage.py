@@ -26,7 +26,7 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FIRST_OBJECT, Dropped
 from vico.world.objects import FEET, Objects
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.worldgen.facts.expendable import NamedShape, expendable, widened
 from vico.worldgen.objects.barriers import barrier_wishes
 from vico.worldgen.objects.catalogue import standing

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from vico.errors import EmptyInputError, InputError
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.io.compiled import compiled
 from vico.threads import in_order
 from vico.world.mesh import Surface

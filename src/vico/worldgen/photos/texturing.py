@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from vico.errors import InputError, MissingExtraError, MissingFileError
-from vico.geo.street_images.model import StreetImage
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.street_images import StreetImage
+from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.facts.sight import Sight

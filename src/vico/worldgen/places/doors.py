@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
-from vico.world.check.places import faces_into
+from vico.world.check.outdoors import faces_into
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
 from vico.world.routing import Router

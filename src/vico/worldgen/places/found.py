@@ -16,7 +16,7 @@ from difflib import SequenceMatcher
 import numpy as np
 import shapely
 
-from vico.geo.places.model import FoundPlace
+from vico.geo.places import FoundPlace
 from vico.geometry import distance
 from vico.world.model import Category, Dropped
 from vico.worldgen.facts.named_places import NamedPlace

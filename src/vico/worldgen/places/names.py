@@ -9,7 +9,7 @@ from functools import cached_property
 import shapely
 
 from vico.geo.osm import Tags
-from vico.world.street_model import Roads
+from vico.world.model import Roads
 from vico.worldgen.facts.named_places import NamedPlace
 from vico.worldgen.facts.place_words import place_names
 from vico.worldgen.places.doors import MATCH, Finder

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 import shapely
 
-from vico.geo.places.model import FoundPlace
-from vico.world.check.places import entrance_findings, is_reachable
+from vico.geo.places import FoundPlace
+from vico.world.check.outdoors import entrance_findings, is_reachable
 from vico.world.heights import HeightField
-from vico.world.model import Building, Category, Dropped, Entrance, Place
+from vico.world.model import Building, Category, Dropped, Entrance, Place, Roads
 from vico.world.routing import Router
-from vico.world.street_model import Roads
-from vico.world.transit_model import Transit
+from vico.world.transit import Transit
 from vico.world.walkable import WalkableMap
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.named_places import NamedPlace

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.world.borders import ABOVE, ALIKE, NEAR, SAME, Profile, Side, edges_on, profile_of
+from vico.world.city import ABOVE, ALIKE, NEAR, SAME, Profile, Side, edges_on, profile_of
 from vico.world.mesh import Surface
 
 Floats = NDArray[np.float64]

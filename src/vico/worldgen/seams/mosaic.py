@@ -14,14 +14,12 @@ from shapely import MultiPolygon, Polygon
 from shapely.affinity import translate
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.io.arrays import new_array
 from vico.io.files import write_bytes
 from vico.io.npz import npz_bytes
-from vico.world.city_files import EDGE, HIGH, LEVELS, LOW, SMOOTH
-from vico.world.decks import Decks
-from vico.world.heights import HeightField
-from vico.world.stairs import Stairs
+from vico.world.city import EDGE, HIGH, LEVELS, LOW, SMOOTH
+from vico.world.heights import Decks, HeightField, Stairs
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.grid import Tile, TileGrid
 from vico.worldgen.seams.heights import cropped

@@ -11,7 +11,7 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.grid import HALO, STRIP, Tile, TileGrid
 

@@ -14,9 +14,9 @@ from scipy import ndimage
 from vico.io.arrays import new_array
 from vico.io.files import write_bytes
 from vico.io.npz import npz_bytes
-from vico.world.city_files import COST, GATES, REACHED, ROOM, STEPS, SURFACES
+from vico.world.city import COST, GATES, REACHED, ROOM, STEPS, SURFACES
 from vico.world.city_gates import Gates
-from vico.world.disjoint import DisjointSets
+from vico.world.lanes import DisjointSets
 from vico.world.routing import walking_costs
 from vico.world.walkable import BLOCKED, WalkableMap, read_walkable
 from vico.worldgen.seams.grid import Tile, TileGrid

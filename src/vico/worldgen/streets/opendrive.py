@@ -21,7 +21,7 @@ from defusedxml.ElementTree import fromstring
 from numpy.typing import NDArray
 
 from vico.world.heights import HeightField
-from vico.world.opendrive import Curve, beside, elevation, lane_borders, reference_line, wrapped
+from vico.world.opendrive import Curve, elevation, lane_borders, offset_point, reference_line, wrap_angle
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def sound_opendrive(content: bytes, height: HeightField | None = None) -> bytes:
     Returns
     -------
     bytes
-        Equal input gives equal bytes. `vico.world.check.opendrive` says what holds of it.
+        Equal input gives equal bytes. `vico.world.opendrive` says what holds of it.
     """
     root = fromstring(content, forbid_dtd=True)
     roads = {str(road.get("id")): road for road in root.findall("road")}
@@ -173,7 +173,7 @@ def _smooth(curves: list[Curve]) -> list[Curve]:
 
 
 def _corner(a: Curve, b: Curve) -> float:
-    return abs(wrapped(b.end(0.0)[1] - a.end(1.0)[1]))
+    return abs(wrap_angle(b.end(0.0)[1] - a.end(1.0)[1]))
 
 
 def _within(curve: Curve, low: float, high: float) -> Curve:
@@ -186,7 +186,7 @@ def _within(curve: Curve, low: float, high: float) -> Curve:
 def _edge(street: _Street, lane: int, *, last: bool, outer: bool = False) -> tuple[Floats, float]:
     """Return where a border of a lane is at an end of a street, and the heading there."""
     point, heading = street.end(last=last)
-    return beside(point, heading, street.borders[lane][outer]), heading
+    return offset_point(point, heading, street.borders[lane][outer]), heading
 
 
 def _make_room(streets: Mapping[str, _Street], turns: Sequence[_Turn]) -> None:
@@ -199,7 +199,7 @@ def _make_room(streets: Mapping[str, _Street], turns: Sequence[_Turn]) -> None:
             _edge(after, turn.lanes[0][1], last=False),
         )
         ahead = float((b - a) @ np.array([math.cos(heading), math.sin(heading)]))
-        turned = abs(wrapped(there - heading))
+        turned = abs(wrap_angle(there - heading))
         if turned > _U_TURN:
             continue
         lacking = _ROOM - (ahead if turned < math.pi / 4 else math.hypot(*(b - a)))
@@ -270,7 +270,7 @@ def _way(turn: _Turn, number: str, streets: Mapping[str, _Street]) -> Element:
     left = [_edge(before, first[0], last=True), _edge(after, first[1], last=False)]
     right = [_edge(before, last[0], last=True, outer=True), _edge(after, last[1], last=False, outer=True)]
     size = [math.hypot(*(end[0] - start[0])) for start, end in (left, right)]
-    outer = abs(wrapped(left[1][1] - left[0][1])) > _U_TURN and size[1] > size[0]
+    outer = abs(wrap_angle(left[1][1] - left[0][1])) > _U_TURN and size[1] > size[0]
     start, end = right if outer else left
     curve = Curve.between(*start, *end)
     length = round(curve.length, 8)

@@ -14,7 +14,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.worldgen.facts.expendable import NamedShape, changed, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
@@ -50,7 +50,7 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
     """
     reach = site.osm.half + site.osm.margin
     window = shapely.box(-reach, -reach, reach, reach)
-    solid = united(changed(obstacles, overlay.mended), grid=_GRID) if len(obstacles) else MultiPolygon()
+    solid = united(changed(obstacles, overlay.make_valid), grid=_GRID) if len(obstacles) else MultiPolygon()
     strips = strips_of(site)
     driven = united(strips.drive, grid=_GRID)
     carriageway = _carriageway(driven, strips.through, solid, window)

@@ -16,8 +16,7 @@ from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.geo.quantities import quantity
-from vico.world.model import Dropped
-from vico.world.street_model import Junction, Road, Roads
+from vico.world.model import Dropped, Junction, Road, Roads
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import OVER_A_STREET
 from vico.worldgen.facts.site import SiteFacts

@@ -14,7 +14,7 @@ from vico.geometry import distances
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.transit_model import BikeStation
+from vico.world.transit import BikeStation
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts

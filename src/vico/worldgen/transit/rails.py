@@ -13,14 +13,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.geo.gtfs.feed import DAY, Feed, Pattern
+from vico.geo.gtfs_feed import DAY, Feed, Pattern
 from vico.geo.osm import OsmData, OsmRelation, OsmWay
 from vico.geometry import arc_lengths, points_along
 from vico.rules import BUS_DWELL, TRAM_WIDTH
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
-from vico.world.rails import TRAM_LENGTH, Track, tram_door
-from vico.world.transit_model import TramLine, TramStop
+from vico.world.transit import TRAM_LENGTH, Track, TramLine, TramStop, tram_door
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import is_bridge, on_the_ground

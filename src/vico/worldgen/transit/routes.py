@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, Pattern
+from vico.geo.gtfs_feed import DAY, Feed, GtfsRoute, Pattern
 from vico.geo.osm import OsmData, OsmRelation, Tags
 from vico.world.model import Dropped
 from vico.world.opening_hours import weekly_hours

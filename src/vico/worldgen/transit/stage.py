@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from vico.geo.gtfs.feed import NO_TIMETABLE, Feed
+from vico.geo.gtfs_feed import NO_TIMETABLE, Feed
 from vico.geo.osm import OsmData
 from vico.rules import BUS_DOOR_BEHIND_FRONT
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FAILED, FIRST_STOP, Dropped
-from vico.world.transit_model import Line, Stop, Transit
+from vico.world.transit import Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.worldgen.facts.expendable import expendable, leave_out
 from vico.worldgen.facts.site import SiteFacts
@@ -127,7 +127,7 @@ def transit_from_osm(
     seed
         Decides what the map leaves open: planned stops, bikes in a station.
     feeds
-        Timetables of the same window (`vico.geo.gtfs.reader.read_gtfs`).
+        Timetables of the same window (`vico.geo.gtfs.read_gtfs`).
 
     Returns
     -------

@@ -15,9 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from vico.geo.gtfs.feed import DAY
+from vico.geo.gtfs_feed import DAY
 from vico.rules import BUS_DWELL, BUS_LAYOVER
-from vico.world.transit_model import Line, Stop
+from vico.world.transit import Line, Stop
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive
 
 BUS_SPEED = 10.0

@@ -22,8 +22,7 @@ from vico.rules import (
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import Point2, Point3
-from vico.world.rails import TRAM_DOORS, Track, tram_door
-from vico.world.transit_model import Stop, TramLine, TramStop, Transit
+from vico.world.transit import TRAM_DOORS, Stop, Track, TramLine, TramStop, Transit, tram_door
 from vico.worldgen.facts.streets import StreetPolygons
 
 # Metres between a waiting place and the pavement's edge: as much as there is room for.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo import overlay
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.worldgen.buildings.solids import seat_of, solid_meshes
 from vico.worldgen.facts.outlines.plans import BuildingPlan

@@ -14,7 +14,7 @@ import shapely
 
 from vico.errors import EmptyInputError
 from vico.geo import overlay
-from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
 from vico.worldgen.buildings.fitting.heights import raised_to_mesh

@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.exact import dot
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.world.model import Dropped
 from vico.worldgen.buildings.solids import Mesh
 from vico.worldgen.facts.expendable import expendable

@@ -10,7 +10,8 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmData
+from vico.geo.overlay import polygons_of
 from vico.world.model import Dropped
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.heights import STOREY

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from vico.geo import overlay
-from vico.geo.buildings.model import RoofFacet
-from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
-from vico.geo.overlay import OverlayError
+from vico.geo.buildings import RoofFacet
+from vico.geo.osm import OsmArea, OsmData, Tags
+from vico.geo.overlay import OverlayError, polygons_of
 from vico.geo.quantities import Kind, quantity, read
 from vico.seeds import rng
 from vico.world.model import OPEN_KINDS, Dropped
@@ -98,7 +98,7 @@ def _mapped(osm: OsmData, key: str, dropped: list[Dropped]) -> list[_Row]:
 
 def _pieces(drawn: Polygon | MultiPolygon) -> list[Polygon]:
     """Return the connected pieces of an outline as drawn: valid, without needless corners, spikes and slits."""
-    whole = drawn if drawn.is_valid else overlay.mended(drawn)
+    whole = drawn if drawn.is_valid else overlay.make_valid(drawn)
     return [
         piece
         for shape in polygons_of(whole)

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 from shapely import MultiPolygon, Polygon
 
-from vico.geo.buildings.forms import form_of
-from vico.geo.buildings.model import FoundBuilding, RoofFacet
+from vico.geo.buildings import FoundBuilding, RoofFacet, form_of
 from vico.geo.osm import OsmArea, Tags
-from vico.geo.outlines import joined
+from vico.geo.outlines import union_closing_gaps
 from vico.worldgen.facts.outlines.heights import said_height, said_levels
 from vico.worldgen.facts.outlines.plans import BuildingOrigin
 from vico.worldgen.facts.outlines.roof_shapes import shape_named
@@ -51,7 +50,7 @@ class Claim:
 
     def footprint(self) -> Polygon | MultiPolygon:
         """Return the outline of all together."""
-        return joined([found.footprint for found in self.buildings], gap=_CLOSING, least=_LEAST_AREA)
+        return union_closing_gaps([found.footprint for found in self.buildings], gap=_CLOSING, least=_LEAST_AREA)
 
 
 @dataclass(frozen=True)

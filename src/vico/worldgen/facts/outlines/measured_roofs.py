@@ -14,8 +14,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from vico.geo import overlay
-from vico.geo.buildings.forms import form_of
-from vico.geo.buildings.model import RoofFacet
+from vico.geo.buildings import RoofFacet, form_of
 from vico.geo.overlay import OverlayError
 from vico.geo.quantities import quantity
 from vico.worldgen.facts.outlines.heights import STOREY

@@ -17,7 +17,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from vico.geo import overlay
-from vico.geo.buildings.model import FoundBuilding, FoundBuildings, RoofFacet
+from vico.geo.buildings import FoundBuilding, FoundBuildings, RoofFacet
 from vico.geo.osm import OsmArea, OsmData, Tags
 from vico.world.model import Dropped
 from vico.worldgen.facts.expendable import expendable

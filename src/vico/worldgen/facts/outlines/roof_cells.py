@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo import overlay
-from vico.geo.buildings.model import RoofFacet
+from vico.geo.buildings import RoofFacet
 from vico.geo.overlay import OverlayError
 from vico.worldgen.facts.outlines.roof_shapes import rings_of
 

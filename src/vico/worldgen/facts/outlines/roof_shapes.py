@@ -12,7 +12,7 @@ from manifold3d import CrossSection, Manifold
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from vico.geo.buildings.model import RoofFacet
+from vico.geo.buildings import RoofFacet
 
 SHAPES = (
     "flat",

@@ -17,10 +17,10 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import polygons_of
+from vico.geo.overlay import polygons_of
 from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 from vico.worldgen.ground.bridges.decks import left_normals
 from vico.worldgen.ground.bridges.masonry import PARAPET, Masonry
 from vico.worldgen.ground.bridges.tunnels import WALL, Bore
@@ -115,7 +115,7 @@ def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) 
             _portal(stone, a, b, floors, terrain)
     for bore in bores:
         _lamps(stone, bore, reach)
-    return joined(stone.surfaces())
+    return merge_surfaces(stone.surfaces())
 
 
 def _edges(area: BaseGeometry) -> Iterator[tuple[Floats, Floats]]:
@@ -134,7 +134,7 @@ def _pieces(bores: Sequence[Bore]) -> Iterator[_Piece]:
         before = [shape for shape in taken if shape.intersects(bore.plan())]
         for k in range(len(bore.line) - 1):
             corners = np.concatenate([(bore.line + side)[k : k + 2], (bore.line - side)[k : k + 2][::-1]])
-            plan: BaseGeometry = overlay.mended(Polygon(corners))
+            plan: BaseGeometry = overlay.make_valid(Polygon(corners))
             for other in before:
                 plan = overlay.difference(plan, other)
             headroom = bore.headroom if bore.covered[k] and bore.covered[k + 1] else 0.0

@@ -18,7 +18,7 @@ from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.geometry import distance
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.streets import StreetPolygons
@@ -144,7 +144,7 @@ def portal_surfaces(portals: Sequence[Portal], terrain: HeightField, window: Pol
     for portal in portals:
         with expendable(f"w{portal.way}"):
             stone.take(_drawn(portal, terrain, window))
-    return joined(stone.surfaces())
+    return merge_surfaces(stone.surfaces())
 
 
 def _drawn(portal: Portal, terrain: HeightField, window: Polygon) -> Masonry:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from shapely import Polygon
 
-from vico.world.decks import Decks
-from vico.world.heights import HeightField
+from vico.world.heights import Decks, HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons

@@ -14,10 +14,11 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmWay, polygons_of
+from vico.geo.osm import OsmWay
+from vico.geo.overlay import polygons_of
 from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, merge_surfaces
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
@@ -50,7 +51,7 @@ def bridge_surfaces(
             _draw_deck(drawn, deck, terrain, window, keep_clear, beside, own)
             stone.take(drawn)
     _draw_rails(stone, site, terrain, window)
-    return joined(stone.surfaces())
+    return merge_surfaces(stone.surfaces())
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class _Beside:
             apart = np.hypot(*(mine.line[:, None] - deck.line[None]).transpose(2, 0, 1))
             i, j = np.unravel_index(int(apart.argmin()), apart.shape)
             if abs(float(mine.z[i] - deck.z[j])) < _STEP_BETWEEN:
-                found.append(overlay.mended(_driven(deck)))
+                found.append(overlay.make_valid(_driven(deck)))
         return overlay.union_all(found)
 
 

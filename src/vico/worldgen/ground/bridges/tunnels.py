@@ -183,7 +183,7 @@ def _strip(line: Floats, chosen: NDArray[np.bool_], half: float, *, both: bool =
         for k in range(len(line) - 1)
         if int(chosen[k]) + int(chosen[k + 1]) > both
     ]
-    return overlay.union_all([overlay.mended(piece) for piece in pieces])
+    return overlay.union_all([overlay.make_valid(piece) for piece in pieces])
 
 
 def _is_bore(way: OsmWay, window: Box) -> bool:

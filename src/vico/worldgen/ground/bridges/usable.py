@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo.osm import OsmWay
-from vico.world.decks import HEADROOM, Decks
-from vico.world.heights import HeightField
+from vico.world.heights import HEADROOM, Decks, HeightField
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.geo.detections.model import Detections, Located, Sighting
+from vico.geo.detections import Detections, Located, Sighting
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
 from vico.worldgen.objects.detections.agreement import NEAREST, ROUGH, Rays, agreeing, beside

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.street import street_models
-from vico.geo.detections.model import Detections
+from vico.geo.detections import Detections
 from vico.geo.osm import OsmData, OsmNode
 from vico.geometry import distances
-from vico.world.detected import DetectedObject
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
+from vico.world.world import DetectedObject
 from vico.worldgen.objects.detections.classes import Rules, detected_classes
 from vico.worldgen.objects.detections.locate import Spot, located, merged
 from vico.worldgen.objects.points import mapped_wishes

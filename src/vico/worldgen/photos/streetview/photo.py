@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
-from vico.geo.street_images.model import StreetImage
+from vico.geo.street_images import StreetImage
 from vico.worldgen.photos.streetview.masks import Movers, PhotoView, StandingDifferences
 from vico.worldgen.photos.streetview.matching import Matcher, SiftMatcher, opencv
 from vico.worldgen.photos.streetview.painting import FastMarching, Painter

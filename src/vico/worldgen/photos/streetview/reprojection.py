@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.geo.street_images.model import StreetImage
+from vico.geo.street_images import StreetImage
 from vico.world.model import Dropped
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.sight import Sight

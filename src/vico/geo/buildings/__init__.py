@@ -1,1 +1,0 @@
-"""Buildings that others than OpenStreetMap know: city models (CityJSON, CityGML) and Overture's footprints."""

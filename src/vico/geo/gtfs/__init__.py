@@ -1,1 +1,0 @@
-"""Timetables: zipped GTFS feeds, cut to a window."""
