@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from reporting import machine, publish
 
 import toy_city
-from vico.assets.motions.rotations import matrices_of
+from vico.assets.motions.clip import rotation_matrices
 from vico.assets.people import Appearance, J, SkinnedBody, body_of
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
@@ -146,7 +146,7 @@ def transition(first: dict[str, Any], then: dict[str, Any], look: Appearance) ->
         for k in range(len(yaw))
     ]
     rotations, offsets = (np.concatenate(parts) for parts in zip(*frames, strict=True))
-    turned = matrices_of(rotations)
+    turned = rotation_matrices(rotations)
     between = np.einsum("tjkr,tjkc->tjrc", turned[:-1], turned[1:])
     angle = np.degrees(np.arccos(np.clip((np.trace(between, axis1=2, axis2=3) - 1) / 2, -1, 1))).max(axis=1)
     change = slice(int(2 * RATE) - 1, int(2.9 * RATE))

@@ -25,10 +25,9 @@ from reporting import machine, publish
 from render import WalkingFigures, scene_to_measure, street_cameras
 from vico.errors import VicoError
 from vico.render import Cameras, Lighting, Scene
-from vico.render.frames import PictureRequest, take_pictures
-from vico.render.quality import FINE
-from vico.render.sensors.batch import Viewers
-from vico.render.sensors.lens import Lens
+from vico.render.cameras import Lens
+from vico.render.frames import FINE_QUALITY, PictureRequest, take_pictures
+from vico.render.viewers import Viewers
 
 DAY = Lighting.at(9 * 3600, 60.0)
 NIGHT_RAIN = replace(Lighting.at(23 * 3600, 52.0, day=340, clouds=0.9), wet=1.0, rain=4.0)
@@ -169,7 +168,7 @@ def own(scene: Scene, cameras: Cameras, frames: int, move: Callable[[int], None]
         scene.lighting = light
         if light is not DAY:
             lines.append(row(name, measured(by_request(scene, cameras, usual), frames, move), beside))
-        fine = measured(by_request(scene, cameras, PictureRequest(quality=FINE)), frames, move)
+        fine = measured(by_request(scene, cameras, PictureRequest(quality=FINE_QUALITY)), frames, move)
         lines.append(row(f"{name}, quality fine", fine, beside))
     scene.lighting = DAY
     depth = PictureRequest(rgb=False, segmentation=False)

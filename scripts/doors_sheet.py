@@ -14,8 +14,7 @@ from PIL import Image
 
 from vico.community import read_community
 from vico.render import Cameras
-from vico.render.frames import PictureRequest, take_pictures
-from vico.render.quality import FINE
+from vico.render.frames import FINE_QUALITY, PictureRequest, take_pictures
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.people.placement import place_in_room
@@ -49,7 +48,9 @@ def pictures(sim: Simulation, renderer: SceneRenderer, who: str, place: str, siz
             tenths[0] += 1
         if tenths[0] in (LEAVING if leaves else ENTERING):
             scene = renderer.show(state)
-            seen.append(take_pictures(scene, cameras, PictureRequest(samples=2, quality=FINE), threads=1).rgb[0])
+            seen.append(
+                take_pictures(scene, cameras, PictureRequest(samples=2, quality=FINE_QUALITY), threads=1).rgb[0]
+            )
 
     state.on_substep = look
     action = {"type": "exit"} if leaves else {"type": "enter", "place": place}

@@ -14,8 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from vico.assets.people import Appearance, J, body_of
 from vico.render import Cameras, Lighting, Scene
-from vico.render.frames import PictureRequest, take_pictures
-from vico.render.quality import FINE
+from vico.render.frames import FINE_QUALITY, PictureRequest, take_pictures
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
 from vico.sim.animation import clip_index, pose, style_of
@@ -96,7 +95,7 @@ def close_ups(looks: list[Appearance], size: int, **body: str) -> list[list[NDAr
             cameras = Cameras(
                 (middle + away)[None], -away[None], width=size, height=size, fov_y=2 * np.arctan(wide / 2 / DISTANCE)
             )
-            request = PictureRequest(samples=2, quality=FINE)
+            request = PictureRequest(samples=2, quality=FINE_QUALITY)
             pictures.append(take_pictures(scene, cameras, request, threads=1).rgb[0])
         drawn.append(pictures)
     return drawn

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models, street_models
 from vico.assets.models.model import Model
 from vico.assets.models.model import model as model_of
 from vico.assets.models.movable import movable_colours, movable_kinds, movable_surfaces
-from vico.assets.models.street import street_models
 from vico.assets.shapes import box
 from vico.render import Cameras, Scene, render
 

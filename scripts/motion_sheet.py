@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from vico.assets.models.in_hand import in_hand_models
+from vico.assets.models.library import in_hand_models
 from vico.assets.models.movable import movable_surfaces
 from vico.assets.people import Appearance, body_of
 from vico.assets.vehicles import bicycle

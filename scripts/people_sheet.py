@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from vico.assets.people import Appearance, body_of
-from vico.assets.people.weather_clothes import dressed
+from vico.assets.people.model import dress_for_weather
 from vico.community import build_community
 from vico.community.people import ResidentDraft
 from vico.community.profiles import Wardrobe, trade_clothes
@@ -104,7 +104,7 @@ def main() -> None:
         looks = [Appearance.from_dict(r.appearance) for r in people]
         names = [(f"{r.name}, {r.age}", r.occupation) for r in people]
     if arguments.temperature is not None:
-        looks = [dressed(look, arguments.temperature, arguments.rain) for look in looks]
+        looks = [dress_for_weather(look, arguments.temperature, arguments.rain) for look in looks]
     sheet(looks, names, height=arguments.height, columns=10).save(arguments.out, quality=80)
 
 

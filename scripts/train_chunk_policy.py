@@ -40,8 +40,8 @@ from vico.agents.robot.increments import ChunkShape
 from vico.datasets.folder import Dataset
 from vico.datasets.vectors import SPACE
 from vico.errors import InputError, VicoError
+from vico.io.arrays import read_npz
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
-from vico.io.npz import read_npz
 from vico.seeds import rng
 from vico.version import __version__
 

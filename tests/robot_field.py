@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vico.assets.packages import installed
+from vico.assets.packages import installed_folder
 from vico.assets.robots.packs import GO2_PACKAGE
 from vico.assets.shapes import box
 from vico.sim.bodies.arrays import RESIDENT, Bodies
@@ -34,7 +34,8 @@ PACKS = [
     pytest.param(
         True,
         marks=pytest.mark.skipif(
-            installed(GO2_PACKAGE) is None, reason="the Go2 package is not installed (vico assets install robots)"
+            installed_folder(GO2_PACKAGE) is None,
+            reason="the Go2 package is not installed (vico assets install robots)",
         ),
     ),
 ]

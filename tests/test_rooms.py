@@ -43,7 +43,7 @@ ALLOWED = {
         "llm",
         "io.compiled",
         "io.data_files",
-        "io.npz",
+        "io.arrays",
         "world.public",
         "world.routing",
         "world.trips",

@@ -9,11 +9,19 @@ import numpy as np
 import pytest
 
 from command_line import vico
-from vico.assets.generated import generate as module
-from vico.assets.generated.entry import Entry, name_of, write_entry
-from vico.assets.generated.generate import Networks, ThingRequest, check_licence, thing_of_mesh, thing_of_words
-from vico.assets.generated.raw_mesh import RawMesh, object_surface
-from vico.assets.models.street import street_models
+from vico.assets import object_generation as module
+from vico.assets.mesh_cleaning import RawMesh, object_surface
+from vico.assets.models.library import street_models
+from vico.assets.object_generation import (
+    GenerationRequest,
+    Networks,
+    ObjectEntry,
+    check_licence,
+    generate_from_mesh,
+    generate_from_text,
+    object_name,
+    write_entry,
+)
 from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError, SourceError
 from vico.io import diffusion
 from vico.io.diffusion import ModelFolder, model_folder
@@ -66,9 +74,10 @@ def test_degenerate_geometry_is_refused_with_the_reason(spoil: object, reason: s
 
 
 def test_an_entry_is_found_by_its_tag_and_thanked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = thing_of_mesh(ThingRequest("a red ball", 0.8, faces=200), ball(), digest="0" * 64, licence="CC-BY-4.0",
-                         credit='Jo "Doe"')  # fmt: skip
-    entry = Entry("red_ball", "ball", tags=("leisure=ball", "leisure=big ball"))
+    made = generate_from_mesh(
+        GenerationRequest("a red ball", 0.8, faces=200), ball(), digest="0" * 64, licence="CC-BY-4.0", credit='Jo "Doe"'
+    )
+    entry = ObjectEntry("red_ball", "ball", tags=("leisure=ball", "leisure=big ball"))
     write_entry(made, entry, tmp_path)
     with pytest.raises(OutputExistsError, match="--force"):
         write_entry(made, entry, tmp_path)
@@ -109,8 +118,8 @@ def test_a_mesh_of_a_file_comes_in_by_the_command(tmp_path: Path, capsys: pytest
     assert made["size"][2] == 2.0
     assert made["triangles"] <= 150
     assert json.loads((tmp_path / "data/generated/ball.json").read_text())["prompt"] == "a ball"
-    assert [name_of(words) for words in ("The red post box", "邮筒", "7 dwarfs")] == [
-        "red_post_box", "thing_" + name_of("邮筒")[6:], name_of("7 dwarfs")]  # fmt: skip
+    assert [object_name(words) for words in ("The red post box", "邮筒", "7 dwarfs")] == [
+        "red_post_box", "thing_" + object_name("邮筒")[6:], object_name("7 dwarfs")]  # fmt: skip
 
 
 def toy_folder(path: Path, *, weights: str = "model.safetensors", card: str = "---\nlicense: mit\n---\n") -> Path:
@@ -179,7 +188,7 @@ class Counted:
 
 def test_the_same_words_and_seed_ask_no_network_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VICO_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(module, "versions", lambda: {"torch": "1"})
+    monkeypatch.setattr(module, "network_versions", lambda: {"torch": "1"})
     for name in ("DiffusionPicture", "ShapEMesh"):
         monkeypatch.setattr(module, name, Counted)
     model = ModelFolder(tmp_path, "jo/doe", "1" * 64, "ShapEImg2ImgPipeline", "mit", None)
@@ -187,7 +196,7 @@ def test_the_same_words_and_seed_ask_no_network_twice(tmp_path: Path, monkeypatc
 
     def made(seed: int, **more: object) -> int:
         before = Counted.asked
-        thing = thing_of_words(ThingRequest("a ball", 1.0, seed, **more), networks)  # type: ignore[arg-type]
+        thing = generate_from_text(GenerationRequest("a ball", 1.0, seed, **more), networks)  # type: ignore[arg-type]
         assert thing.licence == "mit"
         assert "jo/doe (mit)" in thing.credit
         return Counted.asked - before

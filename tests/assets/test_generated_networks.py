@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from torchvision_without_kernels import make_importable
-from vico.assets.generated.generate import Networks, Thing, ThingRequest, thing_of_words
+from vico.assets.object_generation import GeneratedObject, GenerationRequest, Networks, generate_from_text
 from vico.errors import InputError
 from vico.io.diffusion import model_folder
 
@@ -123,11 +123,11 @@ def test_tiny_random_networks_make_a_thing_and_the_same_again(
 ) -> None:
     picture, mesh = model_folder(tiny / "picture"), model_folder(tiny / "mesh")
     networks = Networks(picture, mesh, steps=2, mesh_steps=2, cells=16, side=32)
-    request = ThingRequest("a ball", 1.2, seed=4, faces=400)
+    request = GenerationRequest("a ball", 1.2, seed=4, faces=400)
 
-    def made(cache: str) -> Thing:
+    def made(cache: str) -> GeneratedObject:
         monkeypatch.setenv("VICO_CACHE", str(tmp_path / cache))
-        return thing_of_words(request, networks)
+        return generate_from_text(request, networks)
 
     first, second = made("a"), made("b")
     assert first.picture == second.picture
@@ -137,8 +137,8 @@ def test_tiny_random_networks_make_a_thing_and_the_same_again(
     assert first.licence == "apache-2.0"
     assert first.record["mesh"]["revision"] == mesh.digest
     Image.fromarray(np.full((40, 40, 4), (200, 60, 60, 128), np.uint8)).save(tmp_path / "seen.png")
-    seen = thing_of_words(request, Networks(None, mesh, mesh_steps=2, cells=16), picture=tmp_path / "seen.png")
+    seen = generate_from_text(request, Networks(None, mesh, mesh_steps=2, cells=16), picture=tmp_path / "seen.png")
     assert seen.picture != first.picture
     assert "picture (" not in seen.credit
     with pytest.raises(InputError, match="its pipeline is StableDiffusionPipeline"):
-        thing_of_words(request, Networks(picture, picture, steps=2, side=32))
+        generate_from_text(request, Networks(picture, picture, steps=2, side=32))

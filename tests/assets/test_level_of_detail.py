@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.assets.people import PASSERS_BY, Appearance, J, SkinnedBody, anny, body_of, choice, passer_by, procedural
-from vico.assets.people.level_of_detail import lightened
-from vico.assets.people.store import stored_body
+from vico.assets.people import PASSERS_BY, Appearance, J, SkinnedBody, anny, bodies, body_of, passer_by, procedural
+from vico.assets.people.bodies import body_path
+from vico.assets.people.level_of_detail import simplify_body
 
 SOURCES = [
     "procedural",
@@ -113,17 +113,17 @@ def together(a: SkinnedBody, b: SkinnedBody) -> SkinnedBody:
 
 
 def test_skin_under_cloth_is_left_out_and_the_cloth_stays() -> None:
-    light = lightened(together(ball(0.10, (200, 150, 120)), ball(0.12, (20, 20, 90))), 10_000)
+    light = simplify_body(together(ball(0.10, (200, 150, 120)), ball(0.12, (20, 20, 90))), 10_000)
     assert np.unique(light.colour, axis=0).tolist() == [[20, 20, 90]]
 
 
 def test_skin_far_under_a_cloak_stays() -> None:
-    light = lightened(together(ball(0.10, (200, 150, 120)), ball(0.30, (20, 20, 90))), 10_000)
+    light = simplify_body(together(ball(0.10, (200, 150, 120)), ball(0.30, (20, 20, 90))), 10_000)
     assert len(np.unique(light.colour, axis=0)) == 2
 
 
 def test_a_closed_surface_stays_closed_when_thinned() -> None:
-    light = lightened(ball(0.2, (90, 90, 90)), 120)
+    light = simplify_body(ball(0.2, (90, 90, 90)), 120)
     assert len(light.triangles) <= 120
     edges = np.concatenate([light.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     _, place = np.unique(np.round(light.vertices, 5), axis=0, return_inverse=True)
@@ -139,14 +139,14 @@ def test_a_kept_body_equals_the_one_that_was_made(cache: Path) -> None:
 
 def test_a_kept_body_is_not_made_again(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = body_of(CROWD[1], source="procedural")
-    monkeypatch.setattr(choice, "lightened", lambda body: pytest.fail("made again"))
+    monkeypatch.setattr(bodies, "simplify_body", lambda body: pytest.fail("made again"))
     assert same(body_of(CROWD[1], source="procedural"), made)
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"\x93NUMPY"])
 def test_a_damaged_kept_body_is_made_anew(cache: Path, content: bytes) -> None:
     made = body_of(CROWD[1], source="procedural")
-    path = stored_body(CROWD[1], "procedural", None)
+    path = body_path(CROWD[1], "procedural", None)
     path.write_bytes(content)
     assert same(body_of(CROWD[1], source="procedural"), made)
     assert path.stat().st_size > 10_000

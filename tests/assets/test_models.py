@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 
 from vico.assets.interior import RISE
-from vico.assets.models.files import read_models
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models, read_models, street_models
 from vico.assets.models.movable import movable_kinds, movable_surfaces
 from vico.assets.models.parts import HERE, copies_of
 from vico.assets.models.schema import BoxPart, GroupPart
-from vico.assets.models.street import street_models
 from vico.errors import InputError, SchemaError
 from vico.io.data_files import PACKAGED
 from vico.world.model import LANDING

@@ -7,9 +7,16 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from vico.assets.models.movable import kinds_for, movable_kinds, movable_prototype, movable_surfaces
+from vico.assets.models.movable import (
+    Solid,
+    kinds_for,
+    movable_kinds,
+    movable_mass,
+    movable_prototype,
+    movable_solids,
+    movable_surfaces,
+)
 from vico.assets.models.schema import MovableEntry
-from vico.assets.models.solids import Solid, movable_mass, movable_solids
 from vico.challenges.pick_place.tasks import fitting_kinds
 
 WITH_SOLIDS = sorted(kind for kind in movable_kinds() if movable_solids(movable_prototype(kind, "red")))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vico.assets.packages import FetchError, IntegrityError, Package, extract, fetch, installed
+from vico.assets.packages import FetchError, IntegrityError, Package, extract, fetch, installed_folder
 
 
 def wheel(folder: Path, members: dict[str, bytes]) -> Path:
@@ -63,7 +63,7 @@ def test_a_file_with_another_digest_is_refused_and_nothing_is_kept(shelf: Path, 
     wanted = package(wheel(shelf, {"shapes/a.obj": b"a"}), ("shapes/*.obj",), digest="0" * 64)
     with pytest.raises(IntegrityError, match="SHA-256"):
         fetch(wanted)
-    assert installed(wanted) is None
+    assert installed_folder(wanted) is None
     assert not (tmp_path / "cache").exists()
 
 
@@ -82,7 +82,7 @@ def test_what_is_installed_is_not_fetched_again(shelf: Path, monkeypatch: pytest
 def test_wanting_other_members_makes_an_install_stale(shelf: Path) -> None:
     path = wheel(shelf, {"shapes/a.obj": b"a", "shapes/b.obj": b"b"})
     fetch(package(path, ("shapes/a.obj",)))
-    assert installed(package(path, ("shapes/b.obj",))) is None
+    assert installed_folder(package(path, ("shapes/b.obj",))) is None
 
 
 @pytest.mark.parametrize("name", ["../evil.obj", "/evil.obj", "a/../../evil.obj", "C:evil.obj"])

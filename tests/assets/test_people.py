@@ -23,8 +23,8 @@ from vico.assets.people import (
     body_of,
     random_appearance,
 )
-from vico.assets.people.cutting import cut, decimated, open_loops
-from vico.assets.people.weather_clothes import dressed
+from vico.assets.people.bake import cut, decimate, open_loops
+from vico.assets.people.model import dress_for_weather
 from vico.errors import InputError, MissingExtraError
 from vico.seeds import rng
 
@@ -201,13 +201,13 @@ def test_an_apron_goes_with_the_thighs_below_it() -> None:
 
 def test_people_dress_for_the_weather() -> None:
     summer = Appearance(top="t-shirt", bottom="shorts", shoes="sandals")
-    snow = dressed(summer, -5.0, snow=1.0)
+    snow = dress_for_weather(summer, -5.0, snow=1.0)
     assert (snow.top, snow.bottom, snow.shoes, snow.hat) == ("coat", "jeans", "boots", "beanie")
-    assert dressed(summer, 25.0) == summer
-    assert dressed(summer, 17.0, rain=2.0).top == "jacket"
-    assert dressed(Appearance(top="coat", age=80), 28.0).top == "t-shirt"
+    assert dress_for_weather(summer, 25.0) == summer
+    assert dress_for_weather(summer, 17.0, rain=2.0).top == "jacket"
+    assert dress_for_weather(Appearance(top="coat", age=80), 28.0).top == "t-shirt"
     builder = Appearance(top="hoodie", over="vest", hat="hard hat")
-    assert dressed(builder, -5.0).hat == "hard hat"
+    assert dress_for_weather(builder, -5.0).hat == "hard hat"
 
 
 def test_an_appearance_survives_json() -> None:
@@ -277,7 +277,7 @@ def test_cutting_keeps_exactly_the_positive_side() -> None:
 
 def test_thinning_a_flat_sheet_keeps_its_outline_and_area() -> None:
     points, triangles = grid(12)
-    kept, left = decimated(points, triangles, 30, np.ones(len(points)))
+    kept, left = decimate(points, triangles, 30, np.ones(len(points)))
     assert len(kept) <= 30
     assert area(points[kept], left) == pytest.approx(121, rel=0.02)
     assert len(open_loops(left)) >= 4

@@ -7,20 +7,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from vico.assets.packages import installed
+from vico.assets.packages import installed_folder
 from vico.assets.robots import BUMPER, FourLegs, robot_model, robot_names
-from vico.assets.robots.onnx import dense_layers
-from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
-from vico.assets.shading import shaded
-from vico.assets.simplify import thinned
+from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE, dense_layers
+from vico.assets.shapes import surface_with_normals
+from vico.assets.simplification import simplify_mesh
 from vico.errors import InputError, SchemaError
 from vico.world.mesh import Surface
 
 needs_go2 = pytest.mark.skipif(
-    installed(GO2_PACKAGE) is None, reason="the Go2 package is not installed (vico assets install robots)"
+    installed_folder(GO2_PACKAGE) is None, reason="the Go2 package is not installed (vico assets install robots)"
 )
 needs_husky = pytest.mark.skipif(
-    installed(HUSKY_PACKAGE) is None, reason="the Husky package is not installed (vico assets install robots)"
+    installed_folder(HUSKY_PACKAGE) is None, reason="the Husky package is not installed (vico assets install robots)"
 )
 MODELS = [("drone", False), ("husky", False), ("go2", False), ("h1", False)]
 
@@ -169,9 +168,9 @@ def test_the_installed_policy_has_the_layers_it_was_published_with() -> None:
 def test_a_decimated_sphere_stays_a_sphere() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5)
     points, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
-    light, triangles, _ = thinned(points, faces, 800)
+    light, triangles, _ = simplify_mesh(points, faces, 800)
     assert 400 < len(triangles) <= 800
     assert np.abs(np.linalg.norm(light, axis=1) - 1).max() < 0.03
-    surface = shaded(light, triangles, (9, 9, 9))
+    surface = surface_with_normals(light, triangles, (9, 9, 9))
     outward = np.einsum("ij,ij->i", surface.normals, surface.positions)
     assert outward.min() > 0.85

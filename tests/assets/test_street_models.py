@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.world.objects import FEET, GROUPS
 
 # Heights in metres between which such things are in real streets.

@@ -15,22 +15,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from vico.assets.packages import FetchError, IntegrityError
-from vico.assets.simplify import thinned
-from vico.assets.things import pack as things
-from vico.assets.things.archive import COLLECTIONS, archives
-from vico.assets.things.fit import OURS, StandIn
-from vico.assets.things.obj import read_obj
-from vico.assets.things.pack import (
+from vico.assets import furniture_pack as things
+from vico.assets.furniture_archive import COLLECTIONS, archives, read_obj
+from vico.assets.furniture_pack import (
+    OURS,
+    STAND_INS,
+    StandIn,
     available_things,
     baked_things,
     credits_of,
     fetch_things,
     our_models,
     read_things,
+    transfer_uv,
 )
-from vico.assets.things.stand_ins import STAND_INS
-from vico.assets.things.texturing import textured_again
+from vico.assets.packages import FetchError, IntegrityError
+from vico.assets.simplification import simplify_mesh
 from vico.errors import MissingExtraError, MissingFileError, SchemaError
 
 BOX = """mtllib box.mtl
@@ -164,7 +164,7 @@ def test_thinning_keeps_a_ball_round_and_a_plank_that_touches_nothing() -> None:
     points = np.concatenate([ball.vertices, plank.vertices])
     faces = np.concatenate([ball.faces, plank.faces + len(ball.vertices)])
     paint = np.r_[np.zeros(len(ball.faces), int), np.ones(len(plank.faces), int)]
-    few, kept_faces, kept = thinned(points, faces, 400, kinds=paint)
+    few, kept_faces, kept = simplify_mesh(points, faces, 400, kinds=paint)
     assert 350 <= len(kept_faces) <= 400
     worn = paint[kept]
     board = few[np.unique(kept_faces[worn == 1])]
@@ -182,8 +182,8 @@ def test_a_picture_stays_in_its_place_on_a_thinned_surface() -> None:
     a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
     faces = np.concatenate([np.stack([a, a + 1, a + n], 1), np.stack([a + 1, a + n + 1, a + n], 1)])
     paint = np.zeros(len(faces), int)
-    few, kept_faces, kept = thinned(points, faces, 60, kinds=paint)
-    uv = textured_again(few, kept_faces, paint[kept], points, faces, points[faces][..., :2], paint)
+    few, kept_faces, kept = simplify_mesh(points, faces, 60, kinds=paint)
+    uv = transfer_uv(few, kept_faces, paint[kept], points, faces, points[faces][..., :2], paint)
     assert len(kept_faces) <= 60
     assert np.allclose(uv, few[kept_faces][..., :2], atol=1e-9)
     assert np.allclose([few.min(0), few.max(0)], [points.min(0), points.max(0)], atol=1e-3)

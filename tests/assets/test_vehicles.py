@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from vico.assets.bus import BUS_DOORS, bus_door_leaves
-from vico.assets.tram import tram_prototypes
-from vico.assets.vehicle_lights import night_lamps
-from vico.assets.vehicles import vehicle_prototypes, vehicle_size
+from vico.assets.transit_vehicles import BUS_DOORS, bus_door_leaves, tram_prototypes
+from vico.assets.vehicles import night_lamps, vehicle_prototypes, vehicle_size
 
 NAMES = sorted(vehicle_prototypes())
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.assets.people import Appearance, J, SkinnedBody, body_of
-from vico.assets.people.worn import worn
+from vico.assets.people.custom_body import fit_custom_body
 from vico.errors import MissingFileError, SchemaError
 from vico.render.skinning import batch_bodies, skin
 
@@ -133,7 +133,7 @@ def placed(body: SkinnedBody, rotations: NDArray[np.float32]) -> NDArray[np.floa
 
 
 def test_a_textured_head_is_worn_on_the_neck_and_turns_with_it(tmp_path: Path) -> None:
-    body = worn(plain(), head_file(tmp_path / "head.glb"))
+    body = fit_custom_body(plain(), head_file(tmp_path / "head.glb"))
     new = slice(len(plain().vertices), None)
     rest = np.zeros((55, 3), np.float32)
     head = placed(body, rest)[new]
@@ -155,7 +155,7 @@ def test_a_textured_head_is_worn_on_the_neck_and_turns_with_it(tmp_path: Path) -
 
 
 def test_a_skinned_body_moves_as_its_own_joints_would(tmp_path: Path) -> None:
-    body = worn(plain(), body_file(tmp_path / "body.glb", plain()))
+    body = fit_custom_body(plain(), body_file(tmp_path / "body.glb", plain()))
     assert body.height == plain().height
     bent = np.zeros((55, 3), np.float32)
     bent[J["left_elbow"]] = 0.0, 0.0, -1.0
@@ -167,7 +167,7 @@ def test_a_skinned_body_moves_as_its_own_joints_would(tmp_path: Path) -> None:
 
 def test_files_that_cannot_be_worn_are_refused_with_their_name(tmp_path: Path) -> None:
     with pytest.raises(MissingFileError, match=r"none\.glb"):
-        worn(plain(), tmp_path / "none.glb")
+        fit_custom_body(plain(), tmp_path / "none.glb")
     whole = head_file(tmp_path / "head.glb").read_bytes()
     for k, data in enumerate(
         (b"", b"glTF", whole[:200], whole.replace(b'"POSITION": 0', b'"POSITION": 9'), whole[:-60])
@@ -175,4 +175,4 @@ def test_files_that_cannot_be_worn_are_refused_with_their_name(tmp_path: Path) -
         damaged = tmp_path / f"damaged{k}.glb"
         damaged.write_bytes(data)
         with pytest.raises(SchemaError, match=f"damaged{k}"):
-            worn(plain(), damaged)
+            fit_custom_body(plain(), damaged)

@@ -13,7 +13,7 @@ from vico.cli.demo import EVENING
 from vico.community.folder import COMMUNITY_FOLDER
 from vico.datasets.folder import DATASET_FOLDER
 from vico.errors import OutputExistsError
-from vico.io.folders import FolderKind
+from vico.io.files import FolderKind
 from vico.sim.recording import interventions
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.world.exports import EXPORT_FOLDER

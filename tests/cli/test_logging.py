@@ -56,6 +56,6 @@ def test_a_fault_of_the_program_is_a_sentence_and_its_traceback_is_for_who_asks(
 
 
 def test_modules_log_under_their_own_names() -> None:
-    from vico.io.http import retries
+    from vico.io import http
 
-    assert retries.log is logging.getLogger("vico.io.http.retries")
+    assert http.log is logging.getLogger("vico.io.http")

@@ -13,8 +13,8 @@ import pytest
 from command_line import vico
 from shared_folders import Shared
 from vico.agents.robot.chunk_policy import ChunkPolicy
+from vico.io.arrays import read_npz
 from vico.io.files import sha256_of
-from vico.io.npz import read_npz
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "train_chunk_policy.py"
 NO_TORCH = importlib.util.find_spec("torch") is None

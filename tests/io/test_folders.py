@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from vico.errors import InputError, OutputError, OutputExistsError
-from vico.io.folders import FolderLock, check_replaceable, is_being_written, new_folder
+from vico.io.files import FolderLock, check_replaceable, is_being_written, new_folder
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from vico.io.folders import FolderLock
+from vico.io.files import FolderLock
 lock = FolderLock(Path(sys.argv[1]))
 print("held", flush=True)
 time.sleep(60)

@@ -242,7 +242,7 @@ def test_a_server_that_drips_is_left() -> None:
 
     clock = iter(range(0, 10**6, 400))
     with serve(drip) as base, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vico.io.http.exchange.time.monotonic", lambda: float(next(clock)))
+        patch.setattr("vico.io.http.time.monotonic", lambda: float(next(clock)))
         with pytest.raises(SourceError, match="sent 1 bytes in"):
             HttpClient(retries=0, timeout=30).get(base)
 

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from vico.io.npz import read_npz
+from vico.io.arrays import read_npz
 
 
 def _archive(**arrays: object) -> bytes:

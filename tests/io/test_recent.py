@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
-from vico.io.recent import Recent
+from vico.io.memory import LruCache
 
 
 def test_what_was_not_used_longest_is_dropped() -> None:
-    table: Recent[str, int] = Recent(2)
+    table: LruCache[str, int] = LruCache(2)
     table.keep("a", 1)
     table.keep("b", 2)
     assert table.get("a") == 1
@@ -19,7 +19,7 @@ def test_what_was_not_used_longest_is_dropped() -> None:
 
 
 def test_threads_share_it() -> None:
-    table: Recent[int, int] = Recent(8)
+    table: LruCache[int, int] = LruCache(8)
 
     def use(seed: int) -> None:
         for k in range(4_000):

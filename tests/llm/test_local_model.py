@@ -10,8 +10,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict
 
 from toytown import make_world
-from vico.assets.language_model import SMALL_LANGUAGE_MODEL, small_language_model
-from vico.assets.packages import installed
+from vico.assets.packages import SMALL_LANGUAGE_MODEL, installed_folder, small_language_model
 from vico.community import build_community, check_community
 from vico.community.llm import LlmCommunityAuthor
 from vico.errors import InputError, MissingExtraError, MissingFileError
@@ -19,7 +18,7 @@ from vico.llm import Budget, Connection, Endpoint, LanguageModel, Sampling, user
 from vico.llm.local import serve_model
 
 HAS_SERVER = importlib.util.find_spec("xllamacpp") is not None
-HAS_MODEL = installed(SMALL_LANGUAGE_MODEL) is not None
+HAS_MODEL = installed_folder(SMALL_LANGUAGE_MODEL) is not None
 
 needs_server = pytest.mark.skipif(not HAS_SERVER, reason="no xllamacpp: pip install 'virtual-community[llm]'")
 needs_model = pytest.mark.skipif(not HAS_MODEL, reason="no small model: vico assets install llm")

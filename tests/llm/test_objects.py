@@ -7,8 +7,7 @@ import time
 import pytest
 
 from asked_person import ANNA, DRAFT, GOOD, Person
-from vico.llm.objects import is_one_object, objects_in
-from vico.llm.replies import read
+from vico.llm.replies import is_one_object, objects_in, parse_reply
 
 
 @pytest.mark.parametrize(
@@ -23,7 +22,7 @@ from vico.llm.replies import read
 )
 @pytest.mark.parametrize("before", ["", f"Draft: {DRAFT}\nFinal: ", f"```json\n{DRAFT}\n```\nBetter:\n"])
 def test_what_loses_nothing_is_mended_in_the_last_object(before: str, final: str) -> None:
-    assert read(before + final, Person, None).value == ANNA
+    assert parse_reply(before + final, Person, None).value == ANNA
 
 
 @pytest.mark.parametrize(
@@ -42,7 +41,7 @@ def test_what_loses_nothing_is_mended_in_the_last_object(before: str, final: str
     ],
 )
 def test_a_draft_is_not_taken_where_the_answer_is_broken(final: str) -> None:
-    found = read(f"Draft: {DRAFT}\nFinal: {final}", Person, None)
+    found = parse_reply(f"Draft: {DRAFT}\nFinal: {final}", Person, None)
     assert found.value is None
     assert [one[:25] for one in found.findings] == ["the JSON object is broken"]
 
@@ -58,7 +57,7 @@ def test_a_draft_is_not_taken_where_the_answer_is_broken(final: str) -> None:
     ],
 )
 def test_an_answer_after_what_is_broken_is_taken(text: str) -> None:
-    assert read(text, Person, None).value == ANNA
+    assert parse_reply(text, Person, None).value == ANNA
 
 
 def test_literals_of_python_are_mended_outside_strings_only() -> None:

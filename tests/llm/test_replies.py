@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, Field
 
-from vico.io.http.exchange import retry_after
-from vico.llm.replies import read, response_format
+from vico.io.http import retry_after
+from vico.llm.replies import parse_reply, response_format
 
 
 class Point(BaseModel):
@@ -28,7 +28,7 @@ class Point(BaseModel):
 @settings(max_examples=150, deadline=None)
 @given(st.text(alphabet=st.sampled_from('{}[]":,\\ truefalsn0123.eE-xyzw\n\x1b\ud800é')))
 def test_any_text_is_read_or_refused_with_a_reason(text: str) -> None:
-    found = read(text, Point, None)
+    found = parse_reply(text, Point, None)
     assert (found.value is None) == bool(found.findings)
     assert all(one.isprintable() for one in found.findings)
 
@@ -41,7 +41,7 @@ def test_any_text_is_read_or_refused_with_a_reason(text: str) -> None:
 )
 def test_a_record_is_found_whatever_is_said_around_it(x: float, words: list[str], around: str) -> None:
     point = Point(x=x, words=[word for word in words if "</think>" not in word])
-    found = read(f"{around}{point.model_dump_json()}{around.replace('</think>', '')}", Point, None)
+    found = parse_reply(f"{around}{point.model_dump_json()}{around.replace('</think>', '')}", Point, None)
     assert found.value == point
 
 
@@ -51,7 +51,7 @@ def test_a_record_is_found_whatever_is_said_around_it(x: float, words: list[str]
 )
 def test_hostile_replies_are_given_up_soon(text: str) -> None:
     start = time.process_time()
-    assert read(text, Point, None).findings
+    assert parse_reply(text, Point, None).findings
     assert time.process_time() - start < 3.0
 
 

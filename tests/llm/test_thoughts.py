@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from asked_person import ANNA, DRAFT, GOOD, Person
-from vico.llm.replies import read, said_in
-from vico.llm.thoughts import without_thoughts
+from vico.llm.replies import parse_reply, reply_text, without_thoughts
 
 
 @pytest.mark.parametrize(
@@ -41,7 +40,7 @@ from vico.llm.thoughts import without_thoughts
     ],
 )
 def test_the_answer_is_taken_and_the_thought_is_not(text: str) -> None:
-    assert read(text, Person, None).value == ANNA
+    assert parse_reply(text, Person, None).value == ANNA
 
 
 @pytest.mark.parametrize(
@@ -54,19 +53,19 @@ def test_the_answer_is_taken_and_the_thought_is_not(text: str) -> None:
     ],
 )
 def test_a_thought_without_an_answer_is_no_answer(text: str) -> None:
-    found = read(text, Person, None)
+    found = parse_reply(text, Person, None)
     assert found.value is None
     assert found.findings in (["the reply is thought and no answer"], ["the reply holds no JSON object"])
 
 
 def test_words_in_a_record_are_no_thought() -> None:
-    named = read('{"name": "<think>er</think>", "age": 41}', Person, None).value
+    named = parse_reply('{"name": "<think>er</think>", "age": 41}', Person, None).value
     assert named is not None
     assert named.name == "<think>er</think>"
 
 
 def test_a_draft_is_not_taken_where_the_answer_is_refused() -> None:
-    found = read(f"{DRAFT} or rather {GOOD}", Person, lambda one: ["too old"] if one.age > 40 else [])
+    found = parse_reply(f"{DRAFT} or rather {GOOD}", Person, lambda one: ["too old"] if one.age > 40 else [])
     assert (found.value, found.findings) == (None, ["too old"])
 
 
@@ -93,7 +92,7 @@ def test_text_without_thoughts_stays_as_it_is() -> None:
     ],
 )
 def test_what_is_plainly_meant_is_taken(text: str) -> None:
-    assert read(text, Person, None).value == ANNA
+    assert parse_reply(text, Person, None).value == ANNA
 
 
 @pytest.mark.parametrize(
@@ -110,7 +109,7 @@ def test_what_is_plainly_meant_is_taken(text: str) -> None:
     ],
 )
 def test_what_is_not_plain_is_asked_for_again(text: str) -> None:
-    found = read(text, Person, None)
+    found = parse_reply(text, Person, None)
     assert found.value is None
     assert found.findings
 
@@ -153,7 +152,7 @@ def test_what_is_not_plain_is_asked_for_again(text: str) -> None:
     ],
 )
 def test_the_answer_is_found_wherever_a_server_puts_it(message: dict[str, object], finish: str) -> None:
-    assert read(said_in(message, finish), Person, None).value == ANNA
+    assert parse_reply(reply_text(message, finish), Person, None).value == ANNA
 
 
 @pytest.mark.parametrize(
@@ -164,9 +163,9 @@ def test_the_answer_is_found_wherever_a_server_puts_it(message: dict[str, object
     ],
 )
 def test_a_thought_beside_an_empty_answer_is_no_answer(message: dict[str, object], finish: str) -> None:
-    assert said_in(message, finish) == ""
+    assert reply_text(message, finish) == ""
 
 
 def test_what_a_tool_says_to_the_model_is_no_answer() -> None:
     text = f"<|start|>functions.look to=assistant<|channel|>commentary<|message|>{DRAFT}<|end|>"
-    assert read(text, Person, None).value is None
+    assert parse_reply(text, Person, None).value is None

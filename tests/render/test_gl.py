@@ -10,19 +10,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.assets.bus import bus, bus_cabin
 from vico.assets.shapes import ball, box, pose_matrix
-from vico.assets.vehicle_lights import night_lamps
+from vico.assets.transit_vehicles import bus, bus_cabin
+from vico.assets.vehicles import night_lamps
 from vico.errors import InputError, MissingExtraError
 from vico.render import Cameras, Lighting, Scene
-from vico.render.frames import PictureRequest, take_pictures
+from vico.render.cameras import Lens
+from vico.render.frames import FINE_QUALITY, PictureRequest, take_pictures
 from vico.render.gl.renderer import GlRenderer
-from vico.render.lamps.found import lamps_placed
 from vico.render.limbs import LIMBS
-from vico.render.quality import FINE
 from vico.render.records import GROUND_WINDOWS, OPENING, ROOM_FRONT, UPPER_WINDOWS
-from vico.render.sensors.batch import Viewers
-from vico.render.sensors.lens import Lens
+from vico.render.viewers import Viewers
+from vico.render.world_scene import placed_lamps
 from vico.sim.config import SimConfig
 from vico.world.mesh import Material, merge_surfaces
 
@@ -78,7 +77,7 @@ def scene() -> Scene:
     figure = ball((0.3, 0.3, 0.9), (-7, -5, 0.9), colour=(90, 120, 200)).of_entity(9)
     made.set_skinned(figure.positions, figure.normals, figure.triangles, figure.colour, figure.entity)
     places = np.array([pose_matrix(x, -4.0, 3.0) for x in (-9, -2, 6)])
-    made.lamps = lamps_placed(models, ["crown"] * 3, places)
+    made.lamps = placed_lamps(models, ["crown"] * 3, places)
     made.lamps["entity"][1] = 12
     return made
 
@@ -111,7 +110,7 @@ WET = replace(DAY, wet=0.8, rain=2.0)
     [
         (OUTSIDE, DAY, PictureRequest(normals=True)),
         (OUTSIDE, NIGHT, PictureRequest(normals=True)),
-        (OUTSIDE, WET, PictureRequest(normals=True, quality=FINE)),
+        (OUTSIDE, WET, PictureRequest(normals=True, quality=FINE_QUALITY)),
         (OUTSIDE, DAY, PictureRequest(normals=True, samples=2)),
         (INSIDE, DAY, PictureRequest(normals=True)),
     ],
@@ -138,7 +137,7 @@ def test_rooms_behind_glass_are_the_same_ones(both: tuple[Scene, GlRenderer]) ->
     made, gl = both
     made.lighting, made.fronts = DAY, front()
     look = Cameras(np.array([[-14.0, 0.0, 1.6]]), np.array([[1.0, 0.0, 0.0]]), width=320, height=240)
-    request = PictureRequest(quality=FINE)
+    request = PictureRequest(quality=FINE_QUALITY)
     wanted, got = take_pictures(made, look, request).rgb.astype(int), gl.take(look, request).rgb.astype(int)
     made.fronts = made.fronts[:0]
     without = gl.take(look, request).rgb.astype(int)

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 import toy_city
 from vico.assets.shapes import box
 from vico.render import Cameras, Lighting, Scene
-from vico.render.behind.fronts import room_fronts
-from vico.render.frames import PictureRequest, take_pictures
-from vico.render.quality import RenderQuality
+from vico.render.frames import PictureRequest, RenderQuality, take_pictures
 from vico.render.records import GROUND_WINDOWS, ROOM_FRONT, UPPER_WINDOWS
+from vico.render.world_scene import room_fronts
 from vico.world.mesh import Material, Surface, merge_surfaces
 from vico.world.model import Doorway
 

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from vico.assets.shapes import box, pose_matrix
-from vico.assets.vehicle_lights import night_lamps
+from vico.assets.vehicles import night_lamps
 from vico.render import Cameras, Lighting, Scene, render
-from vico.render.lamps.found import HEAD, lamps_placed, shop_lamps, with_lit_heads
-from vico.render.view_cache import ViewCache
+from vico.render.view import ViewCache
+from vico.render.world_scene import HEAD, placed_lamps, shop_lamps, with_lit_heads
 from vico.world.mesh import Material, Surface
 
 NIGHT, DAY = Lighting.at(23 * 3600), Lighting.at(12 * 3600)
@@ -32,7 +32,7 @@ def street() -> Scene:
     made = Scene(static, models, lighting=NIGHT)
     where = pose_matrix(2.0, 0.0, 0.0, 0.0)[None]
     made.place(["post"], where, [20])
-    made.lamps = np.concatenate([lamps_placed(models, ["post"], where), shop_lamps(static, ("ground_shops",))])
+    made.lamps = np.concatenate([placed_lamps(models, ["post"], where), shop_lamps(static, ("ground_shops",))])
     return made
 
 
@@ -88,7 +88,7 @@ def test_bright_parts_high_up_are_what_shines_in_a_lamp() -> None:
     assert sum(len(surface.triangles) for surface in heads) == 12
     glass = [Surface.from_triangles(np.eye(3), np.array([[0, 1, 2]]), material=Material("glass", emission=0.5))]
     assert with_lit_heads(glass) == glass
-    lamp = lamps_placed({"post": heads}, ["post"], pose_matrix(3.0, 1.0, 5.0, np.pi / 2)[None])[0]
+    lamp = placed_lamps({"post": heads}, ["post"], pose_matrix(3.0, 1.0, 5.0, np.pi / 2)[None])[0]
     assert [float(lamp[name]) for name in "xyz"] == pytest.approx([3.0, 1.5, 11.0])
 
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from vico.assets.shapes import box
 from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
-from vico.render.frames import PictureRequest, take_pictures
-from vico.render.quality import FINE, PLAIN, RenderQuality
+from vico.render.frames import FINE_QUALITY, PLAIN_QUALITY, PictureRequest, RenderQuality, take_pictures
 from vico.world.mesh import Material, Surface, merge_surfaces
 
 LOOK = Cameras(np.array([[-9.0, -3.0, 2.0]]), np.array([[1.0, 0.25, -0.12]]), width=160, height=120)
@@ -45,7 +44,7 @@ def changed(scene: Scene, **switch: bool) -> tuple[NDArray[Any], NDArray[np.int3
 
 
 def test_plain_is_what_it_was(scene: Scene) -> None:
-    assert np.array_equal(colours(scene, PLAIN), render(scene, LOOK).rgb[0])
+    assert np.array_equal(colours(scene, PLAIN_QUALITY), render(scene, LOOK).rgb[0])
 
 
 def test_corners_get_darker_and_open_ground_does_not(scene: Scene) -> None:
@@ -97,9 +96,9 @@ def test_glass_mirrors_and_walls_do_not(scene: Scene) -> None:
 
 def test_everything_together_is_the_same_with_any_number_of_threads(scene: Scene) -> None:
     two = Cameras(np.repeat(LOOK.position, 2, 0), np.repeat(LOOK.forward, 2, 0), width=160, height=120)
-    frames = take_pictures(scene, two, PictureRequest(quality=FINE), threads=2)
+    frames = take_pictures(scene, two, PictureRequest(quality=FINE_QUALITY), threads=2)
     assert np.array_equal(frames.rgb[0], frames.rgb[1])
-    assert np.array_equal(frames.rgb[0], colours(scene, FINE))
+    assert np.array_equal(frames.rgb[0], colours(scene, FINE_QUALITY))
     assert np.array_equal(frames.depth[0], render(scene, LOOK).depth[0])
 
 

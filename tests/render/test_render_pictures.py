@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.assets.bus import bus, bus_cabin
 from vico.assets.shapes import ball, box, pose_matrix
+from vico.assets.transit_vehicles import bus, bus_cabin
 from vico.assets.vehicle_parts import Cabin
 from vico.render import Cameras, Lighting, Scene, render, render_top_down
 from vico.render.limbs import LIMBS

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vico.assets.shapes import box, pose_matrix
 from vico.errors import InputError
 from vico.render import Cameras, Scene, render
-from vico.render.sensors.batch import Viewers
-from vico.render.sensors.lens import Lens, directions
+from vico.render.cameras import Lens, directions
+from vico.render.viewers import Viewers
 from vico.world.mesh import merge_surfaces
 
 EAST = np.array([[0.0, 0.0, 1.5, 1.0, 0.0, 0.0]])

@@ -5,11 +5,17 @@ import pytest
 
 from vico.assets.shapes import box
 from vico.render import Cameras, Lighting, Scene, render
-from vico.render.shading.light import ReliefMap
 from vico.render.shading.shade import sky_visibility
 from vico.render.shadows.moving import _ball_shadow, _box_shadow, _contact_shadow
-from vico.render.uniforms import camera_uniforms, light_uniforms
-from vico.render.visibility.fill import PictureSize, ScreenPoint, ScreenTriangle, fill, inverse_depth, triangle_number
+from vico.render.uniforms import ReliefMap, camera_uniforms, light_uniforms
+from vico.render.visibility.rasteriser import (
+    PictureSize,
+    ScreenPoint,
+    ScreenTriangle,
+    fill,
+    inverse_depth,
+    triangle_number,
+)
 from vico.world.mesh import Material, Surface
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)

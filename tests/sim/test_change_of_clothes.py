@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.assets.people.weather_clothes import dressed
-from vico.render.between import moment_of, show_between
+from vico.assets.people.model import dress_for_weather
+from vico.render.motion import moment_of, show_interpolated
 from vico.sim.config import SimConfig
 from vico.sim.environment.weather import Weather
 from vico.sim.loop.simulation import Simulation
@@ -46,7 +46,7 @@ def test_who_leaves_home_in_snow_has_a_coat_on_and_who_stays_has_not(sim: Simula
     drawn.follow(sim.state)
     look = drawn.looks[0]
     assert look.top == "coat"
-    assert look == dressed(look, -6.0, 0.0, 1.0)
+    assert look == dress_for_weather(look, -6.0, 0.0, 1.0)
     assert drawn.looks[1] == sim.looks[1]
     assert len(drawn.batch.vertices) != len(first.vertices) or not np.array_equal(drawn.batch.colour, first.colour)
     # Back in time they have not changed.
@@ -67,7 +67,7 @@ def test_between_two_moments_the_others_move_on_when_somebody_has_changed(sim: S
     entity = int(state.people.entity[2])
     middle = []
     for share in (0.0, 0.5, 1.0):
-        scene = show_between(before, after, share)
+        scene = show_interpolated(before, after, share)
         spans = scene.arrays.avatars.span
         span = next(s for s in spans if scene.arrays.mesh.entity[s["first_triangle"]] == entity)
         middle.append(float(scene.arrays.mesh.x[span["first_vertex"] : span["end_vertex"]].mean()))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.render.sensors.batch import PictureSet
+from vico.render.viewers import PictureSet
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import toy_city
 from vico.agents.schedule import ScheduleFollower
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.assets.people import J
 from vico.seeds import rng
 from vico.sim.bodies.rooms import Indoor
@@ -61,7 +61,7 @@ def furnished(beds: Sequence[dict[str, Any]] | None = None) -> World:
         _piece("bench", -20.0, -15.0, 0.0, (0.6, 1.7, 0.9), ""),
     ]
 
-    from vico.assets.models.street import street_models
+    from vico.assets.models.library import street_models
 
     models = furniture_models() | street_models()
     parts = {name: getattr(world, name) for name in ("height", "buildings", "places", "entrances", "rooms", "roads")}

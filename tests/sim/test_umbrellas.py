@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import toy_city
-from vico.assets.models.in_hand import in_hand_models
+from vico.assets.models.library import in_hand_models
 from vico.sim.animation import Hold
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation

@@ -18,10 +18,10 @@ from vico.cli.film import followed
 from vico.errors import InputError, SchemaError
 from vico.io.files import write_json
 from vico.render import Scene
-from vico.render.between import SceneMoment, between, moment_of, show_between
 from vico.render.film import read_film
+from vico.render.frames import PLAIN_QUALITY
 from vico.render.limbs import LIMBS
-from vico.render.quality import PLAIN
+from vico.render.motion import SceneMoment, interpolate_transforms, moment_of, show_interpolated
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run, read_run
@@ -101,7 +101,7 @@ def test_a_film_cuts_between_the_shots_of_a_file(run: Run, tmp_path: Path) -> No
     ]
     path = tmp_path / "shots.json"
     write_json(path, {"schema_name": "vico.shots", "version": 1, "shots": shots})
-    plain = FilmSettings(follow="", width=96, height=64, rate=10, samples=1, quality=PLAIN)
+    plain = FilmSettings(follow="", width=96, height=64, rate=10, samples=1, quality=PLAIN_QUALITY)
     read = [
         Span(replace(plain, follow=s.follow, view=s.view, angle=s.angle, speed=s.speed), int(s.start), int(s.stop))
         for s in read_shots(path)
@@ -146,7 +146,7 @@ def test_people_are_filmed_by_name(run: Run, tmp_path: Path) -> None:
     agent, name = next((agent, name) for agent, name in run.names.items() if agent.startswith("resident"))
     assert name != agent
     assert followed(run, name.upper(), 0, run.last, option="film: --follow") == agent
-    by_name = FilmSettings(follow=name, width=64, height=64, samples=1, quality=PLAIN)
+    by_name = FilmSettings(follow=name, width=64, height=64, samples=1, quality=PLAIN_QUALITY)
     picture = still(repeated(run), by_name, 5)
     assert np.array_equal(picture, still(repeated(run), replace(by_name, follow=agent), 5))
 
@@ -183,7 +183,7 @@ def test_what_is_there_for_a_part_of_the_run_alone_is_told_with_its_times(
 def test_half_way_is_half_turned_and_as_large() -> None:
     a, b = pose_matrix(0, 0, 0, 0.2)[None, :3], pose_matrix(1.0, 0, 2.0, 0.8)[None, :3]
     a, b = (m.astype(np.float32) * np.array([2, 2, 2, 1], np.float32) for m in (a, b))
-    half = between(a, b, 0.5)[0]
+    half = interpolate_transforms(a, b, 0.5)[0]
     assert math.atan2(half[1, 0], half[0, 0]) == pytest.approx(0.5, abs=1e-4)
     assert np.linalg.norm(half[:, 0]) == pytest.approx(2.0, abs=1e-4)
     assert half[:, 3].tolist() == [0.5, 0.0, 1.0]
@@ -199,7 +199,7 @@ def test_things_and_bodies_go_half_way_and_what_leaps_waits() -> None:
         limbs = np.full((1, len(LIMBS), 7), x, np.float32)
         scene.set_skinned(vertices, figure.normals, figure.triangles, figure.colour, figure.entity, limbs=limbs)
         moments.append(moment_of(scene, x))
-    show_between(*moments, 0.25)
+    show_interpolated(*moments, 0.25)
     assert scene.arrays.instances.matrix[:2, 0, 3].tolist() == [0.25, 0.0]
     assert scene.arrays.avatars.low[0].tolist() == pytest.approx([0.0, -0.25, 0.0], abs=1e-6)
     assert np.unique(scene.arrays.avatars.limbs).tolist() == [0.25]
@@ -224,13 +224,13 @@ def test_avatars_that_are_not_drawn_at_a_moment_are_nowhere_in_its_frames() -> N
         entity = scene.arrays.mesh.entity[avatars.span["first_triangle"]].tolist()
         return {one: round(float(x), 3) for one, x in zip(entity, (avatars.low + avatars.high)[:, 0] / 2, strict=True)}
 
-    show_between(moments[0], moments[1], 0.25)
+    show_interpolated(moments[0], moments[1], 0.25)
     assert places() == {11: 0.25, 12: 0.25}
-    show_between(moments[1], moments[2], 1.0)
+    show_interpolated(moments[1], moments[2], 1.0)
     assert places() == {10: 2.0, 12: 2.0}
-    show_between(moments[2], moments[3], 0.5)
+    show_interpolated(moments[2], moments[3], 0.5)
     assert places() == {}
-    show_between(moments[0], moments[1], 1.0)
+    show_interpolated(moments[0], moments[1], 1.0)
     assert places() == {11: 1.0, 12: 1.0}
 
 

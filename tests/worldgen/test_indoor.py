@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vico.assets.models.files import read_models
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models, read_models
 from vico.assets.models.movable import movable_kinds
 from vico.io.data_files import PACKAGED
 from vico.rules import REACH

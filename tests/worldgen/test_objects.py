@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
+from vico.assets.models.library import street_models
 from vico.assets.models.plants import plant_models
-from vico.assets.models.street import street_models
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField

@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay

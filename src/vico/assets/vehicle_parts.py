@@ -75,7 +75,7 @@ def inside_lights(low: tuple[float, float, float], high: tuple[float, float, flo
     return replace(one_surface([ceiling, floor]), material=SHINING)
 
 
-def mirrored(surface: Surface) -> Surface:
+def mirror(surface: Surface) -> Surface:
     """Return the same with left and right exchanged."""
     other = np.array([1.0, -1.0, 1.0], np.float32)
     return replace(
@@ -139,7 +139,7 @@ def arch(x: float, y: float, radius: float, sill: float) -> Surface:
 
 def both_sides(parts: Sequence[Surface]) -> list[Surface]:
     """Return the parts of one side and the same of the other."""
-    return [*parts, *(mirrored(part) for part in parts)]
+    return [*parts, *(mirror(part) for part in parts)]
 
 
 def panel(x0: float, x1: float, y: float, z0: float, z1: float, colour: Colour = TRIM) -> Surface:
@@ -152,7 +152,7 @@ def front(x: float, half: float, z0: float, z1: float, colour: Colour) -> Surfac
     return quads([[(x, -half, z0), (x, half, z0), (x, half, z1), (x, -half, z1)]], colour)
 
 
-def tube(a: Sequence[float], b: Sequence[float], radius: float, colour: Colour, sides: int = 5) -> Surface:
+def straight_tube(a: Sequence[float], b: Sequence[float], radius: float, colour: Colour, sides: int = 5) -> Surface:
     """Make a straight tube between two points."""
     start, end = np.asarray(a, np.float64), np.asarray(b, np.float64)
     axis = (end - start) / np.linalg.norm(end - start)

@@ -1,7 +1,8 @@
-"""Vehicles modelled from measurements: cars of five kinds, a city bus, a bicycle.
+"""Vehicles modelled from measurements: cars of five kinds, a bicycle, and the lamps of vehicles.
 
 Models stand on z = 0 with their footprint's centre at the origin, +x forward, metres. Every vehicle is closed enough to
-be seen from any side at street distance, 300 to 1200 triangles; the bus can be looked into, and out of.
+be seen from any side at street distance, 300 to 1200 triangles. Headlights and rear lights shine at night; brake lights
+and indicators are lit now and then. The bus is in `vico.assets.transit_vehicles`.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.bus import BUS_AXLES, BUS_LAMPS, BUS_SIZE, bus
 from vico.assets.shapes import Colour, box
+from vico.assets.transit_vehicles import BUS_AXLES, BUS_LAMPS, BUS_SIZE, bus, bus_inside_lights
 from vico.assets.vehicle_parts import (
     GLASS,
     HEADLIGHT,
     PLATE,
     RIM,
+    SHINING,
     TAILLIGHT,
     TRIM,
     TYRE,
@@ -30,7 +32,7 @@ from vico.assets.vehicle_parts import (
     one_surface,
     panel,
     quads,
-    tube,
+    straight_tube,
     wheel,
 )
 from vico.world.mesh import Surface
@@ -280,11 +282,11 @@ def _fittings(build: _Build, paint: Colour) -> list[Surface]:
 
 def cranks() -> Surface:
     """Make a bicycle's cranks and pedals, turning about the y axis at the origin; the left pedal is ahead."""
-    parts = [tube((0.0, -0.09, 0.0), (0.0, 0.09, 0.0), 0.015, RIM)]
+    parts = [straight_tube((0.0, -0.09, 0.0), (0.0, 0.09, 0.0), 0.015, RIM)]
     for side in (-1.0, 1.0):
         at = side * CRANK, side * 0.09, 0.0
-        parts.append(tube((0.0, side * 0.08, 0.0), at, 0.012, RIM))
-        parts.append(tube(at, (side * CRANK, side * 0.18, 0.0), 0.018, TRIM))
+        parts.append(straight_tube((0.0, side * 0.08, 0.0), at, 0.012, RIM))
+        parts.append(straight_tube(at, (side * CRANK, side * 0.18, 0.0), 0.018, TRIM))
     return one_surface(parts)
 
 
@@ -295,22 +297,22 @@ def bicycle(paint: Colour = (255, 200, 0), *, parked: bool = True) -> Surface:
     angles = np.linspace(0, 2 * np.pi, 17)
     for x in (rear, front):
         rim = [(x + np.cos(t) * radius, 0.0, radius + np.sin(t) * radius) for t in angles]
-        parts += [tube(p, q, 0.02, TYRE, 4) for p, q in pairwise(rim)]
+        parts += [straight_tube(p, q, 0.02, TYRE, 4) for p, q in pairwise(rim)]
         for t in np.linspace(0, np.pi, 4, endpoint=False):
             c, s = np.cos(t) * (radius - 0.02), np.sin(t) * (radius - 0.02)
-            parts.append(tube((x - c, 0, radius - s), (x + c, 0, radius + s), 0.004, RIM, 3))
+            parts.append(straight_tube((x - c, 0, radius - s), (x + c, 0, radius + s), 0.004, RIM, 3))
     crank, seat, head = (-0.08, 0.0, 0.29), (-0.24, 0.0, 0.78), (0.38, 0.0, 0.80)
     low_head = (0.42, 0.0, 0.62)
     for a, b in (
         (crank, seat), (crank, low_head), (seat, low_head), (crank, (rear, 0, radius)), (seat, (rear, 0, radius)),
         (head, (front, 0, radius)),
     ):  # fmt: skip
-        parts.append(tube(a, b, 0.022, paint))
+        parts.append(straight_tube(a, b, 0.022, paint))
     parts += [
-        tube(head, (0.35, 0, 1.02), 0.016, TRIM),
-        tube((0.35, 0, 1.02), (0.28, 0.29, 1.04), 0.016, TRIM),
-        tube((0.35, 0, 1.02), (0.28, -0.29, 1.04), 0.016, TRIM),
-        tube(seat, (-0.27, 0, 0.92), 0.015, RIM),
+        straight_tube(head, (0.35, 0, 1.02), 0.016, TRIM),
+        straight_tube((0.35, 0, 1.02), (0.28, 0.29, 1.04), 0.016, TRIM),
+        straight_tube((0.35, 0, 1.02), (0.28, -0.29, 1.04), 0.016, TRIM),
+        straight_tube(seat, (-0.27, 0, 0.92), 0.015, RIM),
         box((0.27, 0.15, 0.06), (-0.27, 0, 0.95), colour=TRIM),
         box((0.26, 0.34, 0.03), (0.58, 0, 0.78), colour=TRIM),
         box((0.02, 0.34, 0.2), (0.70, 0, 0.88), colour=TRIM),
@@ -320,11 +322,59 @@ def bicycle(paint: Colour = (255, 200, 0), *, parked: bool = True) -> Surface:
     ]
     if parked:
         parts += [
-            tube((-0.08, -0.09, 0.29), (-0.08, 0.09, 0.29), 0.015, RIM),
+            straight_tube((-0.08, -0.09, 0.29), (-0.08, 0.09, 0.29), 0.015, RIM),
             box((0.1, 0.09, 0.025), (-0.08, 0.15, 0.14), colour=TRIM),
             box((0.1, 0.09, 0.025), (-0.08, -0.15, 0.44), colour=TRIM),
         ]
     for t0, t1 in zip(np.linspace(0.5, 2.9, 6)[:-1], np.linspace(0.5, 2.9, 6)[1:], strict=True):
         arc = [(rear + np.cos(t) * (radius + 0.04), 0.0, radius + np.sin(t) * (radius + 0.04)) for t in (t0, t1)]
-        parts.append(tube(arc[0], arc[1], 0.018, paint, 4))
+        parts.append(straight_tube(arc[0], arc[1], 0.018, paint, 4))
     return one_surface(parts)
+
+
+_HEADLIGHT_WHITE: Colour = (255, 250, 228)
+_REAR_RED: Colour = (150, 16, 14)
+_BRAKE_RED: Colour = (255, 36, 22)
+_INDICATOR_AMBER: Colour = (255, 160, 20)
+_LAMP_OFFSET = 0.006  # m that a lit lamp stands out of its face
+_LAMP_THICKNESS = 0.012  # m
+
+
+def _vehicle_lamp(place: tuple[float, float, float], size: tuple[float, float], colour: Colour, out: float) -> Surface:
+    """Make a lit rectangle (width, height) on a face of a lamp, `out` metres forward of it."""
+    x, y, z = place
+    return box((_LAMP_THICKNESS, *size), (x + out, y, z), colour=colour, material=SHINING)
+
+
+@cache
+def night_lamps(kind: str) -> Surface:
+    """Return the headlights and rear lights of a kind of car, of the bus or a bicycle: they shine when it is dark.
+
+    With the bus comes the light in it.
+    """
+    front, rear = lamp_places(kind)
+    sizes = ((0.06, 0.06), (0.04, 0.05)) if kind == "bicycle" else ((0.24, 0.11), (0.18, 0.16))
+    lamps = both_sides(
+        [_vehicle_lamp(front, sizes[0], _HEADLIGHT_WHITE, 0.0), _vehicle_lamp(rear, sizes[1], _REAR_RED, 0.0)]
+    )
+    return one_surface([*lamps, bus_inside_lights()] if kind == "bus" else lamps)
+
+
+@cache
+def lit_lamps() -> dict[str, list[Surface]]:
+    """Return what is lit now and then: ``sedan:brake``, ``sedan:left`` and ``sedan:right``, and so on."""
+    found: dict[str, list[Surface]] = {}
+    for kind in (*CAR_KINDS, "bus"):
+        front, rear = lamp_places(kind)
+        upper, lower = (rear[0], rear[1], rear[2] + 0.04), (rear[0], rear[1], rear[2] - 0.055)
+        outer = (front[0], front[1] + 0.11, front[2])
+        left = [
+            _vehicle_lamp(lower, (0.2, 0.08), _INDICATOR_AMBER, -2 * _LAMP_OFFSET),
+            _vehicle_lamp(outer, (0.09, 0.12), _INDICATOR_AMBER, _LAMP_OFFSET),
+        ]
+        found[f"{kind}:brake"] = [
+            one_surface(both_sides([_vehicle_lamp(upper, (0.2, 0.11), _BRAKE_RED, -_LAMP_OFFSET)]))
+        ]
+        found[f"{kind}:left"] = [one_surface(left)]
+        found[f"{kind}:right"] = [one_surface(both_sides(left)[len(left) :])]
+    return found

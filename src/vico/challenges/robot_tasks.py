@@ -19,9 +19,9 @@ from pydantic import BaseModel, Field, ValidationError
 from vico.agents.robot.body import ArmBody
 from vico.agents.robot.carrier import Deck, Team
 from vico.assets.models.movable import MovableKind, movable_colours, movable_kinds
-from vico.assets.people.words import looks_in_words
+from vico.assets.people.model import describe_appearance
 from vico.assets.robots import DeckModel, MobileManipulator, RobotModel
-from vico.assets.robots.ground import narrow_ground
+from vico.assets.robots.traversability import untraversable_cells
 from vico.challenges.assistant.candidates import ChoiceQuestion, Chooser, choose
 from vico.challenges.assistant.placement import Neighbourhood
 from vico.challenges.assistant.tasks import Person, Region, Start, TaskObject
@@ -30,8 +30,7 @@ from vico.community.model import Community, Resident
 from vico.errors import InputError, SchemaError
 from vico.geometry import distance
 from vico.io.files import read_json, write_json
-from vico.kinematics.arm import Chain
-from vico.kinematics.limbs import Jaw
+from vico.kinematics.arm import Chain, Jaw
 from vico.world.model import Record
 from vico.world.walkable import OPEN, SIDEWALK
 from vico.world.world import World
@@ -228,7 +227,7 @@ class RobotReachability:
 
     def _kept_off(self, model: RobotModel) -> Grid:
         if model.name not in self._narrow:
-            self._narrow[model.name] = narrow_ground(self.world, model)
+            self._narrow[model.name] = untraversable_cells(self.world, model)
         return self._narrow[model.name]
 
 
@@ -379,4 +378,4 @@ def object_description(thing: TaskObject) -> str:
 
 def person_of(who: Resident) -> Person:
     """Return what robots are told of somebody."""
-    return Person(agent=who.id, name=who.name, looks=looks_in_words(who.appearance))
+    return Person(agent=who.id, name=who.name, looks=describe_appearance(who.appearance))

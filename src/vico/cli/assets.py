@@ -10,12 +10,18 @@ from typing import Literal
 from rich.console import Console
 from rich.table import Table
 
-from vico.assets.language_model import SMALL_LANGUAGE_MODEL, small_language_model
-from vico.assets.packages import FetchError, Package, fetch, installed
+from vico.assets.furniture_pack import PACK, available_things, credits_of, fetch_things, read_things
+from vico.assets.packages import (
+    SMALL_LANGUAGE_MODEL,
+    FetchError,
+    Package,
+    fetch,
+    installed_folder,
+    small_language_model,
+)
 from vico.assets.people.anny import available, baked_file
 from vico.assets.people.bake import PEOPLE, bake
 from vico.assets.robots import robot_model, robot_names, robot_packages
-from vico.assets.things.pack import PACK, available_things, credits_of, fetch_things, read_things
 from vico.cli.output import print_json
 from vico.io.cache import cache_folder
 from vico.viewer.three import THREE, three_module
@@ -78,9 +84,9 @@ def install(what: Pack = "all", *, pack: Path | None = None, force: bool = False
 def status(*, json: bool = False) -> int:
     """Say which packs are installed, with their licences."""
     rows = [("people", PEOPLE, available())]
-    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed(SMALL_LANGUAGE_MODEL) is not None))
-    rows += [("robots", package, installed(package) is not None) for package in robot_packages()]
-    rows.append(("viewer", THREE, installed(THREE) is not None))
+    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed_folder(SMALL_LANGUAGE_MODEL) is not None))
+    rows += [("robots", package, installed_folder(package) is not None) for package in robot_packages()]
+    rows.append(("viewer", THREE, installed_folder(THREE) is not None))
     if json:
         print_json([*(_entry(pack, package, ready) for pack, package, ready in rows), *_things()])
         return 0

@@ -21,7 +21,7 @@ from vico.cli.options import CommunityBuildOptions, RunOptions
 from vico.cli.output import check_output
 from vico.community.folder import COMMUNITY_FOLDER
 from vico.errors import OutputExistsError, StageError
-from vico.io.folders import check_replaceable
+from vico.io.files import check_replaceable
 from vico.sim.recording.schema import RUN_FOLDER
 from vico.world.world import WORLD_FOLDER
 from vico.worldgen.packaged import packaged_extract

@@ -43,8 +43,7 @@ from vico.cli.leaderboard import add_to_leaderboard
 from vico.cli.live import city_of, told
 from vico.cli.output import check_output, print_json
 from vico.errors import InputError, OutputError, OutputExistsError
-from vico.io.files import write_errors
-from vico.io.folders import is_being_written, new_folder
+from vico.io.files import is_being_written, new_folder, write_errors
 from vico.io.stores import Store, is_url, store_at
 from vico.runner.foreign import Terms, check_loads
 from vico.runner.loading import load_agent

@@ -16,7 +16,7 @@ from vico.cli.viewer_options import FilmOptions, StillOptions
 from vico.clock import seconds_of_day
 from vico.errors import InputError, MissingFileError, OutputExistsError, some_of
 from vico.render.film import partial_film
-from vico.render.quality import RenderQuality
+from vico.render.frames import RenderQuality
 from vico.sim.config import find_by_name
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun

@@ -13,7 +13,7 @@ from vico.cli.output import print_json
 from vico.errors import InputError
 
 if TYPE_CHECKING:
-    from vico.assets.generated.generate import Thing, ThingRequest
+    from vico.assets.object_generation import GeneratedObject, GenerationRequest
 
 
 @dataclass(frozen=True)
@@ -116,12 +116,11 @@ class GenerateOptions:
 
 def generate(options: GenerateOptions) -> int:
     """Make the thing and write it; say where it is and how worlds come to show it."""
-    from vico.assets.generated.entry import Entry, check_free, name_of, write_entry
-    from vico.assets.generated.generate import ThingRequest
+    from vico.assets.object_generation import GenerationRequest, ObjectEntry, check_name_free, object_name, write_entry
 
-    entry = Entry(options.name or name_of(options.prompt), options.kind, not options.passable, options.tag)
-    check_free(entry, options.out, force=options.force)
-    request = ThingRequest(
+    entry = ObjectEntry(options.name or object_name(options.prompt), options.kind, not options.passable, options.tag)
+    check_name_free(entry, options.out, force=options.force)
+    request = GenerationRequest(
         options.prompt, options.size, options.seed, along=options.size_of, turn=options.turn, faces=options.faces
     )
     thing = _of_words(options, request) if options.mesh is None else _of_mesh(options.mesh, options, request)
@@ -140,21 +139,20 @@ def generate(options: GenerateOptions) -> int:
     return 0
 
 
-def _of_mesh(mesh: Path, options: GenerateOptions, request: ThingRequest) -> Thing:
-    from vico.assets.generated.generate import thing_of_mesh
-    from vico.assets.generated.given_mesh import mesh_of_file
+def _of_mesh(mesh: Path, options: GenerateOptions, request: GenerationRequest) -> GeneratedObject:
+    from vico.assets.mesh_cleaning import read_mesh_file
+    from vico.assets.object_generation import generate_from_mesh
     from vico.io.files import sha256_of
 
-    raw = mesh_of_file(mesh, up=options.up)
-    return thing_of_mesh(request, raw, digest=sha256_of(mesh), licence=options.licence, credit=options.credit)
+    raw = read_mesh_file(mesh, up=options.up)
+    return generate_from_mesh(request, raw, digest=sha256_of(mesh), licence=options.licence, credit=options.credit)
 
 
-def _of_words(options: GenerateOptions, request: ThingRequest) -> Thing:
-    from vico.assets.generated.generate import Networks, model_names, thing_of_words
-    from vico.assets.generated.networks import versions
+def _of_words(options: GenerateOptions, request: GenerationRequest) -> GeneratedObject:
+    from vico.assets.object_generation import Networks, generate_from_text, model_names, network_versions
     from vico.io.diffusion import model_folder
 
-    versions()  # says what is missing before anything is fetched
+    network_versions()  # says what is missing before anything is fetched
     names = model_names()
     picture_model = None if options.picture is not None else model_folder(options.text_to_image or names.text_to_image)
     networks = Networks(
@@ -166,7 +164,7 @@ def _of_words(options: GenerateOptions, request: ThingRequest) -> Thing:
         side=options.side,
         device=options.device,
     )
-    return thing_of_words(
+    return generate_from_text(
         request, networks, picture=options.picture, accept_licence=options.accept_licence,
         say=lambda sentence: print(sentence, file=sys.stderr),
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from vico.assets.language_model import small_language_model
+from vico.assets.packages import small_language_model
 from vico.llm.local import serve_model
 
 

@@ -25,7 +25,7 @@ from rich.progress import (
 from rich.table import Table
 
 from vico.errors import InputError
-from vico.io.folders import FolderKind, check_replaceable
+from vico.io.files import FolderKind, check_replaceable
 
 Report = Callable[[str, int, int], None]
 

@@ -24,8 +24,7 @@ from vico.cli.output import Report, check_output, print_json, print_table, progr
 from vico.clock import seconds_of_day
 from vico.community import Community, read_community, read_names
 from vico.errors import InputError, OutputExistsError, SchemaError
-from vico.io.files import read_json
-from vico.io.folders import check_replaceable, remove
+from vico.io.files import check_replaceable, read_json, remove_path
 from vico.llm import LanguageModel, Sampling
 from vico.runner.control import Control
 from vico.runner.foreign import Terms, foreign_agents
@@ -304,7 +303,7 @@ class Job:
             return self._resumed(sim, agents, every, self.out, control)
         # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
         check_replaceable(self.out, force=True, kind=RUN_FOLDER)
-        remove(self.out)
+        remove_path(self.out)
         how = self._how(every)
         how["notes"]["faults"] = faults.record()
         return Leg(sim, agents, Recorder(self.out, sim, **how), faults, every)

@@ -34,8 +34,15 @@ from vico.community.model import (
     with_tags,
 )
 from vico.errors import MissingFileError, SchemaError
-from vico.io.files import read_json, write_bytes, write_json
-from vico.io.folders import FolderKind, check_replaceable, mistaken, new_folder
+from vico.io.files import (
+    FolderKind,
+    check_replaceable,
+    new_folder,
+    read_json,
+    write_bytes,
+    write_json,
+    wrong_folder_sentence,
+)
 from vico.world.folder import is_world
 from vico.world.model import Record
 from vico.world.world import World
@@ -134,7 +141,7 @@ def read_manifest(path: Path) -> CommunityManifest:
     if not path.is_dir():
         raise MissingFileError(f"{path}: no such folder; make one with vico community build")
     if not (path / "community.json").exists():
-        raise MissingFileError(mistaken(path, "community", "vico community build"))
+        raise MissingFileError(wrong_folder_sentence(path, "community", "vico community build"))
     content = read_json(path / "community.json")
     found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__
     if found != SCHEMA:

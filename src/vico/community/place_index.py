@@ -24,7 +24,7 @@ from vico.community.ride_times import RideTimes, Walks
 from vico.errors import EmptyInputError, SchemaError
 from vico.geometry import distances
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
-from vico.io.recent import Recent
+from vico.io.memory import LruCache
 from vico.rules import BED_WIDTH, WALK_SPEED
 from vico.world.model import Category, Place, Point2, Room
 from vico.world.opening_hours import DAYS, MINUTES, Coordinates, Span, customary_weekday, open_spans, weekly_hours
@@ -223,7 +223,7 @@ class PlaceIndex:
         self._rooms = PlaceRooms.of(world)
         # From the street to the farthest room: whoever has come that far is there, whatever the room.
         self._inside = self._rooms.inside
-        self._estimates: Recent[str, NDArray[np.int16]] = Recent(_ESTIMATES)
+        self._estimates: LruCache[str, NDArray[np.int16]] = LruCache(_ESTIMATES)
         self._reachable: dict[str, bool] = {}
         self._lists: dict[Category | frozenset[str], NDArray[np.int64]] = {}
         self._hours: dict[tuple[str, Date, bool], list[Span]] = {}

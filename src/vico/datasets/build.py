@@ -23,8 +23,17 @@ from vico.datasets.layout import Contents, Layout, PartEpisode, key_of, read_par
 from vico.datasets.pictures import PICTURES
 from vico.datasets.worker import CHALLENGE, PickPlaceJob, chosen_agents, plain_job
 from vico.errors import EmptyInputError, InputError
-from vico.io.files import read_json, sha256_of, write_bytes, write_errors, write_json
-from vico.io.folders import FolderLock, check_replaceable, put_in_place, remove
+from vico.io.files import (
+    FolderLock,
+    check_replaceable,
+    put_in_place,
+    read_json,
+    remove_path,
+    sha256_of,
+    write_bytes,
+    write_errors,
+    write_json,
+)
 from vico.io.stores import FolderStore
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.jobs.shared import seen_by_all
@@ -408,7 +417,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
     _take(partial)
     with FolderLock(partial, name=out):
         parts = partial / "parts"
-        remove(parts / ".scratch")
+        remove_path(parts / ".scratch")
         shared = FolderStore(parts)
         options = {"parts": str(shared), "contents": request.contents.record()}
         reasons: dict[int, str] = {}
@@ -435,7 +444,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
         record = _write_dataset(partial / "dataset", layout, request, missing)
         with write_errors(out):
             put_in_place(partial / "dataset", out)
-            remove(partial)
+            remove_path(partial)
     return Built(out, record, missing)
 
 
@@ -457,7 +466,7 @@ def layout_of(request: BuildRequest, episodes: Sequence[PartEpisode]) -> Layout:
 
 def _write_dataset(folder: Path, layout: Layout, request: BuildRequest, missing: Sequence[str]) -> Mapping[str, Any]:
     """Write the dataset into a folder that is made anew; return what ``dataset.json`` says."""
-    remove(folder)
+    remove_path(folder)
     folder.mkdir()
     FORMATS[layout.contents.to].assemble(folder, layout)
     write_tables(folder, layout)

@@ -17,8 +17,7 @@ from vico.datasets.formats.registry import FORMATS
 from vico.datasets.layout import IMAGES, STATUSES, Layout
 from vico.datasets.vectors import SPACE, VectorForm, action_form_of
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.io.files import read_json, sha256_of, write_json
-from vico.io.folders import FolderKind, listed_in
+from vico.io.files import FolderKind, files_of_manifest, read_json, sha256_of, write_json
 from vico.version import __version__
 
 _UNITS = {
@@ -176,7 +175,7 @@ def _limits(layout: Layout, record: Mapping[str, Any]) -> str:
 
 SCHEMA, VERSION = "vico.dataset", 1
 #: What a build of a dataset makes.
-DATASET_FOLDER = FolderKind("dataset", "dataset.json", listed_in("dataset.json"))
+DATASET_FOLDER = FolderKind("dataset", "dataset.json", files_of_manifest("dataset.json"))
 RECORD, EPISODES, ENTITIES = "dataset.json", "episodes.parquet", "entities.parquet"
 _EPISODE_FIELDS = {
     "frames": pa.int64(),

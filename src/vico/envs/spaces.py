@@ -19,7 +19,7 @@ from gymnasium import spaces
 from vico.rules import LONGEST_TEXT
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
 from vico.sim.actions.model import Field
-from vico.sim.cameras import USUAL_OUTPUTS, Lens, shape_of
+from vico.sim.cameras import USUAL_OUTPUTS, Lens, output_shape
 from vico.sim.robots import ActionSpace, Reading
 
 #: Characters that texts of observations hold: ASCII, and the letters of Latin, Greek and Cyrillic script with their
@@ -123,7 +123,7 @@ def picture_space(output: str, lens: Lens) -> spaces.Box:
         "semantic": (0, 255),
     }
     low, high = bounds[output]
-    shape, kind = shape_of(output, lens)
+    shape, kind = output_shape(output, lens)
     return spaces.Box(low, high, shape, kind)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import MissingExtraError
-from vico.io.gltf_file import COMPONENTS, GltfFault, GltfFile, faults_told, node_matrix
+from vico.io.gltf_file import COMPONENTS, GltfFault, GltfFile, gltf_errors, node_matrix
 
 _KNOWN = {
     "KHR_draco_mesh_compression",
@@ -105,7 +105,7 @@ def read_gltf(data: bytes, where: str, *, resource: Callable[[str], bytes] | Non
     MissingExtraError
         If it is Draco-compressed and DracoPy is not installed.
     """
-    with faults_told(where), np.errstate(over="ignore", invalid="ignore"):  # what is not finite is sorted out later
+    with gltf_errors(where), np.errstate(over="ignore", invalid="ignore"):  # what is not finite is sorted out later
         return _Reader(GltfFile.of(data, resource)).scene()
 
 

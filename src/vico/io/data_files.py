@@ -129,7 +129,7 @@ def parse_record(text: str, kind: type[R], *, source: str = "data", guide: str =
         plain = json.dumps(tomllib.loads(text))
     except (tomllib.TOMLDecodeError, TypeError) as error:
         raise SchemaError(f"{source}: not valid TOML ({error}){_pointer(guide)}") from None
-    return _checked(plain, kind, source, guide)
+    return _validate(plain, kind, source, guide)
 
 
 def record_of(content: Mapping[str, Any], kind: type[R], *, source: str = "data", guide: str = "") -> R:
@@ -144,10 +144,10 @@ def record_of(content: Mapping[str, Any], kind: type[R], *, source: str = "data"
         plain = json.dumps(content)
     except TypeError as error:
         raise SchemaError(f"{source}: JSON has no such values ({error}){_pointer(guide)}") from None
-    return _checked(plain, kind, source, guide)
+    return _validate(plain, kind, source, guide)
 
 
-def _checked(plain: str, kind: type[R], source: str, guide: str) -> R:
+def _validate(plain: str, kind: type[R], source: str, guide: str) -> R:
     try:
         # JSON has one kind of list, which fits tuples and lists alike under strict types.
         return kind.model_validate_json(plain)

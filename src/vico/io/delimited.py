@@ -80,7 +80,7 @@ class DelimitedText:
         with self._told():
             cells = next(self._rows, [])
         self.written = [cell.strip() for cell in cells]
-        self.header = _named(self.written, columns)
+        self.header = _canonical_header(self.written, columns)
 
     @property
     def line(self) -> int:
@@ -213,7 +213,7 @@ class _Rest(io.RawIOBase):
         return len(data)
 
 
-def _named(header: list[str], columns: Mapping[str, Sequence[str]]) -> list[str]:
+def _canonical_header(header: list[str], columns: Mapping[str, Sequence[str]]) -> list[str]:
     """Return the header with columns that are known by another spelling under their own names."""
     as_written = [_plain(cell) for cell in header]
     without_remarks = [_plain(_BRACKETS.sub("", cell)) for cell in header]

@@ -75,7 +75,7 @@ def model_folder(model: str | Path, *, revision: str | None = None) -> ModelFold
     elif path.is_absolute() or str(model).startswith((".", "~")) or str(model).count("/") != 1:
         raise MissingFileError(f"{model}: no such folder, and no name of a model on a hub (OWNER/NAME)")
     else:
-        path, name = _fetched(str(model), revision), str(model)
+        path, name = _fetch(str(model), revision), str(model)
     kind, components = _components(path)
     variants = [variant for folder in components if (variant := _variant(folder)) is not None]
     return ModelFolder(
@@ -139,7 +139,7 @@ def load_pipeline(
     return loaded
 
 
-def _fetched(name: str, revision: str | None) -> Path:
+def _fetch(name: str, revision: str | None) -> Path:
     """Fetch a model's configurations and safetensors; those in half precision only where there are no others."""
     try:
         hub = importlib.import_module("huggingface_hub")

@@ -38,7 +38,7 @@ class GltfFault(ValueError):
 
 
 @contextmanager
-def faults_told(where: str) -> Iterator[None]:
+def gltf_errors(where: str) -> Iterator[None]:
     """Turn whatever a damaged file leads to into one sentence; `where` is what the file is called in it.
 
     Raises

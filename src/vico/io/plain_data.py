@@ -42,7 +42,7 @@ def encode(value: Any) -> bytes:
         If anything in it is none of this; the message says where.
     """
     arrays: list[NDArray[Any]] = []
-    shown = _shown(value, "", 0, arrays)
+    shown = _to_json(value, "", 0, arrays)
     kinds = [[array.dtype.str, list(array.shape)] for array in arrays]
     header = json.dumps({"value": shown, "arrays": kinds}, ensure_ascii=False, separators=(",", ":"))
     try:
@@ -73,7 +73,7 @@ def decode(content: bytes) -> Any:
             arrays.append(array)
         if end != len(content):
             raise SchemaError(f"plain data: {len(content) - end} bytes too many")
-        return _restored(value, arrays)
+        return _from_json(value, arrays)
     except (ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
         if isinstance(error, SchemaError):
             raise
@@ -112,7 +112,7 @@ def read_plain(path: Path) -> Any:
         raise SchemaError(f"{path}: {error}; make it anew") from None
 
 
-def _shown(value: Any, where: str, depth: int, arrays: list[NDArray[Any]]) -> Any:
+def _to_json(value: Any, where: str, depth: int, arrays: list[NDArray[Any]]) -> Any:
     """Return a value as JSON has it; arrays are put aside."""
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
@@ -129,9 +129,9 @@ def _shown(value: Any, where: str, depth: int, arrays: list[NDArray[Any]]) -> An
             raise InputError(
                 f"plain data: {where or 'the whole'}: a key is {odd!r:.40}; keys have to be text other than {_ARRAY!r}"
             )
-        return {key: _shown(part, f"{where}.{key}".lstrip("."), depth + 1, arrays) for key, part in value.items()}
+        return {key: _to_json(part, f"{where}.{key}".lstrip("."), depth + 1, arrays) for key, part in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_shown(part, f"{where}[{k}]", depth + 1, arrays) for k, part in enumerate(value)]
+        return [_to_json(part, f"{where}[{k}]", depth + 1, arrays) for k, part in enumerate(value)]
     kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else f"of type {type(value).__name__}"
     raise InputError(f"plain data: {where or 'the whole'} is {kind}; give numbers, text, lists, dicts or arrays")
 
@@ -149,12 +149,12 @@ def _array(content: bytes, start: int, name: Any, shape: Any) -> tuple[NDArray[A
     return np.frombuffer(content[start:end], dtype).reshape(shape).copy(), end
 
 
-def _restored(value: Any, arrays: list[NDArray[Any]]) -> Any:
+def _from_json(value: Any, arrays: list[NDArray[Any]]) -> Any:
     if isinstance(value, dict):
         if _ARRAY in value:
             k = value[_ARRAY]
             if type(k) is not int or k < 0 or len(value) > 1:
                 raise SchemaError("plain data: an array that is not there")
             return arrays[k]
-        return {key: _restored(part, arrays) for key, part in value.items()}
-    return [_restored(part, arrays) for part in value] if isinstance(value, list) else value
+        return {key: _from_json(part, arrays) for key, part in value.items()}
+    return [_from_json(part, arrays) for part in value] if isinstance(value, list) else value

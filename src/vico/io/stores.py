@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from vico.errors import InputError, MissingExtraError, OutputError, SourceError
-from vico.io.files import reason_of, write_bytes
-from vico.io.folders import remove
+from vico.io.files import reason_of, remove_path, write_bytes
 
 _THREADS = 16  # files that travel at a time
 
@@ -131,7 +130,7 @@ class FolderStore:
 
     def remove(self, name: str) -> None:
         """Take away a file or a whole folder."""
-        remove(self.folder / name)
+        remove_path(self.folder / name)
 
 
 class ObjectStore:

@@ -1,19 +1,134 @@
-"""Ways of an arm that touch nothing: RRT-Connect (Kuffner and LaValle, 2000) in the space of its joints."""
+"""Motion planning of an arm: paths that touch nothing, by RRT-Connect (Kuffner and LaValle, 2000) in joint space.
+
+What stands around an arm is a grid of distances to what was seen, and to the robot's own base. Angles that bring a hand
+to a pose keep the arm near a posture and off everything.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from vico.io.compiled import compiled
-from vico.kinematics.arm import Chain
-from vico.kinematics.limbs import Limbs, ball_places
-from vico.kinematics.room import Room, clearance
+from vico.kinematics.arm import (
+    Chain,
+    CollisionSpheres,
+    damped_step,
+    hand_error,
+    hand_jacobian,
+    hand_pose,
+    sphere_positions,
+)
+from vico.seeds import rng
 
 Array = NDArray[np.float64]
+
+
+class DistanceGrid(NamedTuple):
+    """Distances around a base, in its frame.
+
+    Attributes
+    ----------
+    distance
+        Metres from the cells' centres to the nearest thing, at most `FAR`, float32, shape ``(nx, ny, nz)``.
+    low
+        Corner of the grid, metres.
+    cell
+        Side of a cell, metres.
+    posts
+        The base itself: x, y, radius and top of upright cylinders, metres, shape ``(p, 4)``.
+    """
+
+    distance: NDArray[np.float32]
+    low: Array
+    cell: float
+    posts: Array
+
+
+#: Distances are no larger; nothing is known beyond the grid, so it is free.
+FAR = 1.0
+#: What an arm of about a metre reaches, metres.
+LOW, HIGH, CELL = np.array([-0.6, -1.1, -0.2]), np.array([1.3, 1.1, 1.6]), 0.025
+# Balls of links below this one belong to the torso, which the base carries.
+_FIRST_FREE = 2
+
+
+def distance_grid(points: Array, posts: Array, *, ground: float | None = None) -> DistanceGrid:
+    """Make the room of points that were seen.
+
+    Parameters
+    ----------
+    points
+        In the base's frame, metres, shape ``(n, 3)``; what lies beyond the grid is left out.
+    posts
+        See `Room`.
+    ground
+        Height of level ground below which all is taken to be solid; None where it was seen.
+    """
+    shape = np.ceil((HIGH - LOW) / CELL).astype(int)
+    free = np.ones(shape, bool)
+    cells = np.floor((points - LOW) / CELL).astype(np.int64)
+    cells = cells[((cells >= 0) & (cells < shape)).all(axis=1)]
+    free[cells[:, 0], cells[:, 1], cells[:, 2]] = False
+    if ground is not None:
+        free[:, :, : max(int(np.floor((ground - LOW[2]) / CELL)), 0)] = False
+    if free.all():
+        distance = np.full(shape, FAR, np.float32)
+    else:
+        # A point lies anywhere in its cell.
+        far = ndimage.distance_transform_edt(free, sampling=CELL) - CELL / 2
+        distance = np.clip(far, 0.0, FAR).astype(np.float32)
+    return DistanceGrid(distance, LOW.copy(), CELL, np.asarray(posts, np.float64).reshape(-1, 4))
+
+
+@compiled
+def clearance(room, limbs, places, enough):  # type: ignore[no-untyped-def]
+    """Return how far an arm's balls are from everything, metres; once less than enough is found, that.
+
+    Parameters
+    ----------
+    places
+        Of the balls, shape ``(n, 3)``.
+    """
+    least = 1e9
+    shape = room.distance.shape
+    for k in range(len(places)):
+        at = np.empty(3, np.int64)
+        inside = True
+        for i in range(3):
+            at[i] = int(np.floor((places[k, i] - room.low[i]) / room.cell))
+            inside = inside and at[i] >= 0 and at[i] < shape[i]
+        if inside:
+            least = min(least, room.distance[at[0], at[1], at[2]] - limbs.radius[k])
+        if limbs.link[k] > _FIRST_FREE:
+            for p in range(len(room.posts)):
+                aside = np.sqrt((places[k, 0] - room.posts[p, 0]) ** 2 + (places[k, 1] - room.posts[p, 1]) ** 2)
+                aside -= room.posts[p, 2]
+                above = places[k, 2] - room.posts[p, 3]
+                if above > 0.0 and aside > 0.0:
+                    aside = np.sqrt(aside * aside + above * above)
+                else:
+                    aside = max(aside, above)
+                least = min(least, aside - limbs.radius[k])
+        if least < enough:
+            return least
+    return least
+
+
+def empty_distance_grid(posts: Array) -> DistanceGrid:
+    """Return a room with nothing in it but the base."""
+    return distance_grid(np.zeros((0, 3)), posts)
+
+
+def obstacle_distance(room: DistanceGrid, limbs: CollisionSpheres, places: Array) -> float:
+    """Return how far an arm's balls are from everything, metres."""
+    return float(clearance(room, limbs, places, -1e9))
+
 
 # Radians between two looks along a way, and between two nodes of a tree; nodes of a tree at most.
 _LOOK, _STEP, _MOST = 0.06, 0.35, 1500
@@ -37,8 +152,8 @@ class Arm(NamedTuple):
     """
 
     chain: Chain
-    limbs: Limbs
-    room: Room
+    limbs: CollisionSpheres
+    room: DistanceGrid
     gap: float = 0.0
 
 
@@ -47,13 +162,13 @@ def is_free(arm: Arm, angles: Array) -> bool:
     return bool(_is_free(arm, angles, np.empty((len(arm.limbs.link), 3))))
 
 
-def way_is_free(arm: Arm, way: Array) -> bool:
+def is_path_free(arm: Arm, way: Array) -> bool:
     """Return whether an arm touches nothing all along a way, angles, shape ``(m, n)``."""
     places = np.empty((len(arm.limbs.link), 3))
     return is_free(arm, way[0]) and all(bool(_edge(arm, a, b, places)) for a, b in pairwise(way))
 
 
-def free_way(arm: Arm, start: Array, goal: Array, *, seed: int = 0) -> Array | None:
+def plan_path(arm: Arm, start: Array, goal: Array, *, seed: int = 0) -> Array | None:
     """Return angles from a start to a goal between which nothing is touched, shape ``(m, n)``; None if none is found.
 
     The way begins with the start. It is straight where nothing is in between, else found by two trees that grow
@@ -82,7 +197,7 @@ def _draw(luck):  # type: ignore[no-untyped-def]
 
 @compiled
 def _is_free(arm, angles, places):  # type: ignore[no-untyped-def]
-    ball_places(arm.chain, arm.limbs, angles, places)
+    sphere_positions(arm.chain, arm.limbs, angles, places)
     return clearance(arm.room, arm.limbs, places, arm.gap) >= arm.gap
 
 
@@ -163,14 +278,14 @@ def _connect(arm, start, goal, seed, way):  # type: ignore[no-untyped-def]
                 if reached:
                     counts[other] += 1
             if reached == 2:
-                count = _joined(nodes, before, counts, way)
-                return _shortened(arm, way, count, places, luck)
+                count = _join_trees(nodes, before, counts, way)
+                return _shorten(arm, way, count, places, luck)
         side = other
     return 0
 
 
 @compiled
-def _joined(nodes, before, counts, way):  # type: ignore[no-untyped-def]
+def _join_trees(nodes, before, counts, way):  # type: ignore[no-untyped-def]
     """Write the way from the first tree's root to the second's through their newest nodes."""
     count, k = 0, counts[0] - 1
     while True:
@@ -191,7 +306,7 @@ def _joined(nodes, before, counts, way):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _shortened(arm, way, count, places, luck):  # type: ignore[no-untyped-def]
+def _shorten(arm, way, count, places, luck):  # type: ignore[no-untyped-def]
     for _ in range(_SHORTCUTS):
         if count < 3:
             break
@@ -203,3 +318,88 @@ def _shortened(arm, way, count, places, luck):  # type: ignore[no-untyped-def]
                 way[k] = way[k + removed]
             count -= removed
     return count
+
+
+_STEPS, _LONGEST, _STARTS = 80, 0.25, 12
+# Share of what is left to the posture that a step takes; exact enough, metres and radians summed.
+_DRAWN, _EXACT = 0.15, 2e-3
+
+
+def collision_free_reach(
+    arm: Arm, goals: Sequence[Array], near: Array, *, posture: Array | None = None
+) -> tuple[Array, int] | None:
+    """Return angles that bring the hand to one of some poses and touch nothing, and which pose it is.
+
+    The poses are tried in order; each from `near`, from the posture, and from starts drawn for it. Of the solutions
+    of a pose the nearest to `near` counts.
+
+    Parameters
+    ----------
+    goals
+        Of the hand in the base's frame, shape ``(3, 4)``, the best first.
+    near
+        Angles the arm has, rad.
+    posture
+        Angles it is drawn to where the hand leaves it a choice; None for the middle of its bounds.
+    """
+    chain = arm.chain
+    drawn = (chain.low + chain.high) / 2 if posture is None else posture
+    for number, goal in enumerate(goals):
+        stream = rng(0, "inverse kinematics")
+        best: tuple[float, Array] | None = None
+        for start in range(_STARTS):
+            angles = (
+                near.copy()
+                if start == 0
+                else drawn.copy()
+                if start == 1
+                else stream.uniform(0.8 * chain.low, 0.8 * chain.high)
+            )
+            if solve_near(chain, angles, goal, drawn, _STEPS) > _EXACT or not is_free(arm, angles):
+                continue
+            far = float(np.abs(angles - near).max())
+            if best is None or far < best[0]:
+                best = far, angles
+        if best is not None:
+            return best[1], number
+    return None
+
+
+@compiled
+def solve_near(chain, angles, goal, posture, steps):  # type: ignore[no-untyped-def]
+    """Bring the hand to a pose and the joints towards a posture, in place; return what is left, metres plus radians.
+
+    Damped least squares; the pull to the posture is in the null space of the hand's motion, and within the bounds.
+    """
+    n = len(angles)
+    origins, directions, pose = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 4))
+    jacobian, error, change = np.empty((6, n)), np.empty(6), np.empty(n)
+    pull, felt, back = np.empty(n), np.empty(6), np.empty(n)
+    left = 1e9
+    for step in range(steps):
+        hand_pose(chain, angles, origins, directions, pose)
+        left = hand_error(pose, goal, error)
+        # Half a turn off there is no error that leads back.
+        if left < 1e-4 and pose[0, 0] * goal[0, 0] + pose[1, 0] * goal[1, 0] + pose[2, 0] * goal[2, 0] < 0.0:
+            return 1e9
+        if left < 1e-4 and step > steps // 2:
+            break
+        hand_jacobian(pose, origins, directions, jacobian)
+        damped_step(jacobian, error, change)
+        # In the last steps the hand alone counts.
+        share = _DRAWN if step < steps // 2 else 0.0
+        for k in range(n):
+            pull[k] = share * (posture[k] - angles[k])
+        for i in range(6):
+            felt[i] = 0.0
+            for k in range(n):
+                felt[i] += jacobian[i, k] * pull[k]
+        damped_step(jacobian, felt, back)
+        most = 0.0
+        for k in range(n):
+            change[k] += pull[k] - back[k]
+            most = max(most, abs(change[k]))
+        scale = min(1.0, _LONGEST / most) if most > 0.0 else 0.0
+        for k in range(n):
+            angles[k] = min(max(angles[k] + scale * change[k], chain.low[k]), chain.high[k])
+    return left

@@ -23,9 +23,8 @@ Any server that speaks ``POST /chat/completions`` will do. The environment names
 
 from vico.llm.budget import Budget, Usage
 from vico.llm.client import LanguageModel, Reply, Sampling
-from vico.llm.endpoint import Endpoint
-from vico.llm.messages import Message, system, user
-from vico.llm.transport import Connection
+from vico.llm.prompts import Message, system, user
+from vico.llm.transport import Connection, Endpoint
 
 __all__ = [
     "Budget", "Connection", "Endpoint", "LanguageModel", "Message", "Reply", "Sampling", "Usage", "system", "user",

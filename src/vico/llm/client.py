@@ -14,12 +14,10 @@ from pydantic import BaseModel
 from vico.errors import InputError, LlmReplyError
 from vico.io.http import Backoff, with_retries
 from vico.llm.budget import Budget, Usage
-from vico.llm.endpoint import Endpoint
-from vico.llm.messages import Message, checked, tokens_of, user
-from vico.llm.prompts import data_block
+from vico.llm.prompts import Message, check_messages, data_block, tokens_of, user
 from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
-from vico.llm.replies import Check, instruction, plain, read, refused_in, response_format, said_in
-from vico.llm.transport import Connection, RequestError, post
+from vico.llm.replies import Check, one_line, parse_reply, refusal_text, reply_text, response_format, schema_instruction
+from vico.llm.transport import Connection, Endpoint, RequestError, post
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -194,7 +192,7 @@ class LanguageModel:
         InputError
             If the messages are unusable, or the recording that is replayed holds no answer.
         """
-        said = checked(messages)
+        said = check_messages(messages)
         kept = self._kept(said, reply, check)
         if kept is not None:
             return kept
@@ -210,7 +208,7 @@ class LanguageModel:
             if answer.refusal:
                 what = _HELD_BACK if _is_filtered(answer.finish) else f"refuses: {answer.refusal[:300]}"
                 raise _unusable(self.endpoint, what, [answer.refusal], answer.text)
-            found = read(answer.text, reply, check)
+            found = parse_reply(answer.text, reply, check)
             if found.value is not None:
                 if self._cache is not None and self._replay is None:
                     self._cache.keep(self._cache.place(self.endpoint, self._whole(said, reply)), answer.text)
@@ -229,7 +227,7 @@ class LanguageModel:
             return None
         request = self._whole(said, reply)
         text = self._cache.text(self._cache.place(self.endpoint, request))
-        found = read(text, reply, check) if text is not None else None
+        found = parse_reply(text, reply, check) if text is not None else None
         if found is None or found.value is None or text is None:
             return None
         if self._recorder is not None:
@@ -241,7 +239,7 @@ class LanguageModel:
         """Return what is said after a bad reply: that reply alone, so that requests don't grow from round to round."""
         # They quote what was asked and said, so they are data, too.
         listed = data_block("findings", list(findings))
-        turns = [user(f"This can't be used. What is wrong with it:\n{listed}\nMend it. {instruction(reply)}")]
+        turns = [user(f"This can't be used. What is wrong with it:\n{listed}\nMend it. {schema_instruction(reply)}")]
         return [{"role": "assistant", "content": text[:_MOST_QUOTED]}, *turns] if text.strip() else turns
 
     def _whole(self, said: Sequence[Message], reply: type[BaseModel]) -> dict[str, Any]:
@@ -296,7 +294,7 @@ class LanguageModel:
                 break
             except RequestError as error:
                 part = self._to_leave_out(error, request, reply, tried)
-                if error.status == _FAILED and not _named(error, request):
+                if error.status == _FAILED and not _refused_parts(error, request):
                     retries -= error.tries  # a server that fails all the same is not asked more often for it
                 if part is None or retries < 0:
                     self._forget(tried)
@@ -322,7 +320,7 @@ class LanguageModel:
         """Which part of a refused request to do without, that was not tried yet, or None."""
         if error.of_messages:
             return None
-        likely = _named(error, request)
+        likely = _refused_parts(error, request)
         if not likely and error.status == _FAILED:
             likely = ["response_format"]  # llama.cpp and others fail at a schema that they can't enforce
         elif not likely and (error.status in _REFUSED or (error.status == 404 and "parameters" in error.told)):
@@ -345,7 +343,7 @@ class LanguageModel:
             try:
                 return (how.transport or post)(self.endpoint, request, how.timeout)
             except RequestError as error:
-                if error.status == _FAILED and _named(error, request):
+                if error.status == _FAILED and _refused_parts(error, request):
                     error.transient = False  # no waiting helps
                 elif error.transient and error.status == _FAILED and "response_format" in request:
                     # It may be the schema. Without such a word it is tried twice.
@@ -367,9 +365,9 @@ class LanguageModel:
             message = {} if _is_filtered(finish) else choice.get("delta")  # of a stream, where a server sends it whole
         if not isinstance(choice, dict) or not isinstance(message, dict):
             raise RequestError("its answer is no chat completion: is VICO_LLM_BASE_URL the address up to /v1?")
-        text = said_in(message, finish)
-        refusal = plain(
-            (refused_in(message) if not text.strip() else "") or ("filtered" if _is_filtered(finish) else "")
+        text = reply_text(message, finish)
+        refusal = one_line(
+            (refusal_text(message) if not text.strip() else "") or ("filtered" if _is_filtered(finish) else "")
         )
         counted = content.get("usage")
         counted = counted if isinstance(counted, dict) else {}
@@ -385,7 +383,7 @@ class LanguageModel:
         return replace(usage, cost=(usage.read * read + usage.written * written) / 1e6)
 
 
-def _named(error: RequestError, request: Mapping[str, Any]) -> list[str]:
+def _refused_parts(error: RequestError, request: Mapping[str, Any]) -> list[str]:
     """Parts of a request that a server's words name and that can be left out."""
     return [name for name in _PARTS if name in request and error.names(name)]
 
@@ -393,7 +391,7 @@ def _named(error: RequestError, request: Mapping[str, Any]) -> list[str]:
 def _in_words(said: Sequence[Message], reply: type[BaseModel]) -> list[Message]:
     """Messages that ask for a schema in their last one: not every server takes a second system message."""
     *before, last = said
-    words = instruction(reply)
+    words = schema_instruction(reply)
     content = last["content"]
     if isinstance(content, list):
         return [*before, {**last, "content": [*content, {"type": "text", "text": words}]}]

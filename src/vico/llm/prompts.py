@@ -1,7 +1,8 @@
 """Prompts as data: a TOML file a prompt, with its inputs named and the record that has to come back beside it.
 
 The package's prompts lie in ``vico/data/prompts/<room>``; a file of the same name in ``$VICO_DATA/prompts/<room>``
-takes the place of ours. ``docs/prompts.md`` says how they are written.
+takes the place of ours. ``docs/prompts.md`` says how they are written. They become messages: plain records of the chat
+protocol, text and pictures.
 
 What comes from maps, files or people is *data*: it is put in as JSON between marks that nothing in it can imitate, and
 the model is told that such text is never an instruction. That makes it harder to talk a model into something, not
@@ -10,6 +11,7 @@ impossible: what a reply may do has to be checked by whoever asked.
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import re
@@ -22,7 +24,82 @@ from pydantic import BaseModel, Field
 
 from vico.errors import InputError, SchemaError
 from vico.io.data_files import PACKAGED, DataRecord, cached_data, own_folder, read_record
-from vico.llm.messages import Message, system, user
+
+#: ``{"role": ..., "content": text or parts}``; made by `system` and `user`.
+Message = dict[str, Any]
+
+_HEADS = (("png", b"\x89PNG\r\n\x1a\n"), ("jpeg", b"\xff\xd8\xff"), ("gif", b"GIF8"))
+_MOST_PICTURE = 20 << 20  # bytes; the least of what the large services take
+
+
+def system(text: str) -> Message:
+    """Say who the model is and what it has to keep to."""
+    return {"role": "system", "content": text}
+
+
+def user(text: str, *pictures: bytes) -> Message:
+    """Say what is wanted, with pictures to look at.
+
+    Parameters
+    ----------
+    text
+        The request.
+    pictures
+        Encoded PNG, JPEG, WebP or GIF files; they travel inside the request.
+
+    Raises
+    ------
+    InputError
+        If a picture is none of these, or larger than 20 MiB.
+    """
+    if not pictures:
+        return {"role": "user", "content": text}
+    parts: list[dict[str, Any]] = [{"type": "text", "text": text}]
+    parts += [{"type": "image_url", "image_url": {"url": _data_url(picture, k)}} for k, picture in enumerate(pictures)]
+    return {"role": "user", "content": parts}
+
+
+def _data_url(picture: bytes, number: int) -> str:
+    if len(picture) > _MOST_PICTURE:
+        raise InputError(f"picture {number}: {len(picture):,} bytes; at most {_MOST_PICTURE:,} can be sent")
+    kinds = [media for media, head in _HEADS if picture.startswith(head)]
+    if picture[:4] == b"RIFF" and picture[8:12] == b"WEBP":
+        kinds.append("webp")
+    if not kinds:
+        raise InputError(f"picture {number}: neither PNG, JPEG, WebP nor GIF")
+    return f"data:image/{kinds[0]};base64,{base64.b64encode(picture).decode()}"
+
+
+def check_messages(messages: Sequence[Message]) -> list[Message]:
+    """Return the messages if they are what `system` and `user` make, or an assistant's words.
+
+    Raises
+    ------
+    InputError
+        If one is not; pictures by address are refused, as the server would fetch what the address names.
+    """
+    for k, message in enumerate(messages):
+        content = message.get("content")
+        if message.get("role") not in ("system", "user", "assistant") or not isinstance(content, (str, list)):
+            raise InputError(f"message {k}: give a role (system, user, assistant) and text, or parts")
+        for part in content if isinstance(content, list) else ():
+            url = part.get("image_url", {}).get("url", "") if part.get("type") == "image_url" else None
+            if not (isinstance(part.get("text"), str) if url is None else url.startswith("data:image/")):
+                raise InputError(f"message {k}: a part is text, or a picture as a data address")
+    if not messages:
+        raise InputError("messages: there are none")
+    return list(messages)
+
+
+def tokens_of(messages: Sequence[Message]) -> int:
+    """About how many tokens messages have: four characters each, 1,000 a picture."""
+    total = 0
+    for message in messages:
+        content = message["content"]
+        for part in [{"text": content}] if isinstance(content, str) else content:
+            total += 1000 if "image_url" in part else len(part["text"]) // 4 + 4
+    return total
+
 
 GUIDE = "docs/prompts.md"
 FOLDER = "prompts"
@@ -128,10 +205,10 @@ class Prompt:
         if unknown := sorted(inputs.keys() - wanted.keys()):
             raise InputError(f"{self.path}: {unknown[0]!r} is no input of this prompt; it takes {', '.join(wanted)}")
         said = {name: self._said(name, one, inputs[name]) for name, one in wanted.items()}
-        head = _filled(self.file.system, said)
+        head = _fill_placeholders(self.file.system, said)
         if any(one.kind == "data" for one in wanted.values()):
             head = f"{head.rstrip()}\n{_ABOUT_DATA}"
-        return [system(head), user(_filled(self.file.user, said))]
+        return [system(head), user(_fill_placeholders(self.file.user, said))]
 
     def mending(self, reply: str, findings: Sequence[str]) -> list[Message]:
         """Return what is said after a reply with faults: the reply, and what is to be mended (at most twelve things).
@@ -185,7 +262,7 @@ def _escape(character: str) -> str:
     return json.dumps(character, ensure_ascii=True)[1:-1]
 
 
-def _filled(text: str, said: Mapping[str, str]) -> str:
+def _fill_placeholders(text: str, said: Mapping[str, str]) -> str:
     """Return a text with what is said in place of the placeholders, in one pass: what is put in is not read again."""
     return _PLACEHOLDER.sub(lambda match: said[match[1]], text)
 

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.files import write_bytes, write_errors
 from vico.llm.budget import Usage
-from vico.llm.endpoint import Endpoint
+from vico.llm.transport import Endpoint
 
 _MOST_LINE = 64 << 20
 _DATA = re.compile(r"^(data:[a-z/+.-]{1,40};base64,).*", re.DOTALL)
@@ -67,9 +67,19 @@ class CallRecorder:
     def keep(self, request: Mapping[str, Any], answer: Answer, *, cached: bool) -> None:
         """Append an answer."""
         usage: dict[str, float | int] = asdict(answer.usage)
-        self._append(_Line(base=self.endpoint.base, model=self.endpoint.model, digest=digest_of(request),
-                           request=_shown(request), text=answer.text, finish=answer.finish, refusal=answer.refusal,
-                           usage=usage, cached=cached))  # fmt: skip
+        self._append(
+            _Line(
+                base=self.endpoint.base,
+                model=self.endpoint.model,
+                digest=digest_of(request),
+                request=_without_pictures(request),
+                text=answer.text,
+                finish=answer.finish,
+                refusal=answer.refusal,
+                usage=usage,
+                cached=cached,
+            )
+        )
 
     def _append(self, line: _Line) -> None:
         text = json.dumps(line.model_dump(), ensure_ascii=True)
@@ -80,13 +90,13 @@ class CallRecorder:
                 file.flush()
 
 
-def _shown(value: Any) -> Any:
+def _without_pictures(value: Any) -> Any:
     """Return a request with its pictures' bytes replaced by their digest: the recording is for eyes, too."""
     if isinstance(value, str):
         return _DATA.sub(lambda m: m[1] + hashlib.sha256(m[0].encode()).hexdigest(), value)
     if isinstance(value, Mapping):
-        return {key: _shown(item) for key, item in value.items()}
-    return [_shown(item) for item in value] if isinstance(value, Sequence) else value
+        return {key: _without_pictures(item) for key, item in value.items()}
+    return [_without_pictures(item) for item in value] if isinstance(value, Sequence) else value
 
 
 class Replay:

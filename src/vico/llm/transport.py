@@ -1,23 +1,201 @@
-"""One request to a server and its answer, in the chat completions protocol.
+"""One request to a server and its answer, in the chat completions protocol; which server and which model.
 
-What an SDK would add to `vico.io.http` (types of the protocol, retries of its own) is either not needed or has to be
-done here anyway, as sizes, times and what is told of a key are ours to answer for.
+The endpoint is named by the environment, never by a file that could be shared by mistake. Some servers stream whatever
+they are asked: an event stream is put together to one completion. What an SDK would add to `vico.io.http` (types of the
+protocol, retries of its own) is either not needed or has to be done here anyway, as sizes, times and what is told of a
+key are ours to answer for.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import os
 import re
 import socket
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import urlsplit
 
-from vico.errors import SourceError
+from vico.errors import InputError, SourceError
 from vico.io.http import HttpError, HttpRequest, Limits, send
-from vico.llm.endpoint import Endpoint
-from vico.llm.stream import completion_from_stream
+
+_OPENAI = "https://api.openai.com/v1"
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A server that speaks the chat completions protocol, and a model it serves.
+
+    Attributes
+    ----------
+    base
+        Address up to and with the version, such as ``http://127.0.0.1:8080/v1``, without a slash at its end.
+    model
+        Name of the model.
+    key
+        Sent as a bearer token; nothing is sent if empty. Never shown, recorded or cached.
+    price
+        Dollars a million tokens read, and written; None if unknown.
+
+    Raises
+    ------
+    InputError
+        If a part is unusable; the sentence names the variable that holds it.
+    """
+
+    base: str
+    model: str
+    key: str = field(default="", repr=False)
+    price: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        try:
+            parts = urlsplit(self.base)
+            usable = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port or 1) > 0
+        except ValueError:
+            usable = False
+        if not usable or re.search(r"[\s\x00-\x1f\x7f]", self.base):
+            raise InputError(
+                "VICO_LLM_BASE_URL: not an http or https address; give one such as http://127.0.0.1:8080/v1"
+            )
+        if "@" in parts.netloc or parts.query or parts.fragment:
+            raise InputError(
+                "VICO_LLM_BASE_URL: must hold no user name, query or fragment; the key goes in VICO_LLM_KEY"
+            )
+        if not self.model or len(self.model) > 300 or not self.model.isprintable():
+            raise InputError("VICO_LLM_MODEL: name the model that the server is to answer with")
+        if not (self.key.isascii() and self.key.isprintable()) or " " in self.key:
+            raise InputError("VICO_LLM_KEY: holds characters that no key has; copy it anew")
+        if self.price is not None and not all(math.isfinite(p) and p >= 0 for p in self.price):
+            raise InputError(f"VICO_LLM_PRICE: {self.price} are no prices")
+        object.__setattr__(self, "base", self.base.rstrip("/"))
+
+    @property
+    def url(self) -> str:
+        """Where completions are asked for."""
+        return f"{self.base}/chat/completions"
+
+    @classmethod
+    def from_environment(cls, environ: Mapping[str, str] | None = None) -> Endpoint:
+        """Read address, model, key and prices from the environment; `vico.llm` lists the variables.
+
+        ``OPENAI_API_KEY`` goes to OpenAI and to ``OPENAI_BASE_URL`` only: another server must not learn it.
+
+        Raises
+        ------
+        InputError
+            If no server or no model is named, or one of them is unusable.
+        """
+        env = os.environ if environ is None else environ
+        own, openai_base = env.get("VICO_LLM_BASE_URL", "").strip(), env.get("OPENAI_BASE_URL", "").strip()
+        openai_key = env.get("OPENAI_API_KEY", "").strip()
+        base = own or openai_base or (_OPENAI if openai_key else "")
+        if not base:
+            raise InputError(
+                "no language model is named: set VICO_LLM_BASE_URL (such as http://127.0.0.1:8080/v1), VICO_LLM_MODEL, "
+                "and VICO_LLM_KEY if the server wants a key"
+            )
+        key = env.get("VICO_LLM_KEY", "").strip()
+        if not key and base.rstrip("/") in (_OPENAI, openai_base.rstrip("/")):
+            key = openai_key
+        return cls(base, env.get("VICO_LLM_MODEL", "").strip(), key, _price(env.get("VICO_LLM_PRICE", "").strip()))
+
+
+def _price(text: str) -> tuple[float, float] | None:
+    if not text:
+        return None
+    try:
+        read, written = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(
+            f"VICO_LLM_PRICE: {text[:40]!r}; give dollars a million tokens read and written, such as 0.15,0.60"
+        ) from None
+    return read, written
+
+
+_WORDS = ("content", "reasoning_content", "reasoning", "refusal")
+
+
+def completion_from_stream(text: str) -> tuple[dict[str, Any] | None, bool]:
+    """Put the chunks of a stream together.
+
+    Parameters
+    ----------
+    text
+        Server-sent events, each with a chunk of a completion as its data; comments between them are skipped.
+
+    Returns
+    -------
+    dict, bool
+        The completion, or the first chunk with an ``error``, or None if the text is no such stream; and whether the
+        stream came to its end.
+    """
+    message: dict[str, Any] = {}
+    calls: dict[Any, dict[str, Any]] = {}
+    finish, usage, ended, found = None, None, False, False
+    for data in _events(text):
+        if data.strip() == "[DONE]":
+            ended = True
+            break
+        try:
+            chunk = json.loads(data)
+        except (ValueError, RecursionError):
+            break  # cut in the middle
+        if not isinstance(chunk, dict):
+            return None, False
+        if chunk.get("error"):
+            return chunk, True
+        found = True
+        usage = chunk.get("usage") or usage
+        choices = chunk.get("choices")
+        choice = choices[0] if isinstance(choices, list) and choices else None
+        if isinstance(choice, dict) and choice.get("index") in (None, 0):
+            finish = choice.get("finish_reason") or finish
+            delta = choice.get("delta") or choice.get("message") or {"content": choice.get("text")}
+            if isinstance(delta, dict):
+                _add(message, calls, delta)
+    if not found:
+        return None, False
+    if calls:
+        message["tool_calls"] = list(calls.values())
+    made = {"choices": [{"index": 0, "message": message, "finish_reason": finish}], "usage": usage}
+    return made, ended or finish is not None
+
+
+def _events(text: str) -> list[str]:
+    """Return the data of each event."""
+    found: list[str] = []
+    for event in re.split(r"\r?\n\r?\n|\r\r", text):
+        lines = [line.removeprefix("data:") for line in re.split(r"[\r\n]+", event) if line.startswith("data:")]
+        # One chunk a line, as the protocol has it; servers that leave out the blank lines between are read, too.
+        found += lines if all(_is_whole(line) for line in lines) else ["\n".join(lines)]
+    return found
+
+
+def _is_whole(data: str) -> bool:
+    return data.strip() == "[DONE]" or (data.strip().startswith("{") and data.strip().endswith("}"))
+
+
+def _add(message: dict[str, Any], calls: dict[Any, dict[str, Any]], delta: Mapping[str, Any]) -> None:
+    """Add a chunk's words and calls to what came before."""
+    for name in _WORDS:
+        more = delta.get(name)
+        if isinstance(more, str):
+            message[name] = message[name] + more if isinstance(message.get(name), str) else more
+        elif isinstance(more, list):
+            message[name] = [*message[name], *more] if isinstance(message.get(name), list) else more
+    parts = delta.get("tool_calls")
+    named = [(part.get("index", 0), part.get("function")) for part in parts or () if isinstance(part, dict)]
+    for index, function in [*named, (None, delta.get("function_call"))]:
+        if isinstance(function, dict):
+            call = calls.setdefault(index, {"function": {"name": "", "arguments": ""}})["function"]
+            call["name"] = function.get("name") or call["name"]
+            more = function.get("arguments")
+            call["arguments"] += more if isinstance(more, str) else json.dumps(more) if isinstance(more, dict) else ""
+
 
 MAX_BYTES = 8 << 20  # of an answer
 # How servers say that their filter refuses a request, and that it is longer than the model reads.
@@ -168,7 +346,7 @@ def _object(received: bytes, endpoint: Endpoint) -> dict[str, Any]:
 
 
 def _refusal(status: int, page: str, endpoint: Endpoint, wait: float | None = None) -> RequestError:
-    message, code, parameter = _told(page)
+    message, code, parameter = _error_details(page)
     said = f" ({message})" if message else ""
     transient = False
     about = f"{code} {message}"
@@ -202,7 +380,7 @@ def _refusal(status: int, page: str, endpoint: Endpoint, wait: float | None = No
     return error
 
 
-def _told(page: str) -> tuple[str, str, str]:
+def _error_details(page: str) -> tuple[str, str, str]:
     """Return message, code and parameter of an error page; its bare text where it is not the protocol's JSON."""
     try:
         found = json.loads(page)

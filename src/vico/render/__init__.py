@@ -9,7 +9,7 @@ from vico.render.cameras import Cameras
 from vico.render.frames import Frames, render, render_top_down, warm_up
 from vico.render.lighting import Lighting, sun_direction
 from vico.render.scene import Scene
-from vico.render.view_cache import ViewCache
+from vico.render.view import ViewCache
 
 __all__ = [
     "Cameras",

@@ -1,4 +1,4 @@
-"""A scene and a thread's scratch memory as plain arrays, for the compiled code."""
+"""A scene and a thread's scratch memory as plain arrays, for the compiled code; offsets of the shader's queue."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.render.geometry import Clusters, Mesh
+from vico.render.materials import Textures
 from vico.render.records import BOX, MODEL_VIEW, TRIANGLE_SETUP
-from vico.render.textures import Textures
 
 # Spare places behind a picture's last pixel: `fill` and shadows work in blocks.
 PAD = 32
@@ -161,7 +161,8 @@ class Buffers(NamedTuple):
     Attributes
     ----------
     keys
-        Inverse depth and triangle number of each pixel (see `vico.render.visibility.fill`), uint64, ``(h * w + PAD,)``.
+        Inverse depth and triangle number of each pixel (see `vico.render.visibility.rasteriser`), uint64, ``(h * w +
+        PAD,)``.
     tiles, blocks
         Bits of the inverse of the farthest depth in each tile, and in each block of tiles, uint32.
     strip
@@ -293,3 +294,15 @@ def _most_vertices(scene: SceneArrays) -> int:
 def widest(spans: NDArray[np.void]) -> int:
     """Return the most vertices of any range."""
     return int((spans["end_vertex"] - spans["first_vertex"]).max(initial=1))
+
+
+# Fields, float32: texture coordinates in texels and their step between samples; colour; normal; position; share of the
+# sky that is seen; light of its own; shares of the sun and the sky that moving things leave. `LAMPS`: light of lamps.
+U, V, SU, SV, RED, GREEN, BLUE, NX, NY, NZ, X, Y, Z, SKY, SHINE, SUN, AROUND = (k * STRIDE for k in range(17))
+F, G, A, B, LEVEL, LIT, LAMPS = (k * STRIDE for k in range(17, 24))
+# Fields, uint32: first texel, columns and rows of the texture's level, the pixel, and whose window it shows.
+START, COLUMNS, ROWS, PIXEL = (k * STRIDE for k in range(4))
+WINDOW = 14 * STRIDE
+I0, I1, I2, I3, T0, T1, T2, T3, PAIR, MIDDLE = (k * STRIDE for k in range(4, 14))
+# What is seen through a pane, once it is known: where a moving thing's share of the sun was.
+SEEN = SUN

@@ -1,14 +1,17 @@
-"""Pictures of a scene: RGB, depth and segmentation for many cameras in one call."""
+"""Pictures of a scene: RGB, depth and segmentation for many cameras in one call, and how carefully they are made.
+
+Each switch of quality has its price.
+"""
 
 from __future__ import annotations
 
 import math
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
 from weakref import WeakSet
@@ -18,22 +21,71 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.render.arrays import Buffers, buffers_for
-from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
-from vico.render.lamps.beams import LIT_FROM
+from vico.render.lamps import LIT_FROM
 from vico.render.lighting import Lighting
-from vico.render.quality import PLAIN, RenderQuality
+from vico.render.motion import NO_PAST, PastPlaces
+from vico.render.portals import show_rooms
 from vico.render.scene import Scene
-from vico.render.sensors.past import NO_PAST, PastPlaces
-from vico.render.sensors.surface import write_surface
-from vico.render.shading.finishing import occlude, smooth_edges
-from vico.render.shading.light import NO_LIGHT, Light
-from vico.render.shading.weather import draw_weather
+from vico.render.shading.post_processing import draw_weather, occlude, smooth_edges
+from vico.render.shading.surfaces import write_surface
 from vico.render.shadows.casters import new_caster
-from vico.render.uniforms import Record, camera_uniforms
-from vico.render.view import NOTHING_KEPT, Pictures, take
-from vico.render.view_cache import ViewCache, fitting_buffers
+from vico.render.uniforms import NO_LIGHT, Light, Record, camera_uniforms
+from vico.render.view import NO_STATIC_PICTURE, ViewCache, ViewOutputs, fitting_buffers, render_view
 from vico.world.mesh import Material, Surface
+
+
+@dataclass(frozen=True)
+class RenderQuality:
+    """What is done beyond a quick picture; nothing, unless told.
+
+    Attributes
+    ----------
+    soft_shadows
+        The rims of the sun's shadows are blurred instead of following the texels of the shadow map.
+    ambient_occlusion
+        Corners, and the ground beneath things, get less light from around.
+    smooth_edges
+        Edges of what stands before something else are smoothed.
+    reflections
+        Windows and other glass mirror the sky and the street.
+    interiors
+        Rooms are seen behind windows: the shop's own behind its front, behind others one that might be there.
+    """
+
+    soft_shadows: bool = False
+    ambient_occlusion: bool = False
+    smooth_edges: bool = False
+    reflections: bool = False
+    interiors: bool = False
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing is done."""
+        return not any(getattr(self, field.name) for field in fields(self))
+
+    @classmethod
+    def of(cls, wanted: str | Mapping[str, Any]) -> RenderQuality:
+        """Make a record of ``"plain"``, ``"fine"`` (everything), or of switches by name.
+
+        Raises
+        ------
+        InputError
+            If it is another word, a switch is unknown, or not true or false.
+        """
+        names = [field.name for field in fields(cls)]
+        if isinstance(wanted, str):
+            if wanted not in ("plain", "fine"):
+                raise InputError(f"quality: {wanted!r}; it has to be plain, fine, or switches: {', '.join(names)}")
+            return cls(**dict.fromkeys(names, wanted == "fine"))
+        for name, value in wanted.items():
+            if name not in names or not isinstance(value, bool):
+                raise InputError(f"quality: {name!r} is {value!r}; switches are {', '.join(names)}, true or false")
+        return cls(**wanted)
+
+
+PLAIN_QUALITY, FINE_QUALITY = RenderQuality(), RenderQuality.of("fine")
+
 
 # Squares along a side of a picture from above.
 _SQUARES = 8
@@ -136,7 +188,7 @@ class PictureRequest:
     past: tuple[PastPlaces, ...] = ()
     samples: int = 1
     moving: bool = True
-    quality: RenderQuality = PLAIN
+    quality: RenderQuality = PLAIN_QUALITY
 
     def __post_init__(self) -> None:
         if self.samples < 1:
@@ -215,7 +267,7 @@ class _How(NamedTuple):
     quality: RenderQuality
 
 
-_USUAL = _How(True, PLAIN)
+_USUAL = _How(True, PLAIN_QUALITY)
 
 
 @dataclass(frozen=True)
@@ -243,9 +295,9 @@ class _Batch:
     def _how(self) -> _How:
         return _How(self.moving, self.quality)
 
-    def pictures(self, k: int) -> Pictures:
+    def pictures(self, k: int) -> ViewOutputs:
         """Return camera `k`'s part of each kind."""
-        return Pictures(_part(self.rgb, k), _part(self.depth, k), _part(self.segmentation, k))
+        return ViewOutputs(_part(self.rgb, k), _part(self.depth, k), _part(self.segmentation, k))
 
     def render(self, k: int) -> None:
         camera = _camera(self.scene, self.cameras, k, 1)
@@ -265,7 +317,7 @@ class _Batch:
         """Take the mean of several rays a pixel for RGB; depth and segmentation of the middle ray."""
         height, width = self.rgb.shape[1:3]
         wide = np.empty((height * samples, width * samples, 3), np.uint8)
-        only_rgb = Pictures(wide, _EMPTY_F32, _EMPTY_I32)
+        only_rgb = ViewOutputs(wide, _EMPTY_F32, _EMPTY_I32)
         _take(
             self.scene,
             _camera(self.scene, self.cameras, k, samples),
@@ -353,7 +405,7 @@ def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2)
     def take(k: int) -> None:
         x, y = corners[k]
         square = np.empty((step * samples, step * samples, 3), np.uint8)
-        _take(scene, _camera(scene, cameras, k, samples), clear, Pictures(square, _EMPTY_F32, _EMPTY_I32))
+        _take(scene, _camera(scene, cameras, k, samples), clear, ViewOutputs(square, _EMPTY_F32, _EMPTY_I32))
         place = picture[y : y + step, x : x + step]
         place[:] = _mean_of_blocks(square, samples)[: place.shape[0], : place.shape[1]]
 
@@ -419,13 +471,20 @@ def _camera(scene: Scene, cameras: Cameras, k: int, samples: int) -> Record:
     return camera_uniforms(cameras, k, samples, scene.room_of(cameras.position[k]))
 
 
-def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, how: _How = _USUAL) -> int:
+def _take(scene: Scene, camera: Record, light: Light | None, out: ViewOutputs, how: _How = _USUAL) -> int:
     """Take pictures of one camera; return how many items were drawn."""
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
     if how.quality.interiors:
         buffers.glass[:] = 0
-    drawn = take(
-        scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, how.moving, new_caster(), out
+    drawn = render_view(
+        scene.arrays,
+        camera,
+        NO_LIGHT if light is None else light,
+        buffers,
+        NO_STATIC_PICTURE,
+        how.moving,
+        new_caster(),
+        out,
     )
     if light is not None and out.rgb.size:
         if how.quality.interiors:
@@ -464,8 +523,8 @@ def _picture_of_room(scene: Scene, light: Light, moving: bool, camera: Record) -
         spare = buffers_for(scene.arrays, side, side)
         _local.room_buffers = spare
     rgb = np.empty((*shape, 3), np.uint8)
-    pictures = Pictures(rgb, _EMPTY_F32, _EMPTY_I32)
-    take(scene.arrays, camera, light, spare.cut(*shape), NOTHING_KEPT, moving, new_caster(), pictures)
+    pictures = ViewOutputs(rgb, _EMPTY_F32, _EMPTY_I32)
+    render_view(scene.arrays, camera, light, spare.cut(*shape), NO_STATIC_PICTURE, moving, new_caster(), pictures)
     return rgb
 
 

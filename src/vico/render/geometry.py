@@ -143,7 +143,7 @@ def mesh_of(soup: Soup) -> Mesh:
     return Mesh(x, y, z, vertex, triangle, soup.entity)
 
 
-def joined_meshes(parts: Sequence[Mesh]) -> Mesh:
+def join_meshes(parts: Sequence[Mesh]) -> Mesh:
     """Return one mesh of several, vertex numbers shifted."""
     shifts = np.cumsum([0, *(len(part.x) for part in parts[:-1])])
     triangles = []
@@ -161,7 +161,7 @@ def joined_meshes(parts: Sequence[Mesh]) -> Mesh:
     )
 
 
-def clustered(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Clusters]:
+def cluster_triangles(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Clusters]:
     """Sort triangles into clusters of at most `CLUSTER` that are small in space and, below 20 m, in direction.
 
     A k-d split over centroids and scaled normals, one level of all clusters at a time.
@@ -201,7 +201,7 @@ def clustered(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Cluste
     span = spans(bounds[:-1], bounds[1:], vertex_bounds[:-1], vertex_bounds[1:])
     if not number:
         none = np.zeros((0, 3), np.float32)
-        return sorted_soup, grouped(none, none, np.zeros(0, NORMAL_CONE), span)
+        return sorted_soup, group_clusters(none, none, np.zeros(0, NORMAL_CONE), span)
     low = np.minimum.reduceat(sorted_soup.position, vertex_bounds[:-1])
     high = np.maximum.reduceat(sorted_soup.position, vertex_bounds[:-1])
     turned = normal[order]
@@ -215,7 +215,7 @@ def clustered(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Cluste
     cone = np.zeros(number, NORMAL_CONE)
     cone["x"], cone["y"], cone["z"] = mean.T
     cone["limit"] = np.where(usable, np.sqrt(np.maximum(1 - spread * spread, 0)) + 1e-3, NEVER_CULLED)
-    return sorted_soup, grouped(low, high, cone, span)
+    return sorted_soup, group_clusters(low, high, cone, span)
 
 
 def spans(first_triangle: Any, end_triangle: Any, first_vertex: Any, end_vertex: Any) -> NDArray[np.void]:
@@ -226,7 +226,7 @@ def spans(first_triangle: Any, end_triangle: Any, first_vertex: Any, end_vertex:
     return span
 
 
-def grouped(
+def group_clusters(
     low: NDArray[np.float32], high: NDArray[np.float32], cone: NDArray[np.void], span: NDArray[np.void]
 ) -> Clusters:
     """Return clusters with the bounds of their groups."""
@@ -236,7 +236,7 @@ def grouped(
     return Clusters(low, high, cone, span, np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts))
 
 
-def simplified(soup: Soup, cell: float) -> Soup | None:
+def simplify_by_clustering(soup: Soup, cell: float) -> Soup | None:
     """Return a coarser copy by vertex clustering on a grid; None where it would lose too much of the shape.
 
     Thin parts (poles, frames) collapse under clustering: a copy that keeps less than 70 % of the area is refused.

@@ -1,15 +1,17 @@
-"""The light of a moment: sun, sky, haze and lamps, and the tables the shader reads them from."""
+"""The light of a moment: sun, sky, haze and lamps, the tables the shader reads them from, and the painted sky."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.exact import each
+from vico.render.compiled import inlined, kernel
 from vico.seeds import rng
 
 Colour = tuple[float, float, float]
@@ -140,23 +142,21 @@ class Lighting:
         warm = _mix((1.0, 0.52, 0.24), (1.0, 0.92, 0.80), high)
         night = up < -0.03
         moonlight = 0.10 + 0.30 * moon_lit * _ramp(moon[2], 0.0, 0.3) * (1 - 0.9 * hidden)
-        sun_colour = _scaled(
-            (0.10, 0.13, 0.20) if night else warm, moonlight if night else (1.15 + 0.95 * high) * shine
-        )
+        sun_colour = _scale((0.10, 0.13, 0.20) if night else warm, moonlight if night else (1.15 + 0.95 * high) * shine)
         zenith = _mix((0.15, 0.27, 0.54), (0.17, 0.37, 0.78), high)
-        zenith = _mix((0.006, 0.010, 0.026), _mix(zenith, _scaled((0.60, 0.63, 0.68), gloom), hidden), day_share)
+        zenith = _mix((0.006, 0.010, 0.026), _mix(zenith, _scale((0.60, 0.63, 0.68), gloom), hidden), day_share)
         horizon = _mix((0.72, 0.74, 0.80), (0.80, 0.90, 1.00), high)
-        horizon = _mix((0.018, 0.024, 0.046), _mix(horizon, _scaled((0.74, 0.77, 0.80), gloom), hidden), day_share)
+        horizon = _mix((0.018, 0.024, 0.046), _mix(horizon, _scale((0.74, 0.77, 0.80), gloom), hidden), day_share)
         horizon = _mix(horizon, (0.92, 0.52, 0.30), 0.6 * glow)
         zenith = _mix(zenith, horizon, 0.9 * fogged)
         ambient = _mix((0.52, 0.55, 0.64), (0.66, 0.74, 0.90), high)
-        ambient = _mix((0.040, 0.050, 0.085), _mix(ambient, _scaled((0.74, 0.77, 0.82), gloom), hidden), day_share)
+        ambient = _mix((0.040, 0.050, 0.085), _mix(ambient, _scale((0.74, 0.77, 0.82), gloom), hidden), day_share)
         bounce = _mix((0.28, 0.24, 0.21), (0.44, 0.40, 0.34), high)
-        bounce = _mix((0.022, 0.022, 0.026), _mix(bounce, _scaled((0.34, 0.33, 0.32), gloom), hidden), day_share)
+        bounce = _mix((0.022, 0.022, 0.026), _mix(bounce, _scale((0.34, 0.33, 0.32), gloom), hidden), day_share)
         # The lamps of a town light the air above it, and walls and ground by what they throw back.
         town = lamps * (1 - day_share)
-        zenith, horizon = _added(zenith, (0.006, 0.005, 0.005), town), _added(horizon, (0.030, 0.023, 0.017), town)
-        ambient, bounce = _added(ambient, (0.024, 0.018, 0.012), town), _added(bounce, (0.024, 0.019, 0.013), town)
+        zenith, horizon = _add(zenith, (0.006, 0.005, 0.005), town), _add(horizon, (0.030, 0.023, 0.017), town)
+        ambient, bounce = _add(ambient, (0.024, 0.018, 0.012), town), _add(bounce, (0.024, 0.019, 0.013), town)
         light = (moon if moon[2] > 0.15 else (0.35, -0.30, 0.88)) if night else sun
         return cls(
             sun_direction=light,
@@ -193,11 +193,11 @@ def _mix(a: Colour, b: Colour, share: float) -> Colour:
     return (a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share)
 
 
-def _added(a: Colour, b: Colour, share: float) -> Colour:
+def _add(a: Colour, b: Colour, share: float) -> Colour:
     return (a[0] + b[0] * share, a[1] + b[1] * share, a[2] + b[2] * share)
 
 
-def _scaled(a: Colour, factor: float) -> Colour:
+def _scale(a: Colour, factor: float) -> Colour:
     return (a[0] * factor, a[1] * factor, a[2] * factor)
 
 
@@ -256,3 +256,109 @@ def cloud_map() -> NDArray[np.uint8]:
         total += (rows[:, i % cells] * (1 - f) + rows[:, (i + 1) % cells] * f) * 0.52**octave
     ranks = np.argsort(np.argsort(total, axis=None, kind="stable"), kind="stable")
     return (ranks.reshape(size, size) * 256 // (size * size)).astype(np.uint8)
+
+
+SKY_SIZE = 512
+_TONE_SCALE = (TONE_STEPS - 1) / TONE_RANGE
+
+
+@kernel
+def paint_sky(light: Any, table: Any, clouds: Any, tone: Any, out: Any) -> None:
+    """Paint the upper half of the sky, tone-mapped and packed like a texture, onto an unfolded octahedron.
+
+    The direction (x, y, z) lies at u, v = (1 + (x + y) / s) / 2, (1 + (x - y) / s) / 2 with s = |x| + |y| + z.
+    """
+    for j in range(SKY_SIZE):
+        for i in range(SKY_SIZE):
+            p, q = (i + 0.5) * (2.0 / SKY_SIZE) - 1.0, (j + 0.5) * (2.0 / SKY_SIZE) - 1.0
+            x, y = 0.5 * (p + q), 0.5 * (p - q)
+            z = max(1.0 - abs(x) - abs(y), 0.0)
+            scale = 1.0 / np.sqrt(x * x + y * y + z * z)
+            red, green, blue = _sky_colour(light, table, clouds, x * scale, y * scale, z * scale)
+            r = np.uint32(tone[min(int(red * _TONE_SCALE), TONE_STEPS - 1)])
+            g = np.uint32(tone[min(int(green * _TONE_SCALE), TONE_STEPS - 1)])
+            b = np.uint32(tone[min(int(blue * _TONE_SCALE), TONE_STEPS - 1)])
+            out[j * SKY_SIZE + i] = r | (g << np.uint32(8)) | (b << np.uint32(16))
+
+
+@kernel
+def _sky_colour(light: Any, table: Any, clouds: Any, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    """Return the linear colour of the sky (or of the haze below the horizon) in a unit direction."""
+    r, g, b = _gradient(table, dz)
+    glow, disc = _sun_glow(light, dx, dy, dz)
+    if glow > 0.0:
+        r += glow * light.sun_red
+        g += glow * light.sun_green
+        b += glow * light.sun_blue
+    if disc > 0.0:
+        r += disc * light.sun_red
+        g += disc * light.sun_green
+        b += disc * light.sun_blue
+    cover, lit = _cloud_cover(light, clouds, dx, dy, dz)
+    if cover > 0.0:
+        r += cover * (light.cloud_shade_red + lit * (light.cloud_lit_red - light.cloud_shade_red) - r)
+        g += cover * (light.cloud_shade_green + lit * (light.cloud_lit_green - light.cloud_shade_green) - g)
+        b += cover * (light.cloud_shade_blue + lit * (light.cloud_lit_blue - light.cloud_shade_blue) - b)
+    return r, g, b
+
+
+@inlined
+def _gradient(table: Any, dz: float) -> Any:
+    """Return the clear sky's colour at a sine of elevation, between two rows of `sky_table`."""
+    s = np.sqrt(abs(dz))
+    if dz < 0.0:
+        s = -s
+    place = (s + 1.0) * (0.5 * (SKY_STEPS - 1))
+    i = min(int(place), SKY_STEPS - 2)
+    f = place - i
+    r = table[i, 0] + f * (table[i + 1, 0] - table[i, 0])
+    g = table[i, 1] + f * (table[i + 1, 1] - table[i, 1])
+    b = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
+    return r, g, b
+
+
+@inlined
+def _sun_glow(light: Any, dx: float, dy: float, dz: float) -> Any:
+    """Return how much of the sun's colour its halo and its disc add."""
+    toward = dx * light.sun_x + dy * light.sun_y + dz * light.sun_z
+    if toward <= 0.0:
+        return 0.0, 0.0
+    glow = toward * toward
+    glow *= glow
+    wide = 0.07 * glow
+    glow *= glow
+    glow *= glow
+    glow *= glow
+    wide += 0.16 * glow
+    disc = min((toward - 0.9994) * 5000.0, 1.0) * 2.0 if toward > 0.9994 else 0.0
+    return wide, disc
+
+
+@inlined
+def _cloud_cover(light: Any, clouds: Any, dx: float, dy: float, dz: float) -> Any:
+    """Return how much a cloud covers, and how much of it is lit, both 0..1.
+
+    Clouds lie on a plane overhead; a second look toward the sun tells lit rims from grey bellies.
+    """
+    if dz <= 0.015:
+        return 0.0, 0.0
+    reach = 34.0 / (dz + 0.06)
+    u, v = dx * reach, dy * reach
+    thick = _cloud_thickness(clouds, u, v)
+    cover = (thick - (1.0 - light.cloud_cover)) * 4.0
+    if cover <= 0.0:
+        return 0.0, 0.0
+    beyond = _cloud_thickness(clouds, u + light.sun_x * 5.0, v + light.sun_y * 5.0)
+    lit = min(max(0.55 + (thick - beyond) * 2.2 - 0.35 * (thick - 0.75), 0.0), 1.0)
+    return min(cover, 1.0) * min((dz - 0.015) * 5.0, 1.0) * 0.9, lit
+
+
+@inlined
+def _cloud_thickness(clouds: Any, u: float, v: float) -> float:
+    """Return the cloud map's value at a place, 0..1, blended between its four neighbours."""
+    i, j = int(np.floor(u)), int(np.floor(v))
+    f, g = u - i, v - j
+    a, b = float(clouds[j & 255, i & 255]), float(clouds[j & 255, (i + 1) & 255])
+    c, d = float(clouds[(j + 1) & 255, i & 255]), float(clouds[(j + 1) & 255, (i + 1) & 255])
+    low, high = a + f * (b - a), c + f * (d - c)
+    return (low + g * (high - low)) * (1.0 / 255.0)

@@ -21,29 +21,27 @@ from vico.render.arrays import (
     SceneArrays,
     widest,
 )
-from vico.render.avatars import no_avatars, pose_avatars, with_room
 from vico.render.compiled import kernel
-from vico.render.geometry import Mesh, clustered, grouped, joined_meshes, mesh_of, soup_of, spans
+from vico.render.geometry import Mesh, cluster_triangles, group_clusters, join_meshes, mesh_of, soup_of, spans
 from vico.render.instances import (
     NO_GROUPS,
     entities_of,
-    joined_instances,
+    join_instances,
     matrix_rows,
-    neighbours_together,
-    with_spare,
+    no_avatars,
+    pose_avatars,
+    prototypes_of,
+    sort_by_locality,
+    with_avatar_capacity,
+    with_spare_capacity,
 )
-from vico.render.lamps.beams import beams_of
-from vico.render.lamps.grid import NO_LAMPS, LampGrid, lamp_grid, shining
-from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
+from vico.render.lamps import NO_LAMPS, LampGrid, beams_of, lamp_grid, shining_lamps
+from vico.render.lighting import SKY_SIZE, Lighting, cloud_map, linear_table, paint_sky, sky_table, tone_table, unit
 from vico.render.limbs import LIMBS
-from vico.render.palette import Palette
-from vico.render.prototypes import prototypes_of
+from vico.render.materials import Palette, Textures
 from vico.render.records import COUNTS, LAMP, LIT_WINDOWS, OPENING, ROOM, ROOM_FRONT, SPHERE
-from vico.render.shading.light import Light, ReliefMap, ShadowMap
-from vico.render.shading.sky import SKY_SIZE, paint_sky
 from vico.render.shadows.maps import built_tops, relief_map, shadow_map
-from vico.render.textures import Textures
-from vico.render.uniforms import Record, light_uniforms
+from vico.render.uniforms import Light, Record, ReliefMap, ShadowMap, light_uniforms
 from vico.world.mesh import Material, Surface
 
 _SHADOW_METRES, _RELIEF_METRES = 0.4, 1.5
@@ -119,10 +117,10 @@ class Scene:
         self._skin = materials.number(_SKIN)
         textures = materials.packed()
         self.material_names = materials.names
-        outside, outer = clustered(outside, textures.double_sided)
-        inside, inner = clustered(inside, textures.double_sided)
+        outside, outer = cluster_triangles(outside, textures.double_sided)
+        inside, inner = cluster_triangles(inside, textures.double_sided)
         _shift(inner.span, len(outside.triangles), len(outside.position))
-        clusters = grouped(
+        clusters = group_clusters(
             np.concatenate([outer.low, inner.low]),
             np.concatenate([outer.high, inner.high]),
             np.concatenate([outer.cone, inner.cone]),
@@ -130,10 +128,10 @@ class Scene:
         )
         where = np.full(len(clusters.span), OUTDOORS, np.uint8)
         where[len(outer.span) :] = INDOORS
-        surfaces = joined_meshes([mesh_of(outside), mesh_of(inside)])
+        surfaces = join_meshes([mesh_of(outside), mesh_of(inside)])
         placeable, model_meshes = prototypes_of(model_soups, list(models), cabins or {})
         _shift(placeable.levels, len(surfaces.triangle), len(surfaces.x))
-        mesh = joined_meshes([surfaces, *model_meshes])
+        mesh = join_meshes([surfaces, *model_meshes])
         self.names = {name: k for k, name in enumerate(models)}
         self.version = 0  # of all that stays where it is
         self.rooms = _rooms(np.zeros((0, 7)) if rooms is None else np.asarray(rooms, np.float64).reshape(-1, 7))
@@ -226,9 +224,9 @@ class Scene:
         rows = matrix_rows(transforms, len(number))
         inside = np.broadcast_to(np.asarray(indoor, bool), len(number))
         where = np.where(inside, INDOORS, OUTDOORS).astype(np.uint8)
-        added = neighbours_together(self._instances(rows, number, entities_of(entities, len(number)), where))
+        added = sort_by_locality(self._instances(rows, number, entities_of(entities, len(number)), where))
         moving = self._moving()
-        self._placed = joined_instances(self._placed, added)
+        self._placed = join_instances(self._placed, added)
         self._set_instances(moving)
         outdoors = ~inside
         if outdoors.any():
@@ -303,7 +301,7 @@ class Scene:
         first_triangle, first_vertex = self._static_size
         mesh = self.arrays.mesh
         if len(mesh.x) < first_vertex + vertex_count or len(mesh.triangle) < first_triangle + triangle_count:
-            mesh = with_room(mesh, self._static_size, vertex_count * 5 // 4, triangle_count * 5 // 4)
+            mesh = with_avatar_capacity(mesh, self._static_size, vertex_count * 5 // 4, triangle_count * 5 // 4)
             self._replace(mesh=mesh)
         known = self._clothed
         if known is None or any(a is not b for a, b in zip(known, (mesh, triangles, colour, entity), strict=True)):
@@ -415,7 +413,7 @@ class Scene:
             return NO_LAMPS
         if self._grid is None:
             self._grid = lamp_grid(self.lamps, built_tops(self.arrays, self._low, self._high))
-        return shining(self._grid, self._lighting, self.arrays.windows)
+        return shining_lamps(self._grid, self._lighting, self.arrays.windows)
 
     def light_rooms(self, lamp: ArrayLike, daylight: float) -> None:
         """Switch each room's lamps on, 0..1, shape ``(r,)``, and let a share of the daylight in by its windows."""
@@ -486,7 +484,7 @@ class Scene:
         """Put what moves behind what stays; copying all that stays is left for when there is no room."""
         fixed, count = len(self._placed.entity), len(moving.entity)
         if self._spacious is not self._placed or len(self.arrays.instances.entity) < fixed + count:
-            self._replace(instances=with_spare(self._placed, count * 5 // 4 + 8))
+            self._replace(instances=with_spare_capacity(self._placed, count * 5 // 4 + 8))
             self._spacious = self._placed
         all_of, rows = self.arrays.instances, slice(fixed, fixed + count)
         all_of.matrix[rows], all_of.prototype[rows], all_of.entity[rows] = (

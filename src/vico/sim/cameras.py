@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
-from vico.render.sensors.batch import USUAL_OUTPUTS, shape_of
-from vico.render.sensors.lens import Lens
+from vico.render.cameras import Lens
+from vico.render.viewers import USUAL_OUTPUTS, output_shape
 from vico.sim.config import SimConfig
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.world import World
@@ -154,4 +154,13 @@ def lenses_by_entity(state: SimulationState, config: SimConfig) -> dict[int, Len
     return dict(zip(entities, lenses_of(state, config).values(), strict=True))
 
 
-__all__ = ["CLASSES", "USUAL_OUTPUTS", "Lens", "SemanticClasses", "Views", "lenses_by_entity", "lenses_of", "shape_of"]
+__all__ = [
+    "CLASSES",
+    "USUAL_OUTPUTS",
+    "Lens",
+    "SemanticClasses",
+    "Views",
+    "lenses_by_entity",
+    "lenses_of",
+    "output_shape",
+]

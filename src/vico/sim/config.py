@@ -18,9 +18,9 @@ import numpy as np
 
 from vico.clock import DAY
 from vico.errors import InputError, some_of
-from vico.render.quality import RenderQuality
-from vico.render.sensors.batch import RENDERERS, USUAL_OUTPUTS, checked_outputs
-from vico.render.sensors.lens import Lens
+from vico.render.cameras import Lens
+from vico.render.frames import RenderQuality
+from vico.render.viewers import RENDERERS, USUAL_OUTPUTS, check_outputs
 from vico.sim.traffic.junctions import JunctionRule
 
 __all__ = ["LIMITS", "NO_DAY", "PHYSICS_ENGINES", "SimConfig", "SimSettings", "check_types", "find_by_name"]
@@ -72,15 +72,15 @@ class SimSettings:
     image
         Side of the square images, pixels, of whom `cameras` say nothing about.
     outputs
-        What those who see are given, some of `vico.render.sensors.batch.OUTPUTS`: colour, depth and segmentation
+        What those who see are given, some of `vico.render.viewers.OUTPUTS`: colour, depth and segmentation
         unless told; also normals, optical flow and classes.
     cameras
-        Lenses that are not the usual one: records of `vico.render.sensors.lens.Lens` by agent's name, by model for
+        Lenses that are not the usual one: records of `vico.render.cameras.Lens` by agent's name, by model for
         robots, or for all ``"residents"``, ``"assistants"`` or ``"robots"``; the first of these that is there holds.
     worn
         Files (.glb) of heads and bodies that people wear, by agent's name; docs/adding_people.md.
     quality
-        How carefully pictures are made: ``"plain"``, ``"fine"``, or switches of `vico.render.quality.RenderQuality`.
+        How carefully pictures are made: ``"plain"``, ``"fine"``, or switches of `vico.render.frames.RenderQuality`.
     renderer
         What makes pictures: ``"cpu"``, or ``"gl"`` for OpenGL (extra ``gl``); they agree but for rounding.
     memory
@@ -218,7 +218,7 @@ class SimConfig(SimSettings):
             raise InputError(f"simulation: start is second {self.start} of the day; it has to be 0..{DAY - 1}")
         if not 16 <= self.image <= 1024:
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
-        object.__setattr__(self, "outputs", checked_outputs(self.outputs))
+        object.__setattr__(self, "outputs", check_outputs(self.outputs))
         for name in ("assistant_places", "robot_places"):
             object.__setattr__(self, name, _checked_places(name, getattr(self, name)))
         RenderQuality.of(self.quality)

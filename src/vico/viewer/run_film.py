@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError
-from vico.render.between import SceneMoment, moment_of, show_between
 from vico.render.film import FilmWriter
-from vico.render.frames import PictureRequest, take_pictures
-from vico.render.quality import FINE, RenderQuality
+from vico.render.frames import FINE_QUALITY, PictureRequest, RenderQuality, take_pictures
+from vico.render.motion import SceneMoment, moment_of, show_interpolated
 from vico.sim.pictures.city import renderer_of
 from vico.sim.pictures.scene import SceneRenderer
 from vico.sim.state.simulation_state import SimulationState
@@ -58,7 +57,7 @@ class FilmSettings:
     height: int = 1080
     rate: int = 25
     samples: int = 2
-    quality: RenderQuality = FINE
+    quality: RenderQuality = FINE_QUALITY
 
     def __post_init__(self) -> None:
         if self.width % 2 or self.height % 2 or not (64 <= self.width <= 7680 and 64 <= self.height <= 4320):
@@ -202,7 +201,7 @@ def _frames(repeated: RepeatedRun, settings: FilmSettings, first: int, last: int
 def _picture(
     before: _Seen, after: _Seen, share: float, camera: FollowCamera, settings: FilmSettings, dt: float
 ) -> NDArray[np.uint8]:
-    scene = show_between(before.moment, after.moment, share)
+    scene = show_interpolated(before.moment, after.moment, share)
     eye = camera.look(scene, target_between(before.target, after.target, share), dt)
     request = PictureRequest(depth=False, segmentation=False, samples=settings.samples, quality=settings.quality)
     return take_pictures(scene, eye, request, threads=1).rgb[0]

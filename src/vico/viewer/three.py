@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vico.assets.packages import Package, installed
+from vico.assets.packages import Package, installed_folder
 from vico.errors import MissingFileError
 
 _MODULE = "nicegui/elements/scene/dist/index.js"
@@ -29,7 +29,7 @@ def three_module() -> Path:
     MissingFileError
         If it is not installed.
     """
-    folder = installed(THREE)
+    folder = installed_folder(THREE)
     if folder is None:
         raise MissingFileError("the page's 3D library is not installed; type: vico assets install viewer")
     return folder / _MODULE

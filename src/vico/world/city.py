@@ -27,9 +27,8 @@ from pydantic import Field, ValidationError
 
 from vico.errors import MissingFileError, SchemaError
 from vico.geo import overlay
-from vico.io.arrays import drop_pages, mapped_array
+from vico.io.arrays import drop_pages, mapped_array, read_npz
 from vico.io.files import read_json
-from vico.io.npz import read_npz
 from vico.world.heights import Decks, HeightField, Stairs, Steps
 from vico.world.mesh import Surface
 from vico.world.model import (

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.io.arrays import read_npz
 from vico.io.compiled import compiled
-from vico.io.npz import read_npz
 from vico.world.grid_search import (
     CELL,
     DIAGONAL,

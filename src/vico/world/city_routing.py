@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import SchemaError
 from vico.io.arrays import drop_pages
-from vico.io.recent import Recent
+from vico.io.memory import LruCache
 from vico.world.city import STEPS
 from vico.world.city_gates import GateGraph, Gates, Ints, ReachedCells, Scratch, WindowSearch
 from vico.world.grid_search import STRAIGHT, cells_along, nearest_free
@@ -62,8 +62,8 @@ class CityRouter(Router):
         self.graph = GateGraph(gates, walkable.n, side)
         self._side = side
         # By the room that is needed beside one.
-        self._ends: Recent[tuple[float, int], Ints] = Recent(_ENDS)
-        self._legs: Recent[tuple[float, int, int], tuple[NDArray[np.int32], NDArray[np.int32]]] = Recent(_LEGS)
+        self._ends: LruCache[tuple[float, int], Ints] = LruCache(_ENDS)
+        self._legs: LruCache[tuple[float, int, int], tuple[NDArray[np.int32], NDArray[np.int32]]] = LruCache(_LEGS)
         self._shut = np.zeros(cost.shape, np.bool_)
         self._nothing = np.zeros((0, 0), np.bool_)
         self._scratch = Scratch()
@@ -363,8 +363,8 @@ class CityWalkLengths:
         self._n, self._cell = self._fine.n // 2, 2 * self._fine.cell
         self._cost, self._room = self._coarse()
         self._free = self._cost > 0
-        self._ends: Recent[int, tuple[Ints, ReachedCells]] = Recent(_LENGTH_ENDS)
-        self._windows: Recent[tuple[int, int], WindowSearch] = Recent(_LENGTH_TILES)
+        self._ends: LruCache[int, tuple[Ints, ReachedCells]] = LruCache(_LENGTH_ENDS)
+        self._windows: LruCache[tuple[int, int], WindowSearch] = LruCache(_LENGTH_TILES)
 
     def _coarse(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Return what walking costs on cells of a metre, and their room to walls, tile by tile."""

@@ -25,7 +25,7 @@ from vico.errors import MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.io.arrays import drop_map, drop_pages, mapped_array
 from vico.io.files import sha256_of
-from vico.io.recent import Recent
+from vico.io.memory import LruCache
 from vico.world.city import (
     CITY,
     COST,
@@ -73,7 +73,7 @@ class CityEntities(Mapping[int, dict[str, str]]):
     def __init__(self, city: City, of_all: Mapping[int, dict[str, str]]) -> None:
         self._city = city
         self._of_all = of_all
-        self._tiles: Recent[tuple[int, int], _Named] = Recent(_TILES_KEPT)
+        self._tiles: LruCache[tuple[int, int], _Named] = LruCache(_TILES_KEPT)
 
     def __getitem__(self, entity: int) -> dict[str, str]:
         known = self._of_all.get(entity)

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.geo.frame import LocalFrame
-from vico.io.files import write_bytes, write_json
-from vico.io.folders import FolderKind, listed_in, new_folder
+from vico.io.files import FolderKind, files_of_manifest, new_folder, write_bytes, write_json
 from vico.version import __version__
 from vico.world.city import City
 from vico.world.city_world import CityWorld
@@ -166,7 +165,7 @@ Writer = Callable[..., dict[str, int]]
 
 #: Lists what an export wrote.
 EXPORT_MANIFEST = "export.json"
-EXPORT_FOLDER = FolderKind("export", EXPORT_MANIFEST, listed_in(EXPORT_MANIFEST))
+EXPORT_FOLDER = FolderKind("export", EXPORT_MANIFEST, files_of_manifest(EXPORT_MANIFEST))
 
 
 def _write_xodr(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:

@@ -15,8 +15,7 @@ from pathlib import Path
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.cache import cache_folder
-from vico.io.files import sha256_of, write_bytes, write_errors
-from vico.io.folders import new_folder
+from vico.io.files import new_folder, sha256_of, write_bytes, write_errors
 from vico.io.stores import Store, store_at
 from vico.world.city import CITY, read_city
 from vico.world.city_world import CityWorld

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.arrays import read_npz
 from vico.io.compiled import compiled
 from vico.io.files import write_bytes
-from vico.io.npz import read_npz
 
 BLOCKED, OPEN, SIDEWALK, CROSSING, ROADWAY = range(5)
 CLASS_NAMES = ("blocked", "open", "sidewalk", "crossing", "roadway")

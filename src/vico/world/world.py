@@ -36,9 +36,16 @@ from pydantic import TypeAdapter, ValidationError
 
 from vico.errors import MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.io.files import read_json, sha256_of, write_bytes, write_json
-from vico.io.folders import FolderKind, listed_in, mistaken
-from vico.io.npz import npz_bytes, read_npz
+from vico.io.arrays import npz_bytes, read_npz
+from vico.io.files import (
+    FolderKind,
+    files_of_manifest,
+    read_json,
+    sha256_of,
+    write_bytes,
+    write_json,
+    wrong_folder_sentence,
+)
 from vico.version import __version__
 from vico.world import model
 from vico.world.glb import glb_bounds, read_glb
@@ -409,7 +416,7 @@ def read_stored(path: Path) -> World:
     if not folder.is_dir():
         raise MissingFileError(f"{folder}: no such folder; make one with vico world build")
     if not (folder / "world.json").exists():
-        raise MissingFileError(mistaken(folder, "world", "vico world build"))
+        raise MissingFileError(wrong_folder_sentence(folder, "world", "vico world build"))
     content = read_json(folder / "world.json")
     if not isinstance(content, dict) or content.get("schema_name") != model.SCHEMA:
         found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__
@@ -451,7 +458,7 @@ REQUIRED = (
 
 #: What a build makes.
 WORLD_FOLDER = FolderKind(
-    "world", "world.json", lambda folder: {*listed_in("world.json")(folder), *UNHASHED, f"{STAGES}/**"}
+    "world", "world.json", lambda folder: {*files_of_manifest("world.json")(folder), *UNHASHED, f"{STAGES}/**"}
 )
 
 

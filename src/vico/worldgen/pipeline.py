@@ -15,8 +15,16 @@ from pathlib import Path
 
 from vico.errors import InputError, MissingFileError
 from vico.geo.osm import extract_bounds
-from vico.io.files import read_json, write_json
-from vico.io.folders import FolderKind, FolderLock, check_replaceable, folder_errors, new_folder, remove
+from vico.io.files import (
+    FolderKind,
+    FolderLock,
+    check_replaceable,
+    folder_errors,
+    new_folder,
+    read_json,
+    remove_path,
+    write_json,
+)
 from vico.world.folder import read_world
 from vico.world.model import Manifest
 from vico.world.world import STAGES, WORLD_FOLDER, seal
@@ -182,4 +190,4 @@ def _clear(folder: Path) -> None:
     """Delete what a build before left in the working folder, except what its stages made."""
     for path in folder.iterdir():
         if path.name != STAGES or not path.is_dir():
-            remove(path)
+            remove_path(path)

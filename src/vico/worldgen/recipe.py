@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from vico.assets.things.pack import read_things
+from vico.assets.furniture_pack import read_things
 from vico.geo.osm import OsmData
 from vico.geo.street_images import StreetImage
 from vico.geo.tiles3d import TileMesh

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from vico.assets.models.files import read_all
-from vico.assets.models.furniture import ROOM as INDOOR
-from vico.assets.models.street import ROOM as OUTDOOR
+from vico.assets.models.library import INDOOR, OUTDOOR, read_all
 from vico.io.data_files import own_files
 from vico.worldgen.facades import catalogue as facades
 from vico.worldgen.facts import place_words

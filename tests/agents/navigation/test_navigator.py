@@ -10,7 +10,7 @@ import pytest
 import toy_city
 from vico.agents.assistant.skills import GRASP, OUTSIDE, AssistantSkills, ObservationView
 from vico.agents.navigation.path_planning import Target
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.io.plain_data import decode, encode
 from vico.seeds import rng
 from vico.sim.config import SimConfig

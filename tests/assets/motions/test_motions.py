@@ -20,7 +20,7 @@ from vico.assets.motions import (
     read_gltf_motion,
     smplx_of,
 )
-from vico.assets.motions.grounding import places_of
+from vico.assets.motions.clip import joint_positions
 from vico.assets.people import Appearance, J, body_of
 from vico.errors import InputError, MissingFileError, SchemaError
 
@@ -53,7 +53,7 @@ def directions(places: Any, start: int, end: int) -> Any:
 def bones_agree(clip: MotionClip, rig: rigs.Rig) -> None:
     """Every limb of ours points where the rig's does, in every frame."""
     index = {name: k for k, (name, _, _) in enumerate(rig)}
-    theirs, ours = rigs.places(rig, TURNS, ROOT) @ AXES.T, places_of(clip, t_pose())
+    theirs, ours = rigs.places(rig, TURNS, ROOT) @ AXES.T, joint_positions(clip, t_pose())
     for name, (start, end, our_end) in BONES.items():
         np.testing.assert_allclose(
             directions(ours, J[name], J[our_end]), directions(theirs, index[start], index[end]), atol=1e-4
@@ -93,7 +93,7 @@ def test_a_gltf_of_the_same_rig_gives_the_same_motion(tmp_path: Path) -> None:
     assert other.name == "dance"
     bones_agree(other, rigs.MIXAMO)
     np.testing.assert_allclose(other.position, one.position, atol=1e-3)
-    np.testing.assert_allclose(places_of(other, joints()), places_of(one, joints()), atol=2e-3)
+    np.testing.assert_allclose(joint_positions(other, joints()), joint_positions(one, joints()), atol=2e-3)
 
 
 def test_feet_stand_on_the_ground_where_they_are_lowest(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_feet_stand_on_the_ground_where_they_are_lowest(tmp_path: Path) -> None:
     (tmp_path / "a.bvh").write_text(rigs.bvh(rigs.MIXAMO, still, high))
     body = joints()
     feet = [J["left_ankle"], J["right_ankle"]]
-    placed = places_of(read_bvh(tmp_path / "a.bvh"), body)
+    placed = joint_positions(read_bvh(tmp_path / "a.bvh"), body)
     np.testing.assert_allclose(placed[:, feet, 2], np.tile(body[feet, 2], (FRAMES, 1)), atol=0.01)
 
 
@@ -123,7 +123,7 @@ def test_smplx_s_axes_are_renamed() -> None:
     # About the forward axis (z of SMPL-X) the left arm (along x) goes up.
     poses[0, 3 * J["left_shoulder"] + 2] = np.pi / 2
     body = t_pose()
-    placed = places_of(motion_from_smplx(poses, np.array([[0.0, 0.0, 0.95]]), 30.0), body)[0]
+    placed = joint_positions(motion_from_smplx(poses, np.array([[0.0, 0.0, 0.95]]), 30.0), body)[0]
     up = placed[J["head"]] - placed[0]
     assert up[2] > 0.9 * np.linalg.norm(up)
     toes = placed[J["left_foot"]] - placed[J["left_ankle"]]
@@ -193,7 +193,7 @@ def test_an_amass_file_without_translation_stays_on_the_spot_and_on_the_ground(t
     upright = np.tile([np.pi / 2, 0.0, 0.0], (3, 1))
     np.savez(tmp_path / "a.npz", root_orient=upright, pose_body=np.zeros((3, 63)), mocap_frame_rate=60.0)
     body = joints()
-    placed = places_of(read_amass(tmp_path / "a.npz"), body)
+    placed = joint_positions(read_amass(tmp_path / "a.npz"), body)
     np.testing.assert_allclose(placed[:, J["left_ankle"], 2], body[J["left_ankle"], 2], atol=0.01)
     assert not np.diff(placed, axis=0).any()
 

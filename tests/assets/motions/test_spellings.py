@@ -11,7 +11,7 @@ import pytest
 
 from assets.motions import rigs
 from vico.assets.motions import MotionClip, read_bvh
-from vico.assets.motions.skeleton import Skeleton, joints_by_name
+from vico.assets.motions.retargeting import Skeleton, joints_by_name
 
 TURNS = rigs.random_turns(rigs.MIXAMO, 3, seed=5)
 TEXT = rigs.bvh(rigs.MIXAMO, TURNS, np.tile([0.0, 0.95, 0.0], (3, 1)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.assets.motions.rotations import matrices_of
+from vico.assets.motions.clip import rotation_matrices
 from vico.assets.people import body_of
 from vico.seeds import rng
 from vico.sim.animation import LONGEST_BLEND, STYLE, Transition, clip_index, free_hands, joint_places, pose, style_of
@@ -113,7 +113,7 @@ def _angles(quaternions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     mine[:, 0] = np.column_stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)])
     mine[:, 1] = np.column_stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)])
     mine[:, 2] = np.column_stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
-    cosine = (np.einsum("jrc,jrc->j", mine, matrices_of(rotations)) - 1) / 2
+    cosine = (np.einsum("jrc,jrc->j", mine, rotation_matrices(rotations)) - 1) / 2
     return np.asarray(np.arccos(np.clip(cosine, -1, 1)))
 
 

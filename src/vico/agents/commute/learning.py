@@ -58,7 +58,7 @@ from vico.agents.commute.abstract_city import (
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.exact import each
 from vico.geometry import distance
-from vico.io.npz import read_npz
+from vico.io.arrays import read_npz
 from vico.rules import BIKE_SPEED, BUS_DWELL, WALK_SPEED
 from vico.seeds import rng
 from vico.world.public import PublicMap

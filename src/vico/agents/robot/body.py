@@ -17,8 +17,7 @@ from vico.agents.base import AgentState
 from vico.agents.perception import points_from_depth
 from vico.exact import apply_matrix
 from vico.geometry import distance, distances
-from vico.kinematics.arm import Chain, hand_pose
-from vico.kinematics.limbs import Jaw, Limbs, limbs_of
+from vico.kinematics.arm import Chain, CollisionSpheres, Jaw, collision_spheres, hand_pose
 from vico.quaternions import matrix_of
 
 Array = NDArray[np.float64]
@@ -60,9 +59,9 @@ class ArmBody:
     stand: float
     radius: float
 
-    def limbs(self, opening: float) -> Limbs:
+    def limbs(self, opening: float) -> CollisionSpheres:
         """Return its body with the fingers so far off the middle, metres."""
-        return limbs_of(self.chain, self.radii, jaw=self.jaw, opening=opening)
+        return collision_spheres(self.chain, self.radii, jaw=self.jaw, opening=opening)
 
     def hand(self, angles: Array) -> Array:
         """Return the pose of the middle between the pads in the base's frame, shape ``(3, 4)``."""

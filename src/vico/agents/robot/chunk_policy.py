@@ -24,7 +24,7 @@ from vico.agents.base import AgentState
 from vico.agents.robot.increments import BASE, INCREMENTS, JOINTS, STATE, ChunkShape, arm_state, control_of
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
 from vico.exact import apply_matrix, each
-from vico.io.npz import read_npz
+from vico.io.arrays import read_npz
 
 Array = NDArray[np.float32]
 

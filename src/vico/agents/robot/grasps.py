@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from vico.agents.base import AgentState
 from vico.agents.robot.body import ArmBody, Stance, view_points
 from vico.exact import apply_matrix, dot, product
-from vico.kinematics.limbs import Limbs, box_points, with_held
-from vico.kinematics.ways import downward
+from vico.kinematics.arm import CollisionSpheres, box_points, with_held_object
+from vico.kinematics.hand_paths import downward
 
 Array = NDArray[np.float64]
 
@@ -270,9 +270,9 @@ class HeldObject(NamedTuple):
         """Whether it tips over where what it stands on drives: high for how wide it is."""
         return is_slender(float(self.half[0]), self.below + self.above - _PAD_CLEARANCE)
 
-    def on(self, limbs: Limbs) -> Limbs:
+    def on(self, limbs: CollisionSpheres) -> CollisionSpheres:
         """Return limbs with the thing."""
-        return with_held(limbs, self.points, _BALL_RADIUS)
+        return with_held_object(limbs, self.points, _BALL_RADIUS)
 
     def box(self) -> ObjectBox:
         """Return the box round it, seen from between the pads, along the base as the hand closed."""

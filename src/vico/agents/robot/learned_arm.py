@@ -22,7 +22,7 @@ from vico.agents.robot.body import ArmBody, Stance, follow_joint_path, rotate_as
 from vico.agents.robot.grasps import HeldObject, ObjectPose, ObjectTracker, PoseOracle, finger_contacts, object_in_jaw
 from vico.agents.robot.reaching import GAP, plan_placement, room_around
 from vico.errors import InputError
-from vico.kinematics.planning import Arm, free_way
+from vico.kinematics.planning import Arm, plan_path
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def path_to_ready_pose(body: ArmBody, observation: Mapping[str, Any], now: Array
     """Return a way from angles to those a policy picks from, shape ``(m, 7)``; None if none is free."""
     room, limbs = room_around(body, view_points(observation).points), body.limbs(ready.opening)
     for gap in _READY_GAPS:
-        way = free_way(Arm(body.chain, limbs, room, gap), now, ready.angles)
+        way = plan_path(Arm(body.chain, limbs, room, gap), now, ready.angles)
         if way is not None:
             return way
     return None

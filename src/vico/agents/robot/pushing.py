@@ -16,9 +16,8 @@ from vico.agents.robot.grasps import object_box
 from vico.agents.robot.reaching import room_around
 from vico.exact import dot
 from vico.geometry import distance
-from vico.kinematics.inverse import free_reach
-from vico.kinematics.planning import Arm, free_way
-from vico.kinematics.ways import downward, straight_way
+from vico.kinematics.hand_paths import downward, straight_path
+from vico.kinematics.planning import Arm, collision_free_reach, plan_path
 
 Array = NDArray[np.float64]
 Action = dict[str, Any]
@@ -187,14 +186,14 @@ class Pusher:
         arm = Arm(self.body.chain, self.body.limbs(self._opening), room_around(self.body, seen.points), _CLOSE)
         low = np.array([_AHEAD, 0.0, _LOW - self.body.stand])
         goals = [downward(low, np.array([0.0, sign]), sign * tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
-        found = free_reach(arm, goals, angles[:7], posture=self.body.rest)
-        way = None if found is None else free_way(arm, angles[:7], found[0])
+        found = collision_free_reach(arm, goals, angles[:7], posture=self.body.rest)
+        way = None if found is None else plan_path(arm, angles[:7], found[0])
         if way is None or found is None:
             return self._end("out of reach")
         pose = self.body.hand(found[0])
         higher = pose.copy()
         higher[2, 3] += _LIFTS
-        up = straight_way(self.body.chain, found[0], pose, higher)
+        up = straight_path(self.body.chain, found[0], pose, higher)
         if up is None:
             return self._end("out of reach")
         self._lifts, self._lifted = np.vstack([found[0], up]), 0

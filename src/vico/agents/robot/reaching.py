@@ -17,10 +17,17 @@ from vico.agents.robot.body import ArmBody, Stance, surface_height
 from vico.agents.robot.grasps import Grasp, HeldObject
 from vico.exact import apply_matrix
 from vico.geometry import distances
-from vico.kinematics.inverse import free_reach
-from vico.kinematics.planning import Arm, free_way, is_free, way_is_free
-from vico.kinematics.room import Room, room_of, seen_nothing
-from vico.kinematics.ways import straight_way
+from vico.kinematics.hand_paths import straight_path
+from vico.kinematics.planning import (
+    Arm,
+    DistanceGrid,
+    collision_free_reach,
+    distance_grid,
+    empty_distance_grid,
+    is_free,
+    is_path_free,
+    plan_path,
+)
 
 Array = NDArray[np.float64]
 
@@ -62,13 +69,18 @@ class ReachPlan(NamedTuple):
     number: int
 
 
-def room_around(body: ArmBody, points: Array) -> Room:
+def room_around(body: ArmBody, points: Array) -> DistanceGrid:
     """Return the room that an arm has among points in its base's frame, on ground as level as the base."""
-    return room_of(points, body.posts, ground=-body.stand - 0.04)
+    return distance_grid(points, body.posts, ground=-body.stand - 0.04)
 
 
 def plan_grasp(
-    body: ArmBody, rooms: tuple[Room, Room], now: Array, grasps: Sequence[Grasp], *, skip: Collection[int] = ()
+    body: ArmBody,
+    rooms: tuple[DistanceGrid, DistanceGrid],
+    now: Array,
+    grasps: Sequence[Grasp],
+    *,
+    skip: Collection[int] = (),
 ) -> ReachPlan | None:
     """Return ways to the first of some grasps that can be reached, and up with the thing; None without one.
 
@@ -90,7 +102,7 @@ def plan_grasp(
             continue
         lifted = grasp.pose.copy()
         lifted[2, 3] += LIFT
-        away = straight_way(body.chain, there[1][-1], grasp.pose, lifted)
+        away = straight_path(body.chain, there[1][-1], grasp.pose, lifted)
         if away is None:
             away = there[1][::-1]
         return ReachPlan(*there, away, grasp.opening, number)
@@ -98,7 +110,7 @@ def plan_grasp(
 
 
 def plan_placement(
-    body: ArmBody, room: Room, now: Array, spot: Array, held: HeldObject, turns: Sequence[float] = TURNS
+    body: ArmBody, room: DistanceGrid, now: Array, spot: Array, held: HeldObject, turns: Sequence[float] = TURNS
 ) -> ReachPlan | None:
     """Return ways that bring a held thing's underside to a spot, and the empty hand back up; None without one.
 
@@ -123,7 +135,9 @@ def plan_placement(
     return None
 
 
-def plan_carry(body: ArmBody, room: Room, now: Array, held: HeldObject | None, *, opening: float) -> Array | None:
+def plan_carry(
+    body: ArmBody, room: DistanceGrid, now: Array, held: HeldObject | None, *, opening: float
+) -> Array | None:
     """Return a way to where things are carried, or folded without one, shape ``(m, 7)``; None if none is free.
 
     Parameters
@@ -143,7 +157,7 @@ def plan_carry(body: ArmBody, room: Room, now: Array, held: HeldObject | None, *
                 return way
     for place in _CARRY_POINTS:
         goals = [np.column_stack([held.turned(turn), place]) for turn in TURNS]
-        found = free_reach(arm, goals, now, posture=body.rest)
+        found = collision_free_reach(arm, goals, now, posture=body.rest)
         way = None if found is None else _free_path(arm, now, found[0])
         if way is not None:
             return way
@@ -156,18 +170,25 @@ def plan_raise(body: ArmBody, now: Array, held: HeldObject, height: float) -> Ar
     Where the arm does not reach that far, the way ends lower.
     """
     pose = body.hand(now)
-    arm = Arm(body.chain, held.on(body.limbs(held.opening)), seen_nothing(body.posts), 0.0)
+    arm = Arm(body.chain, held.on(body.limbs(held.opening)), empty_distance_grid(body.posts), 0.0)
     for up in np.arange(height + held.below + _HEIGHT_OVER_SURFACE - float(pose[2, 3]), 0.02, -0.04).tolist():
         goal = pose.copy()
         goal[2, 3] += up
-        way = straight_way(body.chain, now, pose, goal)
+        way = straight_path(body.chain, now, pose, goal)
         if way is not None and _is_free_at_end(arm, way):
             return way
     return None
 
 
 def _approach_paths(
-    arm: Arm, body: ArmBody, now: Array, before: Array, pose: Array, *, last: Room | None = None, level: bool = False
+    arm: Arm,
+    body: ArmBody,
+    now: Array,
+    before: Array,
+    pose: Array,
+    *,
+    last: DistanceGrid | None = None,
+    level: bool = False,
 ) -> tuple[Array, Array] | None:
     """Return a free way to before a pose and the straight one to it; None if either is not free.
 
@@ -181,14 +202,14 @@ def _approach_paths(
     comes = arm if last is None else arm._replace(room=last)
     if level:
         over = _level_path(arm, body, now, before)
-        straight = None if over is None else straight_way(body.chain, over[-1], before, pose)
+        straight = None if over is None else straight_path(body.chain, over[-1], before, pose)
         return (
             (over, straight) if straight is not None and over is not None and _is_free_at_end(comes, straight) else None
         )
-    found = free_reach(arm, [before], now, posture=body.rest)
+    found = collision_free_reach(arm, [before], now, posture=body.rest)
     if found is None:
         return None
-    straight = straight_way(body.chain, found[0], before, pose)
+    straight = straight_path(body.chain, found[0], before, pose)
     if straight is None or not _is_free_at_end(comes, straight):
         return None
     over = _free_path(arm, now, found[0])
@@ -197,16 +218,16 @@ def _approach_paths(
 
 def _is_free_at_end(arm: Arm, straight: Array) -> bool:
     """Return whether a hand may go the last bit to what it is after."""
-    return way_is_free(arm._replace(gap=_END_GAP), straight)
+    return is_path_free(arm._replace(gap=_END_GAP), straight)
 
 
 def _level_path(arm: Arm, body: ArmBody, now: Array, goal: Array) -> Array | None:
     """Return a straight way of the hand to a pose, on which a thing hardly tilts; None if it is not free."""
-    way = straight_way(body.chain, now, body.hand(now), goal)
+    way = straight_path(body.chain, now, body.hand(now), goal)
     if way is None:
         return None
     gap = next((gap for gap in (arm.gap, *_START_GAPS) if is_free(arm._replace(gap=gap), now)), None)
-    return way if gap is not None and way_is_free(arm._replace(gap=gap), np.vstack([now, way])) else None
+    return way if gap is not None and is_path_free(arm._replace(gap=gap), np.vstack([now, way])) else None
 
 
 def _free_path(arm: Arm, now: Array, goal: Array) -> Array | None:
@@ -215,7 +236,7 @@ def _free_path(arm: Arm, now: Array, goal: Array) -> Array | None:
     for gap in (arm.gap, *_START_GAPS):
         nearer = arm._replace(gap=gap)
         if is_free(nearer, start):
-            return free_way(nearer, start, goal)
+            return plan_path(nearer, start, goal)
     return None
 
 
@@ -224,7 +245,7 @@ def _retreat_path(body: ArmBody, there: Array, pose: Array, tall: float) -> Arra
     for away in np.arange(max(LIFT, tall), 0.03, -0.02).tolist():
         back = pose.copy()
         back[:, 3] -= pose[:, 2] * away
-        out = straight_way(body.chain, there[-1], pose, back)
+        out = straight_path(body.chain, there[-1], pose, back)
         if out is not None:
             return out
     return there[::-1]

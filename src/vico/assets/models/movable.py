@@ -1,20 +1,27 @@
-"""Things people carry: small, recognisable, in plain colours; origin at the middle of the underside, z up."""
+"""Movable objects that people carry: shape and colours, how they are held, and what stands for them in physics.
+
+Objects are small and recognisable, in plain colours, with the origin at the middle of the underside, z up. Physics
+knows an object by its mass and a few convex solids, as its entry says.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.models.files import GUIDE
+from vico.assets.models.library import GUIDE
 from vico.assets.models.parts import Scope, surfaces_of
-from vico.assets.models.schema import Grip, MovableEntry, MovableFile
+from vico.assets.models.schema import Grip, MovableEntry, MovableFile, SolidBox, SolidCylinder, SolidPart
 from vico.assets.shapes import Colour
 from vico.errors import InputError, SchemaError
 from vico.io.data_files import cached_data, data_files, read_record
+from vico.quaternions import quaternion_of
 from vico.world.mesh import Surface
 
 
@@ -94,7 +101,7 @@ def movable_entry(prototype: str) -> MovableEntry | None:
 
 
 #: Smaller ones are carried in a hand, ones as wide and as deep as the second before the chest, metres.
-_IN_HAND, _IN_ARMS = 0.22, 0.26
+_HAND_GRIP, _ARMS_GRIP = 0.22, 0.26
 
 
 def movable_grip(prototype: str, size: ArrayLike) -> Grip:
@@ -103,9 +110,9 @@ def movable_grip(prototype: str, size: ArrayLike) -> Grip:
     if entry is not None and entry.grip is not None:
         return entry.grip
     small, middle, large = sorted(np.asarray(size, np.float64).tolist())
-    if large <= _IN_HAND or (middle <= 0.5 * _IN_HAND and large <= 2 * _IN_HAND):
+    if large <= _HAND_GRIP or (middle <= 0.5 * _HAND_GRIP and large <= 2 * _HAND_GRIP):
         return "hand"
-    return "arms" if middle >= _IN_ARMS and small >= 0.5 * _IN_ARMS else "handle"
+    return "arms" if middle >= _ARMS_GRIP and small >= 0.5 * _ARMS_GRIP else "handle"
 
 
 def movable_surfaces(kind: str, colour: str) -> list[Surface]:
@@ -135,3 +142,63 @@ def _shades(paint: Colour) -> dict[str, Colour]:
         "paint_dark": (r * 2 // 3, g * 2 // 3, b * 2 // 3),
         "paint_light": (min(r + 60, 255), min(g + 60, 255), min(b + 60, 255)),
     }
+
+
+Array = NDArray[np.float64]
+
+
+class Solid(NamedTuple):
+    """A convex solid of a thing.
+
+    Attributes
+    ----------
+    shape
+        box, cylinder (along its z) or ball.
+    half
+        Half its extents along its own axes, metres, shape ``(3,)``.
+    middle
+        In the thing's frame, whose origin is the middle of its underside, metres, shape ``(3,)``.
+    rotation
+        To the thing's frame, shape ``(3, 3)``.
+    """
+
+    shape: str
+    half: Array
+    middle: Array
+    rotation: Array
+
+    @property
+    def quaternion(self) -> Array:
+        """The rotation as w, x, y, z."""
+        return quaternion_of(self.rotation)
+
+    @property
+    def volume(self) -> float:
+        """Cubic metres."""
+        box = 8.0 * float(np.prod(self.half))
+        return box * {"box": 1.0, "cylinder": math.pi / 4, "ball": math.pi / 6}[self.shape]
+
+
+def movable_mass(prototype: str) -> float | None:
+    """Return what a thing weighs as its entry says, kilograms; None where none says so."""
+    entry = movable_entry(prototype)
+    return None if entry is None else entry.mass
+
+
+def movable_solids(prototype: str) -> list[Solid]:
+    """Return the solids that stand for a thing, as its entry says; none where the box of its size does."""
+    entry = movable_entry(prototype)
+    return [] if entry is None else [_solid(part) for part in entry.solid]
+
+
+def _solid(part: SolidPart) -> Solid:
+    p, y = math.radians(part.pitch), math.radians(part.yaw)
+    about_y = np.array([[math.cos(p), 0.0, math.sin(p)], [0.0, 1.0, 0.0], [-math.sin(p), 0.0, math.cos(p)]])
+    about_z = np.array([[math.cos(y), -math.sin(y), 0.0], [math.sin(y), math.cos(y), 0.0], [0.0, 0.0, 1.0]])
+    rotation, at = about_z @ about_y, np.array(part.at, np.float64)
+    if isinstance(part, SolidBox):
+        return Solid("box", np.array(part.size) / 2, at, rotation)
+    if isinstance(part, SolidCylinder):
+        half = np.array([part.radius, part.radius, part.length / 2])
+        return Solid("cylinder", half, at + rotation[:, 2] * part.length / 2, rotation)
+    return Solid("ball", np.full(3, part.radius), at, rotation)

@@ -172,7 +172,7 @@ def _packets(part: schema.PacketsPart, place: Placement) -> list[Surface]:
     return row
 
 
-def _posed(part: schema.Part, place: Placement, make: Callable[[NDArray[np.float64]], Surface]) -> list[Surface]:
+def _pose_shape(part: schema.Part, place: Placement, make: Callable[[NDArray[np.float64]], Surface]) -> list[Surface]:
     """Return a shape made at a point if it stands upright and unturned, else made at the origin and moved."""
     turnable = cast("schema.BoxPart", part)
     yaw = math.radians(turnable.yaw) + place.yaw
@@ -188,7 +188,7 @@ def _posed(part: schema.Part, place: Placement, make: Callable[[NDArray[np.float
 
 
 def _box(part: schema.BoxPart, place: Placement, colour: Colour) -> list[Surface]:
-    return _posed(part, place, lambda at: shapes.box(part.size, at, colour=colour))
+    return _pose_shape(part, place, lambda at: shapes.box(part.size, at, colour=colour))
 
 
 def _cylinder(part: schema.CylinderPart, place: Placement, colour: Colour) -> list[Surface]:
@@ -197,7 +197,7 @@ def _cylinder(part: schema.CylinderPart, place: Placement, colour: Colour) -> li
             part.radius, part.length, top=part.top_radius, sides=part.sides, colour=colour, centre=at
         )
 
-    return _posed(part, place, make)
+    return _pose_shape(part, place, make)
 
 
 def _lathe(part: schema.LathePart, place: Placement, colour: Colour) -> list[Surface]:
@@ -205,11 +205,11 @@ def _lathe(part: schema.LathePart, place: Placement, colour: Colour) -> list[Sur
         solid = shapes.lathe(part.profile, sides=part.sides, colour=colour, centre=at, smooth=part.smooth)
         return shapes.inside_out(solid) if part.inside_out else solid
 
-    return _posed(part, place, make)
+    return _pose_shape(part, place, make)
 
 
 def _ball(part: schema.BallPart, place: Placement, colour: Colour) -> list[Surface]:
-    return _posed(
+    return _pose_shape(
         part, place, lambda at: shapes.ball(part.radii, at, colour=colour, sides=part.sides, rings=part.rings)
     )
 
@@ -229,7 +229,7 @@ def _ring(part: schema.RingPart, place: Placement, colour: Colour) -> list[Surfa
 def _extrusion(part: schema.ExtrusionPart, place: Placement, colour: Colour) -> list[Surface]:
     solid = shapes.extrusion(part.outline, part.width, colour=colour)
     stays = part.at == _ORIGIN and not place.offset.any()  # moving it nowhere would change the signs of zeros
-    return _posed(part, place, lambda at: solid if stays else solid.moved(_pose(at)))
+    return _pose_shape(part, place, lambda at: solid if stays else solid.moved(_pose(at)))
 
 
 def _plate(part: schema.PlatePart, place: Placement, colour: Colour) -> list[Surface]:
@@ -245,7 +245,7 @@ def _facing_plate(outline: list[tuple[float, float]], thickness: float, place: P
     return shapes.plate(outline, thickness, colour, place.offset, yaw=place.yaw)
 
 
-def _shaded(tone: Colour, shade: float) -> Colour:
+def _shade_colour(tone: Colour, shade: float) -> Colour:
     return min(int(tone[0] * shade), 255), min(int(tone[1] * shade), 255), min(int(tone[2] * shade), 255)
 
 
@@ -255,7 +255,7 @@ def _boards(part: schema.BoardsPart, place: Placement, colour: Colour) -> list[S
     random = rng(0, "fence", part.seed)
     row = []
     for k in range(part.count):
-        tone = _shaded(colour, float(random.uniform(0.86, 1.06)))
+        tone = _shade_colour(colour, float(random.uniform(0.86, 1.06)))
         top = height + float(random.uniform(-0.01, 0.01))
         middle = (x + (k + 0.5) * length / part.count - length / 2, y, z + (top - part.below) / 2)
         row.append(shapes.box((wide, thick, top + part.below), middle, colour=tone))
@@ -270,7 +270,7 @@ def _masonry(part: schema.MasonryPart, place: Placement, colour: Colour) -> list
     for j in range(part.courses):
         shift = 0.0 if j % 2 else each / 2
         for k in range(part.blocks if j % 2 else part.blocks - 1):
-            tone = _shaded(colour, float(random.uniform(0.88, 1.1)))
+            tone = _shade_colour(colour, float(random.uniform(0.88, 1.1)))
             middle = (x + (k + 0.5) * length / part.blocks - length / 2 + shift, y, z + (j + 0.5) * step)
             wall.append(shapes.box((each - part.joint, thick, step - part.joint), middle, colour=tone))
     return wall

@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.motions.clip import MOST_FRAMES, MOST_RATE, MotionClip
-from vico.assets.motions.retargeting import retargeted
-from vico.assets.motions.rotations import from_angles
-from vico.assets.motions.skeleton import Skeleton, joints_by_name
+from vico.assets.motions.clip import MOST_FRAMES, MOST_RATE, MotionClip, matrices_from_angles
+from vico.assets.motions.retargeting import Skeleton, joints_by_name, retarget
 from vico.errors import MissingFileError, SchemaError
 
 _MOST_BYTES = 512 << 20
@@ -64,9 +62,9 @@ def read_bvh(path: Path) -> MotionClip:
     hierarchy = _hierarchy(lines, path)
     values, rate, note = _frames(lines, sum(map(len, hierarchy.channels)), path)
     skeleton = _skeleton(hierarchy)
-    turned, moved = _turned(hierarchy, values)
+    turned, moved = _joint_transforms(hierarchy, values)
     pelvis = joints_by_name(skeleton, source=str(path))["pelvis"]
-    clip = retargeted(skeleton, turned, moved[:, pelvis], rate, name=path.stem, source=str(path))
+    clip = retarget(skeleton, turned, moved[:, pelvis], rate, name=path.stem, source=str(path))
     return replace(clip, notes=(note,)) if note else clip
 
 
@@ -200,7 +198,9 @@ def _skeleton(hierarchy: _Hierarchy) -> Skeleton:
     return Skeleton(tuple(hierarchy.names), np.array(hierarchy.parents, np.int64), places)
 
 
-def _turned(hierarchy: _Hierarchy, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _joint_transforms(
+    hierarchy: _Hierarchy, values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return how each joint is turned from rest, shape ``(t, n, 3, 3)``, and where it is, shape ``(t, n, 3)``."""
     t, n = len(values), len(hierarchy.names)
     turned, placed = np.empty((t, n, 3, 3)), np.empty((t, n, 3))
@@ -209,7 +209,7 @@ def _turned(hierarchy: _Hierarchy, values: NDArray[np.float64]) -> tuple[NDArray
         mine = values[:, at : at + len(channels)]
         at += len(channels)
         angles = [c for c, channel in enumerate(channels) if channel.endswith("rotation")]
-        local = from_angles(mine[:, angles], [channels[c][0] for c in angles])
+        local = matrices_from_angles(mine[:, angles], [channels[c][0] for c in angles])
         # A joint's own position channels stand instead of its offset.
         offset = np.tile(np.array(hierarchy.offsets[k]), (t, 1))
         for c, channel in enumerate(channels):

@@ -1,14 +1,22 @@
-"""A recorded motion of a person on the 55 joints of SMPL-X, whatever file it came from."""
+"""A recorded motion of a person on the 55 joints of SMPL-X, whatever file it came from, set on the ground.
+
+Feet stand on the ground where they are lowest. Rotations of many frames at once are matrices of shape ``(..., 3, 3)``
+and axis-angle vectors of shape ``(..., 3)``.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from vico.assets.people import JOINTS
+from vico.assets.people import JOINTS, PARENTS, Appearance, J, body_of
 from vico.errors import InputError, SchemaError
 from vico.io.plain_data import read_plain, write_plain
 
@@ -118,3 +126,94 @@ def read_motion(path: Path) -> MotionClip:
         return MotionClip(**record)
     except (TypeError, AttributeError, InputError) as error:
         raise SchemaError(f"{path}: {error}; import it anew with vico motion import") from None
+
+
+Matrices = NDArray[np.float64]
+
+
+def rotation_matrices(vectors: NDArray[Any]) -> Matrices:
+    """Return rotation matrices of axis-angle vectors, radians."""
+    flat = Rotation.from_rotvec(np.asarray(vectors, np.float64).reshape(-1, 3)).as_matrix()
+    return flat.reshape(*vectors.shape[:-1], 3, 3)
+
+
+def rotation_vectors(matrices: Matrices) -> NDArray[np.float32]:
+    """Return axis-angle vectors of rotation matrices, radians, the shorter way."""
+    flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec()
+    return np.asarray(flat, np.float32).reshape(*matrices.shape[:-2], 3)
+
+
+def matrices_from_quaternions(quaternions: NDArray[Any]) -> Matrices:
+    """Return rotation matrices of quaternions x, y, z, w, shape ``(..., 4)``."""
+    flat = Rotation.from_quat(np.asarray(quaternions, np.float64).reshape(-1, 4)).as_matrix()
+    return flat.reshape(*quaternions.shape[:-1], 3, 3)
+
+
+def matrices_from_angles(angles: NDArray[np.float64], axes: Sequence[str]) -> Matrices:
+    """Return the product of rotations about axes in the order they are named.
+
+    Parameters
+    ----------
+    angles
+        Degrees, shape ``(t, k)``.
+    axes
+        ``"X"``, ``"Y"`` or ``"Z"`` for each column.
+    """
+    found = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for k, axis in enumerate(axes):
+        found = found @ Rotation.from_euler(axis.lower(), angles[:, k : k + 1], degrees=True).as_matrix()
+    return np.asarray(found)
+
+
+def rotation_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> Matrices:
+    """Return the smallest rotation that turns one direction into another, shape ``(3, 3)``."""
+    u, v = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    axis, cosine = np.cross(u, v), float(u @ v)
+    if cosine < -0.999999:  # any axis across it
+        across = np.cross(u, [1.0, 0.0, 0.0] if abs(u[0]) < 0.9 else [0.0, 1.0, 0.0])
+        return np.asarray(Rotation.from_rotvec(np.pi * across / np.linalg.norm(across)).as_matrix())
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + cosine)
+
+
+_FEET = tuple(J[f"{side}_{part}"] for side in ("left", "right") for part in ("ankle", "foot"))
+# Of all frames so many have a foot on the ground, at least, percent.
+_STANDING = 4.0
+
+
+def joint_positions(clip: MotionClip, joints: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where a body's joints are in every frame, metres, shape ``(t, 55, 3)``.
+
+    Parameters
+    ----------
+    joints
+        Of the body in the T-pose, the soles at z = 0, metres, shape ``(55, 3)``.
+    """
+    turned = np.concatenate([clip.orientation[:, None], clip.pose], axis=1).astype(np.float64)
+    world = rotation_matrices(turned)
+    placed = np.empty((len(clip), len(joints), 3))
+    placed[:, 0] = clip.position.astype(np.float64) * (joints[0, 2] / HIP_HEIGHT)
+    for k in range(1, len(joints)):
+        parent = PARENTS[k]
+        placed[:, k] = placed[:, parent] + world[:, parent] @ (joints[k] - joints[parent])
+        world[:, k] = world[:, parent] @ world[:, k]
+    return placed
+
+
+def ground_motion(clip: MotionClip) -> MotionClip:
+    """Return a motion moved up or down so that feet stand on the ground where they are lowest.
+
+    Files tell neither how high the soles are below the ankles nor, some of them, where the ground is.
+    """
+    joints = _ground_reference()
+    feet = list(_FEET)
+    above = joint_positions(clip, joints)[:, feet, 2] - joints[feet, 2]
+    sunk = float(np.percentile(above.min(axis=1), _STANDING)) * HIP_HEIGHT / float(joints[0, 2])
+    return replace(clip, position=clip.position - np.array([0.0, 0.0, sunk], np.float32))
+
+
+@cache
+def _ground_reference() -> NDArray[np.float64]:
+    """Return the joints of an average body in the T-pose, shape ``(55, 3)``."""
+    return body_of(Appearance(), source="procedural").joints.astype(np.float64)

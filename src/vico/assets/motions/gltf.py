@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from vico.assets.motions.clip import MOST_FRAMES, MotionClip
-from vico.assets.motions.retargeting import retargeted
-from vico.assets.motions.skeleton import Skeleton, joints_by_name
+from vico.assets.motions.retargeting import Skeleton, joints_by_name, retarget
 from vico.errors import MissingFileError, SchemaError
-from vico.io.gltf_file import GltfFault, GltfFile, faults_told, node_matrix
+from vico.io.gltf_file import GltfFault, GltfFile, gltf_errors, node_matrix
 
 _RATE = 30.0
 _MOST_BYTES = 1 << 30
@@ -44,7 +43,7 @@ def read_gltf_motion(path: Path, *, animation: str = "") -> MotionClip:
         data = path.read_bytes()
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
-    with faults_told(str(path)):
+    with gltf_errors(str(path)):
         rig = Rig(GltfFile.of(data, lambda uri: _beside(path, uri)))
         name, tracks = rig.tracks(animation)
         times = _times(tracks)
@@ -53,7 +52,7 @@ def read_gltf_motion(path: Path, *, animation: str = "") -> MotionClip:
     skeleton = Skeleton(rig.names, rig.parents, rest[:, :3, 3])
     pelvis = joints_by_name(skeleton, source=str(path))["pelvis"]
     turned = _rotations(moving) @ np.swapaxes(_rotations(rest), -1, -2)
-    return retargeted(skeleton, turned, moving[:, pelvis, :3, 3], _RATE, name=name or path.stem, source=str(path))
+    return retarget(skeleton, turned, moving[:, pelvis, :3, 3], _RATE, name=name or path.stem, source=str(path))
 
 
 def _beside(path: Path, uri: str) -> bytes:

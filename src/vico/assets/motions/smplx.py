@@ -16,12 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.motions.clip import HIP_HEIGHT, MotionClip
-from vico.assets.motions.grounding import grounded
-from vico.assets.motions.rotations import matrices_of, vectors_of
+from vico.assets.motions.clip import HIP_HEIGHT, MotionClip, ground_motion, rotation_matrices, rotation_vectors
 from vico.assets.people import JOINTS, J
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.io.npz import read_npz
+from vico.io.arrays import read_npz
 
 #: Pelvis height of the mean SMPL-X body in the T-pose, metres; its translations are for a body of that size.
 _SMPLX_HIP_HEIGHT = 0.95
@@ -83,7 +81,7 @@ def motion_from_smplx(
         name,
         float(rate),
         np.asarray(translation, np.float32) * np.float32(HIP_HEIGHT / _SMPLX_HIP_HEIGHT),
-        vectors_of(matrices_of(joints[:, 0]) @ _AXES.T),
+        rotation_vectors(rotation_matrices(joints[:, 0]) @ _AXES.T),
         np.asarray(joints[:, 1:] @ _AXES.T, np.float32),
     )
 
@@ -98,7 +96,7 @@ def smplx_of(clip: MotionClip) -> dict[str, NDArray[np.float32]]:
         ``pose_jaw`` ``(t, 3)``, ``pose_eye`` ``(t, 6)``, ``pose_hand`` ``(t, 90)``; ``trans``, metres, ``(t, 3)``;
         and ``mocap_frame_rate``.
     """
-    root = vectors_of(matrices_of(clip.orientation) @ _AXES)
+    root = rotation_vectors(rotation_matrices(clip.orientation) @ _AXES)
     rest = np.asarray(clip.pose.astype(np.float64) @ _AXES, np.float32)
     poses = np.concatenate([root[:, None], rest], axis=1).reshape(len(clip), -1)
     parts = {"root_orient": (0, 1), "pose_body": (1, 22), "pose_jaw": (22, 23), "pose_eye": (23, 25)}
@@ -139,9 +137,9 @@ def read_amass(path: Path) -> MotionClip:
         if rate is None or rate.size != 1 or not ("poses" in data or {"root_orient", "pose_body"} <= data.keys()):
             raise SchemaError(
                 f"{path}: no motion of AMASS (poses, or root_orient and pose_body; mocap_frame_rate, one number); "
-                f"it holds {_held(packed)}"
+                f"it holds {_member_names(packed)}"
             )
-        poses = data["poses"] if "poses" in data else _joined(data)
+        poses = data["poses"] if "poses" in data else _full_pose(data)
         name = next((name for name in _TRANSLATIONS if name in data), None)
         if name is not None:
             clip = motion_from_smplx(poses, data[name], rate.item(), name=path.stem)
@@ -149,7 +147,7 @@ def read_amass(path: Path) -> MotionClip:
             return clip if name == "trans" else replace(clip, notes=(said,))
         if like := [name for name in _names(packed) if any(part in name.lower() for part in _LIKE_TRANSLATION)]:
             raise SchemaError(f"{path}: has no trans, but {', '.join(like[:4])}; save its translation as trans")
-        return grounded(motion_from_smplx(poses, np.zeros((len(poses), 3)), rate.item(), name=path.stem))
+        return ground_motion(motion_from_smplx(poses, np.zeros((len(poses), 3)), rate.item(), name=path.stem))
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
     except InputError as error:
@@ -165,7 +163,7 @@ def read_amass(path: Path) -> MotionClip:
         raise SchemaError(f"{path}: no readable .npz of plain arrays ({error})") from None
 
 
-def _joined(data: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
+def _full_pose(data: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
     """Return the pose of all joints, radians, shape ``(t, 165)``; parts that are not there rest."""
     frames = len(np.atleast_1d(data["root_orient"]))
     parts = []
@@ -182,7 +180,7 @@ def _names(packed: bytes) -> list[str]:
         return [name.removesuffix(".npy") for name in archive.namelist()]
 
 
-def _held(packed: bytes) -> str:
+def _member_names(packed: bytes) -> str:
     """Return the names of an archive's arrays, none of which is read."""
     names = _names(packed)
     return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "") or "none of them"

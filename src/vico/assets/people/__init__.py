@@ -1,6 +1,6 @@
 """Bodies of people: how somebody looks, and the skinned mesh that comes of it."""
 
-from vico.assets.people.choice import PASSERS_BY, body_of, passer_by, random_appearance
+from vico.assets.people.bodies import PASSERS_BY, body_of, passer_by, random_appearance
 from vico.assets.people.model import (
     BAGS,
     BOTTOMS,

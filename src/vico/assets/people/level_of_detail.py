@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people.model import JOINTS, J, SkinnedBody
-from vico.assets.simplify import Worth, collapsed, is_sound
+from vico.assets.simplification import Worth, collapse_edges, is_sound
 from vico.io.compiled import compiled
 
 # Triangles of a light body, and of one that is seen from far away; procedural ones are a tenth darker in pictures with
@@ -35,7 +35,7 @@ _LAYERED_LIMIT, _FACE_LIMIT, _HAND_LIMIT = 0.0006, 0.0014, 0.0060
 Array = NDArray[Any]
 
 
-def lightened(body: SkinnedBody, triangles: int = LIGHT) -> SkinnedBody:
+def simplify_body(body: SkinnedBody, triangles: int = LIGHT) -> SkinnedBody:
     """Make a body with at most about `triangles` triangles that looks the same from two metres on.
 
     Parameters
@@ -55,7 +55,7 @@ def lightened(body: SkinnedBody, triangles: int = LIGHT) -> SkinnedBody:
     for k in range(4):
         np.add.at(shares, (np.arange(len(points)), body.weight_joints[:, k]), body.weights[:, k].astype(np.float64))
     faces = body.triangles.astype(np.int64)
-    faces = faces[~_hidden(points, faces, shares)]
+    faces = faces[~_hidden_triangles(points, faces, shares)]
     _, first, place = np.unique(np.round(points, 5), axis=0, return_index=True, return_inverse=True)
     places = place.ravel()[faces]
     sound = is_sound(places)
@@ -64,7 +64,7 @@ def lightened(body: SkinnedBody, triangles: int = LIGHT) -> SkinnedBody:
         care, limit = _care(body, points, faces, shares)
         traits = np.hstack([body.colour / 255.0 * _COLOUR_METRES, shares * _JOINT_METRES])
         worth = Worth(traits[first], care[first], limit[first])
-        _, faces = collapsed(points[first], places, faces, worth, triangles=triangles)
+        _, faces = collapse_edges(points[first], places, faces, worth, triangles=triangles)
     used, faces = np.unique(faces, return_inverse=True)
     return replace(
         body,
@@ -91,7 +91,7 @@ def _care(body: SkinnedBody, points: Array, faces: Array, shares: Array) -> tupl
     ears = (np.abs(points[:, 1]) > 0.30 * size) & (np.abs(points[:, 2] - middle[2] - 0.06 * size) < 0.15 * size)
     care[ears & (shares[:, J["head"]] > 0.5)] = _EARS
     care[near] = _FACE
-    touching = np.unique(faces[_layered(points[faces], _components(faces, len(points))[faces[:, 0]])])
+    touching = np.unique(faces[_layered_triangles(points[faces], _components(faces, len(points))[faces[:, 0]])])
     limit[touching] = _LAYERED_LIMIT
     limit[near] = _FACE_LIMIT
     return care, limit
@@ -120,7 +120,7 @@ def _components(faces: Array, count: int) -> Array:
 
 
 @compiled(nogil=True)
-def _layered(corners: Array, layer: Array) -> Array:
+def _layered_triangles(corners: Array, layer: Array) -> Array:
     """Which triangles lie closely over or under a triangle of another layer."""
     count = len(corners)
     close = np.zeros(count, np.bool_)
@@ -163,7 +163,7 @@ def _over(a: Array, b: Array) -> bool:
     return False
 
 
-def _hidden(points: Array, faces: Array, shares: Array) -> NDArray[np.bool_]:
+def _hidden_triangles(points: Array, faces: Array, shares: Array) -> NDArray[np.bool_]:
     """Which triangles can't be seen from anywhere, whatever the pose."""
     corners = points[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -175,7 +175,7 @@ def _hidden(points: Array, faces: Array, shares: Array) -> NDArray[np.bool_]:
     shape = highest.max(0, initial=0) + 1
     first, member = _members(lowest, highest, shape)
     carried = shares[faces].mean(1)
-    return _covered(corners, normals, low, high, _Grid(origin, shape, first, member), carried)
+    return _covered_triangles(corners, normals, low, high, _Grid(origin, shape, first, member), carried)
 
 
 class _Grid(NamedTuple):
@@ -210,7 +210,7 @@ def _members(lowest: Array, highest: Array, shape: Array) -> tuple[Array, Array]
 
 
 @compiled(nogil=True)
-def _covered(corners: Array, normals: Array, low: Array, high: Array, grid: Any, carried: Array) -> Array:
+def _covered_triangles(corners: Array, normals: Array, low: Array, high: Array, grid: Any, carried: Array) -> Array:
     count = len(corners)
     hidden = np.zeros(count, np.bool_)
     near, found, asked = np.empty(count, np.int64), np.empty(count, np.int64), np.full(count, -1, np.int64)

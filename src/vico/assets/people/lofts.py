@@ -102,7 +102,7 @@ def loft(
     for ring, following in zip(rings, [*rings[1:], rings[-1]], strict=True):
         doubled.append(ring)
         if following.colour != ring.colour:
-            doubled.append(_coloured(following, ring))
+            doubled.append(_with_colour_of(following, ring))
     centres = np.array([np.asarray(ring.centre, np.float64) for ring in doubled])
     axes = _axes(centres)
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
@@ -149,7 +149,7 @@ def _outward(part: BodyPart) -> BodyPart:
     return part
 
 
-def _coloured(following: LoftRing, ring: LoftRing) -> LoftRing:
+def _with_colour_of(following: LoftRing, ring: LoftRing) -> LoftRing:
     return LoftRing(ring.centre, ring.front, ring.back, ring.side, ring.weights, following.colour, ring.square)
 
 
@@ -211,7 +211,7 @@ def blob(
     return loft(rows, sides=sides)
 
 
-def merged(parts: Sequence[BodyPart]) -> BodyPart:
+def merge_parts(parts: Sequence[BodyPart]) -> BodyPart:
     """Put parts together without welding."""
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     return BodyPart(
@@ -223,7 +223,7 @@ def merged(parts: Sequence[BodyPart]) -> BodyPart:
     )
 
 
-def skinned(parts: Sequence[BodyPart], joints: NDArray[np.float64], height: float) -> SkinnedBody:
+def skin_parts(parts: Sequence[BodyPart], joints: NDArray[np.float64], height: float) -> SkinnedBody:
     """Make a body of its parts.
 
     Parameters
@@ -235,7 +235,7 @@ def skinned(parts: Sequence[BodyPart], joints: NDArray[np.float64], height: floa
     height
         Metres, of the person.
     """
-    whole = merged(parts)
+    whole = merge_parts(parts)
     weight_joints, weights = _strongest(whole.weights)
     frames, turned = t_pose(joints)
     return SkinnedBody(

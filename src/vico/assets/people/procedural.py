@@ -1,7 +1,8 @@
 """Our own people: lofted bodies with face, hands, hair and clothes, from anthropometric proportions. No data needed.
 
-Lengths are shares of the stature unless said: segment lengths after Drillis and Contini (as in Winter, *Biomechanics
-and Motor Control of Human Movement*), girths fitted by eye to photographs.
+Lengths are shares of the stature unless said, of bodies of average build: segment lengths after Drillis and Contini (as
+in Winter, *Biomechanics and Motor Control of Human Movement*), girths fitted by eye to photographs. Clothes add
+to them.
 """
 
 from __future__ import annotations
@@ -11,12 +12,94 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.people.accessories import worn_parts
-from vico.assets.people.clothes import darker, front_of
+from vico.assets.people.clothing import darker, front_of, worn_parts
 from vico.assets.people.heads import head_parts
-from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, dense, loft, merged, skinned
-from vico.assets.people.measures import ARM, FINGER, FOREARM, LEG, LEG_EASE, TOP_EASE, TORSO, UPPER_ARM
+from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, dense, loft, merge_parts, skin_parts
 from vico.assets.people.model import FINGERS, JOINTS, Appearance, Colour, J, SkinnedBody
+
+# Height of the ring, then front, back and half-width for a male and for a female body of average build.
+TORSO = np.array(
+    [
+        [0.478, 0.045, 0.050, 0.070, 0.045, 0.050, 0.072],
+        [0.492, 0.057, 0.068, 0.088, 0.058, 0.072, 0.093],
+        [0.510, 0.062, 0.075, 0.096, 0.062, 0.080, 0.102],
+        [0.530, 0.062, 0.075, 0.098, 0.062, 0.079, 0.105],
+        [0.560, 0.061, 0.066, 0.095, 0.060, 0.067, 0.101],
+        [0.590, 0.060, 0.056, 0.089, 0.058, 0.054, 0.089],
+        [0.620, 0.059, 0.050, 0.085, 0.055, 0.047, 0.079],
+        [0.650, 0.060, 0.050, 0.085, 0.055, 0.047, 0.077],
+        [0.680, 0.063, 0.054, 0.089, 0.060, 0.051, 0.081],
+        [0.710, 0.067, 0.059, 0.094, 0.072, 0.055, 0.086],
+        [0.735, 0.069, 0.062, 0.099, 0.076, 0.058, 0.090],
+        [0.760, 0.066, 0.064, 0.103, 0.068, 0.060, 0.093],
+        [0.785, 0.058, 0.062, 0.107, 0.056, 0.059, 0.097],
+        [0.805, 0.049, 0.057, 0.108, 0.047, 0.054, 0.098],
+        [0.820, 0.040, 0.048, 0.094, 0.039, 0.045, 0.084],
+        [0.832, 0.035, 0.041, 0.066, 0.034, 0.038, 0.059],
+        [0.842, 0.031, 0.037, 0.043, 0.029, 0.034, 0.038],
+        [0.855, 0.029, 0.034, 0.033, 0.026, 0.031, 0.029],
+        [0.885, 0.028, 0.033, 0.032, 0.025, 0.030, 0.028],
+    ]
+)
+# Height, front, back, half-width of a leg.
+LEG = np.array(
+    [
+        [0.515, 0.040, 0.048, 0.036],
+        [0.495, 0.050, 0.058, 0.046],
+        [0.470, 0.053, 0.057, 0.049],
+        [0.440, 0.052, 0.051, 0.047],
+        [0.400, 0.049, 0.046, 0.044],
+        [0.350, 0.043, 0.041, 0.039],
+        [0.315, 0.037, 0.036, 0.034],
+        [0.285, 0.034, 0.031, 0.032],
+        [0.260, 0.031, 0.032, 0.031],
+        [0.225, 0.029, 0.038, 0.032],
+        [0.190, 0.027, 0.037, 0.030],
+        [0.140, 0.023, 0.030, 0.024],
+        [0.095, 0.020, 0.024, 0.019],
+        [0.060, 0.019, 0.022, 0.018],
+        [0.040, 0.019, 0.022, 0.018],
+    ]
+)
+# Distance along the arm from the shoulder joint, then half-thickness front-back and across.
+ARM = np.array(
+    [
+        [-0.040, 0.020, 0.014],
+        [-0.018, 0.031, 0.021],
+        [0.004, 0.035, 0.027],
+        [0.035, 0.034, 0.029],
+        [0.070, 0.030, 0.028],
+        [0.110, 0.027, 0.026],
+        [0.150, 0.024, 0.024],
+        [0.172, 0.023, 0.023],
+        [0.192, 0.025, 0.023],
+        [0.220, 0.025, 0.022],
+        [0.260, 0.021, 0.019],
+        [0.300, 0.017, 0.015],
+        [0.318, 0.016, 0.0125],
+    ]
+)
+UPPER_ARM, FOREARM = 0.172, 0.148
+# Along the arm to the knuckle, sideways towards the thumb, length, of index, middle, pinky and ring finger.
+FINGER = {
+    "index": (0.376, 0.0150, 0.043),
+    "middle": (0.380, 0.0050, 0.047),
+    "pinky": (0.367, -0.0145, 0.034),
+    "ring": (0.376, -0.0050, 0.043),
+}
+# What a garment adds to every radius.
+TOP_EASE = {
+    "t-shirt": 0.004,
+    "shirt": 0.005,
+    "jumper": 0.008,
+    "hoodie": 0.010,
+    "jacket": 0.011,
+    "suit": 0.008,
+    "coat": 0.013,
+    "dress": 0.002,
+}
+LEG_EASE = {"trousers": 0.007, "jeans": 0.0035, "shorts": 0.009, "skirt": 0.0, "leggings": 0.0008}
+
 
 # Arms rest this far below the horizontal: halfway between walking and reaching, where shoulders deform best.
 _ARM_DROP = np.radians(58)
@@ -176,7 +259,7 @@ def _torso(tailor: _Tailor) -> list[BodyPart]:
     if look.bottom == "skirt" and look.top not in ("dress", "coat"):
         parts.append(_skirt(tailor, 0.60, 0.325, 1.15, ease=0.010, colour=look.bottom_colour))
     rows = [tailor.z(float(share)) for share in TORSO[:, 0]]
-    return parts + front_of(look, merged(parts), tailor.z, neckline, rows)
+    return parts + front_of(look, merge_parts(parts), tailor.z, neckline, rows)
 
 
 def _share_with_collars(part: BodyPart, tailor: _Tailor) -> None:
@@ -413,4 +496,4 @@ def body(look: Appearance, *, fine: bool = False) -> SkinnedBody:
         parts += [*legs, *_arm(tailor, side)]
     parts += worn_parts(look, tailor.joints, trunk)
     parts += head_parts(look, tailor.head, tailor.h, fine=fine)
-    return skinned(parts, tailor.joints, look.height)
+    return skin_parts(parts, tailor.joints, look.height)

@@ -1,16 +1,6 @@
 """Robots: what physics, control and drawing need to know of each."""
 
 from vico.assets.robots.catalogue import register_robot, robot_kind, robot_model, robot_names, robot_packages
-from vico.assets.robots.control_settings import (
-    ControllerSettings,
-    FourLegs,
-    MobileManipulator,
-    NoController,
-    PolicyNetwork,
-    Quadrotor,
-    SkidSteering,
-    TwoLegs,
-)
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -20,10 +10,18 @@ from vico.assets.robots.model import (
     TOUCH,
     ActionSpace,
     BatteryModel,
+    ControllerSettings,
     DeckModel,
+    FourLegs,
+    MobileManipulator,
+    NoController,
+    PolicyNetwork,
+    Quadrotor,
     RobotModel,
     RotorModel,
     Sensors,
+    SkidSteering,
+    TwoLegs,
     flight_space,
     velocity_space,
 )

@@ -15,8 +15,17 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots.control_settings import Quadrotor
-from vico.assets.robots.model import BUMP, BUMPER, TOUCH, ActionSpace, RobotModel, RotorModel, Sensors, flight_space
+from vico.assets.robots.model import (
+    BUMP,
+    BUMPER,
+    TOUCH,
+    ActionSpace,
+    Quadrotor,
+    RobotModel,
+    RotorModel,
+    Sensors,
+    flight_space,
+)
 from vico.assets.shapes import ball, box, cylinder, facing_x, pose_matrix, tube
 from vico.world.mesh import Surface, merge_surfaces
 
@@ -76,7 +85,7 @@ def _mjcf() -> str:
 </mujoco>"""
 
 
-def _tilted(surface: Surface, axis: tuple[float, float], angle: float, at: NDArray[np.float64]) -> Surface:
+def _tilt(surface: Surface, axis: tuple[float, float], angle: float, at: NDArray[np.float64]) -> Surface:
     """Turn a surface by an angle about a level axis, and move it."""
     u = np.array([axis[0], axis[1], 0.0])
     c, s = np.cos(angle), np.sin(angle)
@@ -137,9 +146,9 @@ def _frame() -> list[Surface]:
     for side in (1.0, -1.0):
         parts.append(box((0.012, 0.004, 0.05), (x - 0.02, side * 0.028, -0.026), colour=_DARK))
     at = np.array([x - 0.02, 0.0, z])
-    parts.append(_tilted(box((0.03, 0.05, 0.032), (0, 0, 0), colour=_ALLOY), (0.0, 1.0), -_CAMERA_PITCH, at))
+    parts.append(_tilt(box((0.03, 0.05, 0.032), (0, 0, 0), colour=_ALLOY), (0.0, 1.0), -_CAMERA_PITCH, at))
     lens = cylinder(0.011, 0.012, sides=12, colour=_DARK).moved(facing_x(0.015, 0, 0))
-    parts.append(_tilted(lens, (0.0, 1.0), -_CAMERA_PITCH, at))
+    parts.append(_tilt(lens, (0.0, 1.0), -_CAMERA_PITCH, at))
     return merge_surfaces(parts)
 
 

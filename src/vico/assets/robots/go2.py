@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 
-from vico.assets.robots.control_settings import FourLegs
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -19,6 +18,7 @@ from vico.assets.robots.model import (
     TOUCH,
     ActionSpace,
     BatteryModel,
+    FourLegs,
     RobotModel,
     Sensors,
     velocity_space,
@@ -118,7 +118,7 @@ def _mjcf() -> str:
 </mujoco>"""
 
 
-def _turned(surface: Surface, axis: str, angle: float, offset: tuple[float, float, float] = (0, 0, 0)) -> Surface:
+def _turn_surface(surface: Surface, axis: str, angle: float, offset: tuple[float, float, float] = (0, 0, 0)) -> Surface:
     c, s = np.cos(angle), np.sin(angle)
     turns = {"x": [[1, 0, 0], [0, c, -s], [0, s, c]], "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]]}
     matrix = np.eye(4)
@@ -142,19 +142,19 @@ def _own_shapes() -> dict[str, list[Surface]]:
     base.append(box((0.32, 0.17, 0.03), (0.01, 0, 0.005), colour=_DARK))
     base.append(box((0.012, 0.07, 0.045), (0.332, 0, 0.015), colour=_BLACK))  # face
     base.append(box((0.006, 0.024, 0.024), (0.339, 0, 0.022), colour=_LIGHT))  # its lamp
-    base.append(_turned(cylinder(0.034, 0.04, sides=14, colour=_BLACK), "y", 2.6, (0.305, 0, -0.052)))  # lidar
+    base.append(_turn_surface(cylinder(0.034, 0.04, sides=14, colour=_BLACK), "y", 2.6, (0.305, 0, -0.052)))  # lidar
     base.append(extrusion([(-0.13, 0.058), (0.13, 0.058), (0.1, 0.075), (-0.1, 0.075)], 0.1, colour=_DARK))  # the back
     shapes = {"base": merge_surfaces(base)}
     for leg in LEGS:
         s = 1 if leg[1] == "L" else -1
         front = 1 if leg[0] == "F" else -1
-        motor = _turned(cylinder(0.046, 0.07, sides=18, colour=_DARK), "y", np.pi / 2, (-0.035, 0, 0))
-        arm = _turned(cylinder(0.044, 0.075, sides=18, colour=_DARK), "x", -s * np.pi / 2, (0, s * 0.012, 0))
+        motor = _turn_surface(cylinder(0.046, 0.07, sides=18, colour=_DARK), "y", np.pi / 2, (-0.035, 0, 0))
+        arm = _turn_surface(cylinder(0.044, 0.075, sides=18, colour=_DARK), "x", -s * np.pi / 2, (0, s * 0.012, 0))
         shapes[f"{leg}_hip"] = merge_surfaces(
             [motor, arm, box((0.05, 0.07, 0.06), (-front * 0.02, 0, 0), colour=_SHELL)]
         )
-        cap = _turned(cylinder(0.047, 0.045, sides=18, colour=_SHELL), "x", -s * np.pi / 2, (0, -s * 0.03, 0))
-        disc = _turned(cylinder(0.03, 0.006, sides=14, colour=_LIGHT), "x", -s * np.pi / 2, (0, s * 0.015, 0))
+        cap = _turn_surface(cylinder(0.047, 0.045, sides=18, colour=_SHELL), "x", -s * np.pi / 2, (0, -s * 0.03, 0))
+        disc = _turn_surface(cylinder(0.03, 0.006, sides=14, colour=_LIGHT), "x", -s * np.pi / 2, (0, s * 0.015, 0))
         outline = [
             (-0.035, 0.01),
             (-0.03, -0.08),

@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 
-from vico.assets.robots.control_settings import SkidSteering
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -20,6 +19,7 @@ from vico.assets.robots.model import (
     DeckModel,
     RobotModel,
     Sensors,
+    SkidSteering,
     velocity_space,
 )
 from vico.assets.robots.packs import husky_shapes

@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 
-from vico.assets.robots.control_settings import MobileManipulator
 from vico.assets.robots.model import (
     BUMP,
     BUMPER,
@@ -18,6 +17,7 @@ from vico.assets.robots.model import (
     TOUCH,
     ActionSpace,
     BatteryModel,
+    MobileManipulator,
     RobotModel,
     Sensors,
     velocity_space,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vico.agents.requester import PACE_HOME
 from vico.agents.talk.acquaintance import first_name
 from vico.assets.models.movable import kinds_for
-from vico.assets.people.words import looks_in_words
+from vico.assets.people.model import describe_appearance
 from vico.challenges.assistant.candidates import ChoiceQuestion, Chooser, choose, seeded_chooser
 from vico.challenges.assistant.placement import (
     Neighbourhood,
@@ -435,7 +435,7 @@ def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     for name in names:
         draw.things.hand(name, kind, holder=who.id, near=source.centre)
     text = (
-        f"Find {who.name}, {looks_in_words(who.appearance)}, often seen at {regions_text(regions)}; take "
+        f"Find {who.name}, {describe_appearance(who.appearance)}, often seen at {regions_text(regions)}; take "
         f"{draw.things.described(names)} from them, follow them home to {region_text(home)} and put it down there."
     )
     return _subtask(index, text, who, names, regions, right, home, candidates)
@@ -466,7 +466,7 @@ def _subtask(
     candidates: dict[str, list[str]],
 ) -> Subtask:
     """Put a subtask together."""
-    person = Person(agent=who.id, name=who.name, looks=looks_in_words(who.appearance))
+    person = Person(agent=who.id, name=who.name, looks=describe_appearance(who.appearance))
     return Subtask(
         index=index,
         text=text,

@@ -18,8 +18,7 @@ from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting
 from vico.challenges.tables.summary import Average, Difference, Estimate, Row, Summary, summarise
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
-from vico.io.files import read_json, write_bytes, write_json
-from vico.io.folders import FolderKind
+from vico.io.files import FolderKind, read_json, write_bytes, write_json
 from vico.version import __version__
 
 _PREFIX = "published_"

@@ -1,44 +1,237 @@
-"""Takes pictures by OpenGL: uploads a scene's arrays as they are, culls, draws, and reads back."""
+"""Takes pictures by OpenGL: uploads a scene's arrays as they are, culls, draws, and reads back.
+
+Shaders are programs that remember their uniforms. A target is what is drawn into and read back.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.errors import MissingExtraError
 from vico.render.arrays import SceneArrays
-from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
+from vico.render.compiled import kernel
 from vico.render.frames import Frames, PictureRequest, light_of
-from vico.render.gl.culling import cluster_ranges, instances_in_view, joined_ranges
-from vico.render.gl.lamps import LAMP_FLOATS, packed_beams, packed_lamps
-from vico.render.gl.moving import CASTER_ROWS, OPENINGS, packed_cabins, packed_casters, packed_openings, packed_past
-from vico.render.gl.program import Program, new_context
-from vico.render.gl.target import Seen, Target
-from vico.render.gl.uniforms import light_uniforms, view_uniforms
-from vico.render.lamps.grid import CELL
+from vico.render.gl.draw_data import (
+    CASTER_ROWS,
+    LAMP_FLOATS,
+    OPENINGS,
+    cluster_ranges,
+    instances_in_view,
+    joined_ranges,
+    light_uniforms,
+    packed_beams,
+    packed_cabins,
+    packed_casters,
+    packed_lamps,
+    packed_openings,
+    packed_past,
+    view_uniforms,
+)
+from vico.render.lamps import AROUND_CORNER, BEFORE, CELL
+from vico.render.lighting import SKY_SIZE
+from vico.render.materials import LEVELS
+from vico.render.motion import PastPlaces
+from vico.render.portals import show_rooms
 from vico.render.records import CABIN_STEPS
 from vico.render.scene import Scene
-from vico.render.sensors.past import PastPlaces
-from vico.render.shading.finishing import occlude, smooth_edges
-from vico.render.shading.lamplight import AROUND_CORNER, BEFORE
-from vico.render.shading.light import Light
-from vico.render.shading.sky import SKY_SIZE
-from vico.render.shading.weather import draw_weather
-from vico.render.shadows import cabins
-from vico.render.textures import LEVELS
-from vico.render.uniforms import Record, camera_uniforms
+from vico.render.shading.post_processing import draw_weather, occlude, smooth_edges
+from vico.render.shadows import casters
+from vico.render.uniforms import Light, Record, camera_uniforms
+
+_HERE = Path(__file__).parent
+
+
+class Program:
+    """A vertex and a fragment shader, which pull corners out of the scene's buffers.
+
+    Parameters
+    ----------
+    gl
+        The context.
+    name
+        Of the two files.
+    constants
+        What shaders share with the processor's renderer, by the names in ``%``.
+    """
+
+    def __init__(self, gl: Any, name: str, constants: Mapping[str, object]) -> None:
+        fragment = (_HERE / f"{name}.frag").read_text()
+        for constant, value in constants.items():
+            fragment = fragment.replace(f"%{constant}%", str(value))
+        program = gl.program((_HERE / f"{name}.vert").read_text(), fragment)
+        self._mode = gl.TRIANGLES
+        self._uniforms = {name: program[name] for name in program}
+        self._told: dict[str, Any] = {}
+        self._corners = gl.vertex_array(program, [])
+
+    def tell(self, values: Mapping[str, Any]) -> None:
+        """Set uniforms that are other than before; what the compiler has left out of the shaders is left out."""
+        for name, value in values.items():
+            if self._told.get(name) != value:
+                self._told[name] = value
+                if name in self._uniforms:
+                    self._uniforms[name].value = value
+
+    def draw(self, triangles: int, instances: int = 1) -> None:
+        """Draw some triangles."""
+        if triangles > 0:
+            self._corners.render(self._mode, vertices=3 * triangles, instances=instances)
+
+
+def new_context() -> Any:
+    """Return a context of OpenGL 4.5, through EGL.
+
+    Raises
+    ------
+    MissingExtraError
+        If moderngl, or a driver, is not there.
+    """
+    try:
+        import moderngl
+    except ImportError:
+        raise MissingExtraError(
+            "the renderer gl needs moderngl: pip install 'virtual-community[gl]', or take the renderer cpu"
+        ) from None
+    try:
+        context = moderngl.create_standalone_context(backend="egl", require=450)
+    except Exception as error:  # whatever a driver says
+        raise MissingExtraError(
+            f"the renderer gl finds no OpenGL 4.5 through EGL ({error}); install a driver (Debian: apt install libegl1 "
+            "libgl1-mesa-dri), or take the renderer cpu"
+        ) from None
+    return context
+
+
+_NOBODY = 1
+# Keys have spare places behind a picture's last pixel.
+_SPARE = 64
+# The sky is this far away, metres: only turning moves it.
+_SKY = 1e7
+
+
+class PictureBuffers(NamedTuple):
+    """A picture and what comes after shading looks at.
+
+    Attributes
+    ----------
+    rgb
+        uint8, shape ``(h, w, 3)``.
+    glass
+        How much of what is behind is seen through each pixel, of 255, uint8, shape ``(h * w,)``.
+    keys
+        As the visibility pass leaves them, uint64: the inverse depth's bits, then who is seen.
+    """
+
+    rgb: NDArray[np.uint8]
+    glass: NDArray[np.uint8]
+    keys: NDArray[np.uint64]
+
+
+class Target:
+    """A frame buffer with all outputs; its first row is the picture's upper one.
+
+    Parameters
+    ----------
+    gl
+        The context.
+    width, height
+        Pixels.
+    with_past
+        Whether it takes where points were.
+    """
+
+    def __init__(self, gl: Any, width: int, height: int, with_past: bool) -> None:
+        size = width, height
+        self._shape = height, width
+        self._colours = gl.texture(size, 4, dtype="f1")
+        self._depth = gl.texture(size, 1, dtype="f4")
+        self._entity = gl.texture(size, 1, dtype="i4")
+        self._normals = gl.texture(size, 4, dtype="f4")
+        planes = [self._colours, self._depth, self._entity, self._normals]
+        if with_past:
+            self._places = gl.texture(size, 4, dtype="f4")
+            planes.append(self._places)
+        for plane in planes:
+            plane.filter = gl.NEAREST, gl.NEAREST
+        self._read_colours = np.empty((height * width, 4), np.uint8)
+        self._buffer = gl.framebuffer(planes, gl.depth_texture(size))
+
+    def clear(self) -> None:
+        """Draw into it from here on, from nothing."""
+        self._buffer.use()
+        self._buffer.clear(depth=1.0)
+
+    def depth(self, into: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """Return depths, metres, shape ``(h, w)``; 0 for the sky."""
+        return self._read(self._depth, np.empty(self._shape, np.float32) if into is None else into)
+
+    def entities(self, into: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
+        """Return who is seen, shape ``(h, w)``."""
+        return self._read(self._entity, np.empty(self._shape, np.int32) if into is None else into)
+
+    def normals(self) -> NDArray[np.float32]:
+        """Return normals, shape ``(h, w, 3)``."""
+        return self._read(self._normals, np.empty((*self._shape, 4), np.float32))[..., :3]
+
+    def places(self, depth: NDArray[np.float32], camera: Record) -> NDArray[np.float64]:
+        """Return where points were, from where the eye was, shape ``(h, w, 3)``; NaN where that is not known."""
+        found = self._read(self._places, np.empty((*self._shape, 4), np.float32)).astype(np.float64)
+        return _with_sky(np.where(found[..., 3:] > 0.5, found[..., :3], np.nan), depth, camera)
+
+    def seen(self, depth: NDArray[np.float32], entity: NDArray[np.int32]) -> PictureBuffers:
+        """Return the picture, given the depths and who is seen in it."""
+        size = self._shape[0] * self._shape[1]
+        colours = self._read(self._colours, self._read_colours)
+        seen = PictureBuffers(
+            np.empty((*self._shape, 3), np.uint8), np.empty(size, np.uint8), np.zeros(size + _SPARE, np.uint64)
+        )
+        halves = seen.keys.view(np.uint32), seen.keys.view(np.float32)
+        _unpack(colours, depth.reshape(-1), entity.reshape(-1), seen.rgb.reshape(-1, 3), seen.glass, *halves)
+        return seen
+
+    def _read(self, plane: Any, into: NDArray[Any]) -> NDArray[Any]:
+        plane.read_into(into)
+        return into
+
+
+@kernel
+def _unpack(colours: Any, depth: Any, entity: Any, rgb: Any, glass: Any, whole: Any, real: Any) -> None:
+    """Write a picture's pixels and keys; `whole` and `real` are the keys' halves, the lower one first."""
+    for i in range(len(depth)):
+        rgb[i, 0], rgb[i, 1], rgb[i, 2] = colours[i, 0], colours[i, 1], colours[i, 2]
+        glass[i] = colours[i, 3]
+        if depth[i] > 0.0:
+            real[2 * i + 1] = np.float32(1.0) / depth[i]
+            whole[2 * i] = max(entity[i], _NOBODY)
+
+
+def _with_sky(places: NDArray[np.float64], depth: NDArray[np.float32], camera: Record) -> NDArray[np.float64]:
+    """Return places with those of the sky, far away along each pixel's ray."""
+    height, width = depth.shape
+    right, down, forward = (
+        np.array([float(camera[f"{name}_{part}"]) for part in "xyz"]) for name in ("right", "down", "forward")
+    )
+    u = (np.arange(width) + 0.5 - float(camera["centre_x"])) / float(camera["focal"])
+    v = (np.arange(height) + 0.5 - float(camera["centre_y"])) / float(camera["focal"])
+    ray = forward + u[None, :, None] * right + v[:, None, None] * down
+    return np.where(depth[..., None] > 0.0, places, _SKY * ray)
+
 
 # What shaders share with the processor's renderer.
 _CONSTANTS = {
     "CASTER_ROWS": CASTER_ROWS,
     "CABIN_STEPS": CABIN_STEPS,
-    "UNDER_ROOF": cabins.UNDER_ROOF,
-    "CABIN_LAMP": cabins.CABIN_LAMP,
-    "CABIN_TILT": cabins.CABIN_TILT,
-    "CABIN_GREEN": cabins.CABIN_GREEN,
-    "CABIN_BLUE": cabins.CABIN_BLUE,
+    "UNDER_ROOF": casters.UNDER_ROOF,
+    "CABIN_LAMP": casters.CABIN_LAMP,
+    "CABIN_TILT": casters.CABIN_TILT,
+    "CABIN_GREEN": casters.CABIN_GREEN,
+    "CABIN_BLUE": casters.CABIN_BLUE,
     "CELL": CELL,
     "AROUND_CORNER": AROUND_CORNER,
     "BEFORE": BEFORE,
@@ -122,7 +315,9 @@ class GlRenderer:
             draw_weather(camera, light, seen.keys, self.scene.moment, rgb)
             frames.rgb[k] = rgb
 
-    def _with_rooms(self, seen: Seen, camera: Record, light: Light, request: PictureRequest) -> NDArray[np.uint8]:
+    def _with_rooms(
+        self, seen: PictureBuffers, camera: Record, light: Light, request: PictureRequest
+    ) -> NDArray[np.uint8]:
         """Return a picture with the rooms behind its glass; draws anew what its target holds."""
         if request.quality.interiors:
 

@@ -10,10 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vico.render.arrays import QUEUE, RUN, SETUPS, STRIDE
-from vico.render.compiled import inlined, kernel
-from vico.render.records import FLAT_NORMAL, MOVES, PLAIN_COLOUR, SHELTERED, TWO_SIDED
-from vico.render.shading.fields import (
+from vico.render.arrays import (
     AROUND,
     BLUE,
     COLUMNS,
@@ -22,11 +19,15 @@ from vico.render.shading.fields import (
     NY,
     NZ,
     PIXEL,
+    QUEUE,
     RED,
     ROWS,
+    RUN,
+    SETUPS,
     SHINE,
     SKY,
     START,
+    STRIDE,
     SU,
     SUN,
     SV,
@@ -37,11 +38,13 @@ from vico.render.shading.fields import (
     Y,
     Z,
 )
-from vico.render.shading.lamplight import queue_lamplight, shown_beams
+from vico.render.compiled import inlined, kernel
+from vico.render.lamps import queue_lamplight, shown_beams
+from vico.render.lighting import SKY_SIZE
+from vico.render.records import FLAT_NORMAL, MOVES, PLAIN_COLOUR, SHELTERED, TWO_SIDED
 from vico.render.shading.pixels import MovingShadows, PixelQueue, finish, finish_sky
-from vico.render.shading.sky import SKY_SIZE
-from vico.render.shading.triangle import set_up_triangle
-from vico.render.visibility.fill import triangle_number
+from vico.render.shading.surfaces import set_up_triangle
+from vico.render.visibility.rasteriser import triangle_number
 
 # Linear red, green, blue of what lies behind a room's walls (doors and windows that nothing fills), sRGB bytes.
 _BEHIND_ROOM = (8, 8, 9)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from vico.exact import apply_matrix
 from vico.render.arrays import INDOORS, PAD
 from vico.render.compiled import inlined, kernel
-from vico.render.lamps.grid import Tops
+from vico.render.lamps import TopHeights
 from vico.render.records import CUTOUT, DOUBLE_SIDED
-from vico.render.shading.light import ReliefMap, ShadowMap
+from vico.render.uniforms import ReliefMap, ShadowMap
 from vico.render.visibility.draw import corner_uv
-from vico.render.visibility.fill import (
+from vico.render.visibility.rasteriser import (
     PictureSize,
     ScreenPoint,
     ScreenTriangle,
@@ -29,7 +29,7 @@ _TOP_METRES = 1.0
 
 
 @inlined
-def _projected(position: Any, model: Any, frame: Any) -> Any:
+def _project(position: Any, model: Any, frame: Any) -> Any:
     """Return column, row and closeness of a point of a model."""
     c, m, f = position, model, frame
     x = m[0, 0] * c[0] + m[0, 1] * c[1] + m[0, 2] * c[2] + m[0, 3]
@@ -74,9 +74,9 @@ def _draw_span(scene: Any, span: Any, model: Any, frame: Any, keys: Any, size: A
         ids, flags = triangle.vertices, materials[triangle.material].flags
         a, b, c = vertices[ids[0]], vertices[ids[1]], vertices[ids[2]]
         t = ScreenTriangle(
-            _projected(a.position, model, frame),
-            _projected(b.position, model, frame),
-            _projected(c.position, model, frame),
+            _project(a.position, model, frame),
+            _project(b.position, model, frame),
+            _project(c.position, model, frame),
         )
         if not lit and twice_area(t) > 0.0 and flags & DOUBLE_SIDED == 0:
             continue
@@ -124,14 +124,14 @@ def shadow_map(
     return ShadowMap(closeness, frame.astype(np.float32))
 
 
-def built_tops(scene: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> Tops:
+def built_tops(scene: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> TopHeights:
     """Return the top heights of ground and buildings, without what is placed on them."""
     counts = scene.counts.copy()
     counts["static_instances"] = 0
     side = float((high - low)[:2].max())
     size = int(np.clip(side / _TOP_METRES, 16, 2048))
     heights, scale = _top_heights(scene._replace(counts=counts), low, high, size)
-    return Tops(heights, float(low[0]), float(low[1]), scale)
+    return TopHeights(heights, float(low[0]), float(low[1]), scale)
 
 
 def relief_map(scene: Any, low: NDArray[np.float64], high: NDArray[np.float64], size: int, radius: float) -> ReliefMap:

@@ -8,10 +8,19 @@ import numpy as np
 
 from vico.render.arrays import PAD, STRIDE
 from vico.render.compiled import inlined, kernel
-from vico.render.shadows.cabins import INSIDE, UNDER_ROOF, sun_in_cabin
-from vico.render.shadows.casters import DEEPEST, TALLEST, instance_reach, is_box_far, set_caster, shadow_reach
-from vico.render.shadows.people import limb_shadow
-from vico.render.visibility.fill import inverse_depth, triangle_number
+from vico.render.shadows.casters import (
+    DEEPEST,
+    INSIDE,
+    TALLEST,
+    UNDER_ROOF,
+    instance_reach,
+    is_box_far,
+    limb_shadow,
+    set_caster,
+    shadow_reach,
+    sun_in_cabin,
+)
+from vico.render.visibility.rasteriser import inverse_depth, triangle_number
 
 # Contact shadows: how far from the middle they reach (in half axes), how steeply they grow, how dark at most.
 _ROUND_EDGE, _BOX_EDGE, _ROUND_GAIN, _BOX_GAIN, _DARKEST = 2.0, 1.25, 1.5, 4.0, 0.75

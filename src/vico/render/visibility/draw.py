@@ -1,8 +1,8 @@
 """The visibility pass: which triangle is seen in which pixel, and how near it is.
 
 What never moves is drawn first, then what moves, so that the former can be kept. Clusters and instances are drawn front
-to back into a buffer of keys (see `vico.render.visibility.fill`); a coarse buffer of the farthest depth in each 8 x 8
-tile tells which of the later ones are hidden as a whole.
+to back into a buffer of keys (see `vico.render.visibility.rasteriser`); a coarse buffer of the farthest depth in each 8
+x 8 tile tells which of the later ones are hidden as a whole.
 """
 
 from __future__ import annotations
@@ -14,29 +14,31 @@ import numpy as np
 from vico.render.arrays import INVERSE_DEPTH, SCREEN_X, SCREEN_Y, VIEW_X, VIEW_Y, VIEW_Z
 from vico.render.compiled import inlined, kernel
 from vico.render.records import CUTOUT, DOUBLE_SIDED
-from vico.render.visibility.candidates import list_moving, list_static, members
 from vico.render.visibility.culling import (
     in_view,
     is_hidden,
     is_instance_in_view,
     is_triangle_hidden,
+    list_moving,
+    list_static,
+    members,
     nearest_depth,
     renew_tiles,
     set_box,
     set_instance_view,
     set_world_view,
 )
-from vico.render.visibility.fill import (
+from vico.render.visibility.rasteriser import (
     CornerUv,
     PictureSize,
     ScreenPoint,
     ScreenTriangle,
+    cut_openings,
     fill,
     fill_cutout,
     triangle_number,
     twice_area,
 )
-from vico.render.visibility.openings import cut_openings
 
 # The coarse depth buffer is renewed after this many triangles of a 256 x 256 picture ...
 _RENEW_TRIANGLES = 1200

@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from vico.geometry import distances
 from vico.io.compiled import compiled
-from vico.io.recent import Recent
+from vico.io.memory import LruCache
 from vico.sim.bodies.collisions import box_gap, gap_to, room_gap
 from vico.sim.bodies.state_arrays import RADIUS
 from vico.world.city_world import numbers_of
@@ -60,7 +60,7 @@ class RoomDoors(Sequence[Sequence[Door]]):
         self._to = rows[order, 1].astype(np.int32)
         self._spots = np.ascontiguousarray(rows[order, 2:])
         self._start = np.searchsorted(rows[order, 0], np.arange(rooms + 1))
-        self._kept: Recent[int, list[Door]] = Recent(_KEPT)
+        self._kept: LruCache[int, list[Door]] = LruCache(_KEPT)
 
     def __len__(self) -> int:
         return len(self._start) - 1

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vico.assets.models.solids import movable_mass, movable_solids
+from vico.assets.models.movable import movable_mass, movable_solids
 from vico.errors import SchemaError
 from vico.exact import apply_matrix
 from vico.quaternions import matrix_of

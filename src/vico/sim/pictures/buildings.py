@@ -36,9 +36,9 @@ from vico.community.model import Resident
 from vico.community.place_index import hours_on
 from vico.exact import apply_matrix
 from vico.render import Scene
-from vico.render.behind.fronts import OPEN_TO_SIGHT
-from vico.render.palette import Palette
+from vico.render.materials import Palette
 from vico.render.records import OPENING
+from vico.render.world_scene import OPEN_TO_SIGHT
 from vico.seeds import rng
 from vico.sim.bodies.arrays import Drawn
 from vico.sim.bodies.rooms import Indoor

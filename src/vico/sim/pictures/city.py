@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.render import Cameras, Scene, render
-from vico.render.palette import Palette
+from vico.render.materials import Palette
 from vico.sim.cameras import Views
 from vico.sim.pictures.buildings import ScenePart
 from vico.sim.pictures.people import MovingBodies

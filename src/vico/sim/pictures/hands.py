@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from vico.assets.models.in_hand import placards, umbrellas
+from vico.assets.models.library import placards, umbrellas
 from vico.assets.models.movable import movable_grip
 from vico.exact import each, product
 from vico.quaternions import matrix_of

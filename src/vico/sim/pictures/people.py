@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people import PASSERS_BY, Appearance, SkinnedBody, body_of, passer_by
-from vico.assets.people.weather_clothes import dressed
+from vico.assets.people.model import dress_for_weather
 from vico.community.model import Resident
 from vico.errors import InputError
 from vico.render.skinning import BodyBatch, batch_bodies
@@ -56,7 +56,7 @@ def looks_of(residents: Sequence[Resident], strangers: int, seed: int, weather: 
     """Return how people look who have dressed for the weather: residents, then strangers."""
     looks = [Appearance.from_dict(resident.appearance) for resident in residents]
     looks += looks_of_strangers(seed, strangers)
-    return [dressed(look, weather.temperature, weather.rain, weather.snow) for look in looks]
+    return [dress_for_weather(look, weather.temperature, weather.rain, weather.snow) for look in looks]
 
 
 def manner_of_pedestrian(pedestrian: int) -> str:
@@ -301,7 +301,7 @@ class DrawnPeople:
 
     def _look(self, i: int, weather: NDArray[np.float64]) -> Appearance:
         temperature, rain, snow = weather.tolist()
-        return dressed(self._own[i], temperature, rain, snow)
+        return dress_for_weather(self._own[i], temperature, rain, snow)
 
     def _prepare(self, look: Appearance) -> None:
         """Begin to make a body."""
@@ -326,11 +326,11 @@ class DrawnPeople:
         made = dict(zip(kinds, in_order(partial(body_of, detail=detail), kinds), strict=True))
         bodies = {i: made[self.looks[i]] for i in rows}
         for name, path in self._worn.items():
-            from vico.assets.people.worn import worn  # few wear anything of their own
+            from vico.assets.people.custom_body import fit_custom_body  # few wear anything of their own
 
             k = self._names.index(name)
             if k in bodies:
-                bodies[k] = worn(bodies[k], path) if detail != "far" else self._bodies[k]
+                bodies[k] = fit_custom_body(bodies[k], path) if detail != "far" else self._bodies[k]
         return bodies
 
     def _describe(self, i: int) -> None:

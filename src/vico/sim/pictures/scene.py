@@ -9,16 +9,16 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.cabins import cabin_of
-from vico.assets.models.in_hand import in_hand_models
+from vico.assets.models.library import in_hand_models
+from vico.assets.transit_vehicles import cabin_of
 from vico.render import Cameras, Lighting, Scene, render
+from vico.render.cameras import Lens
+from vico.render.frames import RenderQuality
 from vico.render.lighting import SHADOW_STEP
 from vico.render.limbs import LIMBS
-from vico.render.quality import RenderQuality
 from vico.render.scene import NO_OPENINGS
-from vico.render.sensors.batch import PictureSet, Viewers
-from vico.render.sensors.lens import Lens
 from vico.render.skinning import skin
+from vico.render.viewers import PictureSet, Viewers
 from vico.render.world_scene import scene_of
 from vico.rules import STAIRS_SPEED
 from vico.sim.animation import LONGEST_BLEND, ground_under_feet, joint_places, pose

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
-from vico.io.files import read_json, write_bytes
-from vico.io.folders import mistaken
+from vico.io.files import read_json, write_bytes, wrong_folder_sentence
 from vico.sim.bodies.arrays import KINDS, Bodies
 from vico.sim.recording.schema import CAST, MANIFEST, SCHEMA, SEGMENT_STEPS, VERSION
 from vico.version import __version__
@@ -136,7 +135,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         If there is none, or it is of another version.
     """
     if not (path / MANIFEST).exists():
-        raise MissingFileError(mistaken(path, "run", "vico run"))
+        raise MissingFileError(wrong_folder_sentence(path, "run", "vico run"))
     manifest = read_json(path / MANIFEST)
     if not isinstance(manifest, dict) or manifest.get("schema_name") != SCHEMA:
         raise SchemaError(f"{path / MANIFEST}: not a {SCHEMA} file; give a run folder")

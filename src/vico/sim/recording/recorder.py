@@ -13,8 +13,7 @@ from typing import Any, Self
 
 from vico.community.folder import write_community
 from vico.errors import EmptyInputError, InputError, OutputError, OutputExistsError
-from vico.io.files import write_errors, write_json
-from vico.io.folders import FolderLock, folder_errors
+from vico.io.files import FolderLock, folder_errors, write_errors, write_json
 from vico.sim.bodies.arrays import Bodies
 from vico.sim.loop.simulation import Simulation, StepResult
 from vico.sim.recording.films import ViewFilms, drop_views_after

@@ -18,7 +18,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from vico.assets.motions import HIP_HEIGHT, MotionClip
-from vico.assets.motions.rotations import matrices_of, vectors_of
+from vico.assets.motions.clip import rotation_matrices, rotation_vectors
 from vico.assets.people import Appearance, body_of
 from vico.errors import EmptyInputError, InputError
 from vico.exact import product
@@ -496,7 +496,7 @@ def motion_of(run: Run, agent: str) -> MotionClip:
     position = (place + product(turned, pelvis[:, :, None])[:, :, 0]) * (HIP_HEIGHT / standing)
     times = run.columns("steps")["time"]
     rate = (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 1 else 1.0
-    orientation = vectors_of(product(turned, matrices_of(rotations[:, 0])))
+    orientation = rotation_vectors(product(turned, rotation_matrices(rotations[:, 0])))
     return MotionClip(agent, rate, np.asarray(position, np.float32), orientation, rotations[:, 1:])
 
 

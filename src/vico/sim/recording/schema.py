@@ -21,8 +21,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
-from vico.io.files import read_json, write_bytes, write_json
-from vico.io.folders import FolderKind
+from vico.io.files import FolderKind, read_json, write_bytes, write_json
 from vico.io.plain_data import read_plain, write_plain
 from vico.sim.state.snapshot import read_snapshot, write_snapshot
 

@@ -16,7 +16,7 @@ from vico.errors import InputError
 from vico.exact import apply_matrix
 from vico.geometry import distances
 from vico.kinematics.arm import hand_pose, reach_pose
-from vico.kinematics.ways import CARRY, downward, way_down, way_to_carry
+from vico.kinematics.hand_paths import CARRY, downward, path_down, path_to_carry
 from vico.quaternions import matrix_of
 from vico.sim.bodies.arrays import Bodies
 from vico.sim.bodies.collisions import DeckPose
@@ -254,7 +254,7 @@ def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool
     run.arrays.status[robot] = RobotStatus.MOVING
     stage = TaskStage(int(a.stage[row]))
     if stage == TaskStage.RAISE and not len(work.ways[row]):
-        work.ways[row] = way_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
+        work.ways[row] = path_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
         a.point[row] = 0
     if stage == TaskStage.GO:
         away = float(np.hypot(*(a.target[row] - run.position(robot))[:2]))
@@ -354,7 +354,7 @@ def _plan(run: RobotRun, robot: int, work: ArmTasks, row: int, memory: Array) ->
     now = work.model.rest[:7] + memory[ARM_NOW][:7]
     way: tuple[Array, int] | None = None
     if goals is not None and kind in (TaskKind.PICK, TaskKind.PLACE):
-        way = way_down(work.chain, now, goals, holds=kind == TaskKind.PLACE)
+        way = path_down(work.chain, now, goals, holds=kind == TaskKind.PLACE)
     elif goals is not None:
         reached = (reach_pose(work.chain, goal, now) for goal in goals)
         way = next(((angles[None], 0) for angles in reached if angles is not None), None)
@@ -481,7 +481,7 @@ def _after_lift(run: RobotRun, robot: int, work: ArmTasks, row: int, memory: Arr
                 _next(work, row, TaskStage.ALIGN)
             return
         a.held[row] = float(a.entity[row]), depth
-        work.ways[row] = way_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
+        work.ways[row] = path_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
     a.point[row] = 0
     _next(work, row, TaskStage.TUCK)
 

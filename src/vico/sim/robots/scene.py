@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import TICK, RobotModel, robot_model
-from vico.assets.robots.ground import narrow_ground
+from vico.assets.robots.traversability import untraversable_cells
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.bodies.arrays import ROBOT, Bodies
@@ -217,7 +217,7 @@ class RobotScene:
         model = self.models[robot]
         key = model.half_width, model.kerb
         if key not in self._narrow:
-            self._narrow[key] = narrow_ground(self.world, model)
+            self._narrow[key] = untraversable_cells(self.world, model)
         return self._narrow[key]
 
 

@@ -19,8 +19,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.assets.house_doors import DOOR_MATERIAL, house_doors
-from vico.assets.models.furniture import furniture_models
-from vico.assets.models.street import street_models
+from vico.assets.models.library import furniture_models, street_models
 from vico.clock import DAY, seconds_of_day
 from vico.community.model import ActivityTag, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import stated_hours

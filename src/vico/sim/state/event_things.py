@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.assets.vehicles import vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.sim.bodies.arrays import CAR, FIXTURE, Bodies, Drawn

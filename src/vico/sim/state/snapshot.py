@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
+from vico.io.arrays import read_npz
 from vico.io.files import write_bytes
-from vico.io.npz import read_npz
 from vico.version import __version__
 
 SCHEMA = "vico.snapshot"

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.vehicle_lights import lit_lamps, night_lamps
-from vico.assets.vehicle_parts import mirrored
-from vico.assets.vehicles import CRANK_AXLE, ridden_prototypes, vehicle_prototypes
+from vico.assets.vehicle_parts import mirror
+from vico.assets.vehicles import CRANK_AXLE, lit_lamps, night_lamps, ridden_prototypes, vehicle_prototypes
 from vico.exact import product
 from vico.sim.animation.motions import TURN_OF_CRANKS
 from vico.sim.bodies.arrays import Bodies, Drawn, concatenate_drawn
@@ -92,7 +91,7 @@ class TrafficDrawing:
         models = models | lit_lamps()
         if self._heads is not None:
             models = models | self._heads.prototypes()
-        return models | {"bus": [mirrored(part) for part in models["bus"]]} if lefthand else models
+        return models | {"bus": [mirror(part) for part in models["bus"]]} if lefthand else models
 
 
 def _crank_transforms(bicycles: NDArray[np.float32], turns: NDArray[np.float64]) -> NDArray[np.float32]:

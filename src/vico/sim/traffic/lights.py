@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.vehicle_lights import lit_lamps
+from vico.assets.vehicles import lit_lamps
 from vico.io.compiled import compiled
 from vico.sim.bodies.arrays import Drawn
 from vico.sim.traffic.state import APPROACHING, NONE

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.signal_lights import signal_prototypes
+from vico.assets.models.library import signal_prototypes
 from vico.io.compiled import compiled
 from vico.seeds import rng
 from vico.sim.bodies.arrays import Drawn

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from vico.assets.bus import BUS_SIZE
+from vico.assets.transit_vehicles import BUS_SIZE
 from vico.clock import DAY
 from vico.errors import InputError
 from vico.sim.traffic import Traffic

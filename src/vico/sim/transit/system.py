@@ -14,8 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.bus import BUS_FLOOR, BUS_SIZE, bus_door_leaves, bus_leaf, bus_places
-from vico.assets.tram import TRAM_FLOOR, tram_places
+from vico.assets.transit_vehicles import (
+    BUS_FLOOR,
+    BUS_SIZE,
+    TRAM_FLOOR,
+    bus_door_leaves,
+    bus_leaf,
+    bus_places,
+    tram_places,
+)
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_CAPACITY, BUS_DOOR_REACH, BUS_DWELL, BUS_FARE, TRAM_SECTIONS
@@ -48,8 +55,8 @@ class TransitVehicles:
     stop
         Index in its line of the stop each bus stands at or drives to.
     riders
-        Who is at each place of each bus, seats first (`vico.assets.bus.bus_places`), -1 for nobody, int32, shape
-        ``(buses, BUS_CAPACITY)``; the caller's numbers.
+        Who is at each place of each bus, seats first (`vico.assets.transit_vehicles.bus_places`), -1 for nobody, int32,
+        shape ``(buses, BUS_CAPACITY)``; the caller's numbers.
     open
         How far each bus's doors are open, 0..1.
     trams

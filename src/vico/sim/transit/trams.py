@@ -15,8 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.train import SHAPES_OF, train_prototypes
-from vico.assets.tram import TRAM_BELLOWS, TRAM_CAPACITY, TRAM_HEIGHT, tram_door_leaves, tram_places, tram_prototypes
+from vico.assets.transit_vehicles import (
+    SHAPES_OF,
+    TRAM_BELLOWS,
+    TRAM_CAPACITY,
+    TRAM_HEIGHT,
+    train_prototypes,
+    tram_door_leaves,
+    tram_places,
+    tram_prototypes,
+)
 from vico.clock import DAY
 from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.sim.bodies.arrays import TRAM, Bodies, Drawn

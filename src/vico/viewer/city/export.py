@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from vico.assets.models.in_hand import placards, umbrellas
+from vico.assets.models.library import placards, umbrellas
 from vico.io.cache import cache_folder
-from vico.io.files import write_bytes, write_json
-from vico.io.folders import new_folder
-from vico.render.lamps.found import LAMP_KINDS, with_lit_heads
+from vico.io.files import new_folder, write_bytes, write_json
+from vico.render.world_scene import LAMP_KINDS, with_lit_heads
 from vico.version import __version__
 from vico.viewer.city.doors import door_entries
 from vico.viewer.city.models import moving_models, write_instances, write_models

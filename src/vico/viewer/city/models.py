@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.models.in_hand import in_hand_models
+from vico.assets.models.library import in_hand_models, signal_prototypes
 from vico.assets.models.movable import movable_colours, movable_kinds, movable_prototype, movable_surfaces
-from vico.assets.signal_lights import signal_prototypes
-from vico.assets.simplify import thinned
-from vico.assets.train import train_prototypes
-from vico.assets.tram import tram_prototypes
-from vico.assets.vehicle_lights import lit_lamps, night_lamps
-from vico.assets.vehicles import CAR_KINDS, ridden_prototypes, vehicle_prototypes
+from vico.assets.simplification import simplify_mesh
+from vico.assets.transit_vehicles import train_prototypes, tram_prototypes
+from vico.assets.vehicles import CAR_KINDS, lit_lamps, night_lamps, ridden_prototypes, vehicle_prototypes
 from vico.viewer.city.pack import Blob, packed
 from vico.viewer.city.textures import TextureLayers
 from vico.world.mesh import Surface
@@ -66,7 +63,7 @@ def coarse(surfaces: Sequence[Surface], textures: TextureLayers) -> list[Surface
 
 def _thinned(surface: Surface, textures: TextureLayers) -> Surface:
     wanted = max(_FAR_LEAST, round(_FAR_SHARE * len(surface.triangles)))
-    points, faces, kept = thinned(surface.positions, surface.triangles, wanted)
+    points, faces, kept = simplify_mesh(surface.positions, surface.triangles, wanted)
     if not len(faces):
         return surface
     tint = textures.layer_of(surface.material).colour / 255.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people import PARENTS, Appearance, SkinnedBody, body_of
-from vico.assets.people.level_of_detail import lightened
+from vico.assets.people.level_of_detail import simplify_body
 from vico.io.cache import cache_folder
 from vico.io.files import write_bytes
 from vico.seeds import rng
@@ -106,7 +106,7 @@ def _rounded(table: NDArray[Any]) -> list[list[float]]:
 
 
 def _far_body(body: SkinnedBody) -> SkinnedBody:
-    return lightened(body, _FAR_TRIANGLES)
+    return simplify_body(body, _FAR_TRIANGLES)
 
 
 def _mesh_columns(mesh: SkinnedBody) -> list[NDArray[Any]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.assets.shapes import Colour
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record

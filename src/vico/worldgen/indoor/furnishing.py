@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.assets.models.model import Model
 from vico.geometry import distances
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.assets.models.model import Top
 from vico.worldgen.indoor.catalogue import room_kinds
 from vico.worldgen.indoor.furnishing import Furnishing

@@ -27,7 +27,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from vico.assets.interior import FLOORS, THICK, WALLS
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.seeds import rng
 from vico.world.check.indoors import walkable_inside
@@ -65,7 +65,7 @@ class LayoutPiece(_Strict):
     def _known(self) -> LayoutPiece:
         if self.model not in furniture_models():
             raise ValueError(
-                f"there is no furniture called {self.model!r}; see vico.assets.models.furniture.furniture_models"
+                f"there is no furniture called {self.model!r}; see vico.assets.models.library.furniture_models"
             )
         return self
 

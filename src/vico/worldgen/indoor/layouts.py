@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vico.assets.interior import DOOR_HEIGHT, HEAD, RISE, SHOP_SILL, SILL, THICK, Inside, WallOpening, shell
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.io.data_files import cached_data
 from vico.rules import REACH
 from vico.seeds import rng

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.worldgen.indoor import records
 from vico.worldgen.indoor.furnishing import STEP_IN, Member, RoomDraft
 

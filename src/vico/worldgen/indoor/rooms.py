@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.assets.models.furniture import furniture_models
+from vico.assets.models.library import furniture_models
 from vico.assets.models.model import Model
 from vico.assets.shapes import pose_matrix
 from vico.world.mesh import Surface, merge_surfaces

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
 from vico.geo.quantities import metres, number, quantity

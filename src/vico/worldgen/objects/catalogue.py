@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from pydantic import Field, model_validator
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.errors import SchemaError
 from vico.geo.osm import Tags
 from vico.geo.quantities import metres

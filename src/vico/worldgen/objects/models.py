@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from vico.assets.things.pack import credits_of, our_models, read_things
+from vico.assets.furniture_pack import credits_of, our_models, read_things
 from vico.assets.vehicles import vehicle_prototypes
 from vico.world.mesh import Surface
 from vico.world.model import Source

@@ -17,8 +17,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.assets.models.library import street_models
 from vico.assets.models.model import Model
-from vico.assets.models.street import street_models
 from vico.geo.osm import OsmData
 from vico.rules import TRAM_WIDTH
 from vico.seeds import rng

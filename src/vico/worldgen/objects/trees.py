@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.geo import overlay
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, Tags

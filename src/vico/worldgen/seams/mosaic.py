@@ -15,9 +15,8 @@ from shapely.affinity import translate
 
 from vico.geo import overlay
 from vico.geo.overlay import polygons_of
-from vico.io.arrays import new_array
+from vico.io.arrays import new_array, npz_bytes
 from vico.io.files import write_bytes
-from vico.io.npz import npz_bytes
 from vico.world.city import EDGE, HIGH, LEVELS, LOW, SMOOTH
 from vico.world.heights import Decks, HeightField, Stairs
 from vico.worldgen.facts.streets import StreetPolygons

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from vico.io.arrays import new_array
+from vico.io.arrays import new_array, npz_bytes
 from vico.io.files import write_bytes
-from vico.io.npz import npz_bytes
 from vico.world.city import COST, GATES, REACHED, ROOM, STEPS, SURFACES
 from vico.world.city_gates import Gates
 from vico.world.lanes import DisjointSets

@@ -32,9 +32,9 @@ from vico.challenges.learning.manipulation.scene import (
 )
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.exact import apply_matrix, each, product
+from vico.io.arrays import read_npz
 from vico.io.files import new_file
-from vico.io.npz import read_npz
-from vico.kinematics.ways import downward, way_down
+from vico.kinematics.hand_paths import downward, path_down
 
 Numbers = NDArray[np.float32]
 
@@ -369,7 +369,7 @@ class ScriptedExpert:
         for axis in np.argsort(half[:2]).tolist():
             along = r.thing_rotation[0, :2, axis]
             goals += [downward(grip, sign * along, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
-        found = way_down(self._chain, r.joints[0, :7].copy(), goals, holds=False)
+        found = path_down(self._chain, r.joints[0, :7].copy(), goals, holds=False)
         if found is None:
             self.stage = ExpertPhase.DONE
             return
@@ -393,7 +393,7 @@ class ScriptedExpert:
             at = goal.copy()
             at[:2] = r.goal[0, :2] + apply_matrix(r.hand[0] - r.thing[0], rotation)[:2]
             turned.append(np.column_stack([product(rotation, r.hand_rotation[0]), at]))
-        found = way_down(self._chain, r.joints[0, :7].copy(), turned, holds=True)
+        found = path_down(self._chain, r.joints[0, :7].copy(), turned, holds=True)
         if found is None:
             self.stage = ExpertPhase.DONE
             return

@@ -18,7 +18,7 @@ from vico.assets.robots import LIMB, TOUCH, MobileManipulator, RobotModel, robot
 from vico.errors import EmptyInputError, InputError
 from vico.io.mujoco import mujoco
 from vico.kinematics.arm import Chain, reach_pose
-from vico.kinematics.ways import downward
+from vico.kinematics.hand_paths import downward
 from vico.quaternions import upright
 
 #: Control steps a second, and seconds of a step of physics.

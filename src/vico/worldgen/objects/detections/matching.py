@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.models.street import street_models
+from vico.assets.models.library import street_models
 from vico.geo.detections import Detections
 from vico.geo.osm import OsmData, OsmNode
 from vico.geometry import distances

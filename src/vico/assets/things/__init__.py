@@ -1,1 +1,0 @@
-"""Models of others in the place of ours: the furniture pack of Debian, found, fitted, made light and baked."""

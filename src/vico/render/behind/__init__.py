@@ -1,1 +1,0 @@
-"""What lies behind glass: rooms seen from the street."""

@@ -1,1 +1,0 @@
-"""Light of lamps, shop fronts and headlights on what is around them."""
