@@ -47,7 +47,7 @@ from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK
 from vico.world.world import World
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.daylight import sun_in, without_sun
 from vico.worldgen.photos.streetview.pose import Correction, Pose, correction
@@ -372,7 +372,7 @@ def texels(truth: World, before: Painted, after: Painted) -> list[str]:
     # Both without the light of their day, as the enhancement leaves them.
     faces = [*after.walls, *after.roofs]
     corners = np.concatenate([s.positions[s.triangles] for s in faces]).reshape(-1, 3)
-    sight = Sight(corners, np.arange(len(corners)).reshape(-1, 3))
+    sight = RayCaster(corners, np.arange(len(corners)).reshape(-1, 3))
     pair = []
     for atlas in (before.atlas, after.atlas):
         sun = sun_in(atlas, sight)

@@ -40,7 +40,7 @@ from vico.world.folder import read_world
 from vico.world.glb import glb_bytes
 from vico.world.mesh import Surface
 from vico.world.world import stage_seconds
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap
 from vico.worldgen.photos.baking import Baked, _Expected, _paint, _Photos, bake
@@ -86,7 +86,7 @@ def truth_of(atlas: Atlas, mesh: TileMesh) -> tuple[NDArray[np.uint8], ...]:
     pages = tuple(page.copy() for page in atlas.pages)
     known = tuple(np.zeros_like(mask) for mask in atlas.known)
     exact = replace(atlas, pages=pages, known=known)
-    _paint(exact, _Expected.nothing(len(atlas.charts)), Sight(mesh.positions, mesh.triangles), _Photos(mesh), 0.12)
+    _paint(exact, _Expected.nothing(len(atlas.charts)), RayCaster(mesh.positions, mesh.triangles), _Photos(mesh), 0.12)
     return pages
 
 
@@ -109,7 +109,7 @@ def photogrammetry(walls: Sequence[Surface], roofs: Sequence[Surface], *, seed: 
     middle = corners.mean(axis=1)
     faces = exact.positions[exact.triangles]
     upward = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])[:, 2] > 0
-    over = Sight(exact.positions, exact.triangles).first(middle + 0.3 * normal, np.array([0.0, 0.0, 1.0]))
+    over = RayCaster(exact.positions, exact.triangles).first(middle + 0.3 * normal, np.array([0.0, 0.0, 1.0]))
     hidden = (over.triangle >= 0) & upward[over.triangle]
     low = middle[:, 2] < np.median(exact.positions[:, 2].min()) + 2.0
     gone = hidden | (low & (random.random(len(middle)) < 0.5)) | (random.random(len(middle)) < 0.02)

@@ -35,7 +35,7 @@ from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.mesh import Surface
 from vico.world.world import World
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap
 from vico.worldgen.photos.streetview.masks import PhotoView
@@ -78,7 +78,7 @@ def true_pages(atlas: Atlas, surfaces: list[Surface], *, reach: float = 0.03) ->
     owner = np.repeat(np.arange(len(surfaces)), [len(s.triangles) for s in surfaces])
     uv = np.concatenate([s.uv[s.triangles] for s in surfaces])
     colour = np.concatenate([s.colour[s.triangles] for s in surfaces]).astype(np.float32)
-    sight = Sight(corners, np.arange(len(corners)).reshape(-1, 3))
+    sight = RayCaster(corners, np.arange(len(corners)).reshape(-1, 3))
     small = [_reduced(s, atlas.texel) for s in surfaces]
     pages = [page.copy() for page in atlas.pages]
     for chart in atlas.charts:
@@ -254,7 +254,7 @@ def measure(world: World, count: int, seed: int, pictures: Path | None) -> list[
     ground = world.surfaces("ground")
     solids = [*ground, *walls, *roofs]
     starts = np.cumsum([0, *(len(s.positions) for s in solids)])
-    sight = Sight(
+    sight = RayCaster(
         np.concatenate([s.positions for s in solids]),
         np.concatenate([s.triangles + k for s, k in zip(solids, starts, strict=False)]),
     )

@@ -6,10 +6,10 @@ from vico.geo.osm import OsmData
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
-from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.building_outlines import building_plans
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.ground.bridges.stage import bridges_of
+from vico.worldgen.ground.grade_separation import bridges_of
 from vico.worldgen.ground.stage import APRON, ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.yards import yards_of

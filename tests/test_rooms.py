@@ -186,7 +186,7 @@ _OVERLAYS = {"intersection", "difference", "union", "union_all", "unary_union", 
     "polygonize", "make_valid", "set_precision", "simplify", "offset_curve",
 }  # fmt: skip
 # Overlays of what is our own: lines between grid points that already meet, a table of countries.
-_EXACT = {"geo/overlay.py", "worldgen/ground/contours.py", "worldgen/facts/driving_side.py"}
+_EXACT = {"geo/overlay.py", "worldgen/ground/polygons.py", "worldgen/facts/street_habits.py"}
 
 
 def test_geometry_from_outside_is_overlaid_by_one_module() -> None:

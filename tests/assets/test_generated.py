@@ -26,8 +26,8 @@ from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaE
 from vico.io import diffusion
 from vico.io.diffusion import ModelFolder, model_folder
 from vico.world.objects import Objects
-from vico.worldgen.objects.kinds import thing_of
-from vico.worldgen.objects.models import models_of
+from vico.worldgen.objects.mapped_objects import thing_of
+from vico.worldgen.objects.stage import models_of
 
 
 def ball(sides: int = 40, *, inside_out: bool = False) -> RawMesh:

@@ -13,7 +13,7 @@ from vico.assets.vehicles import vehicle_prototypes
 from vico.seeds import rng
 from vico.world.mesh import Surface
 from vico.world.world import World
-from vico.worldgen.facts.sight import Hits, Sight
+from vico.worldgen.facts.ray_casting import RayCaster, RayHits
 
 GROUND, BUILDING, THING = 0, 1, 2
 
@@ -35,7 +35,7 @@ class Seen:
         `GROUND`, `BUILDING` or `THING`, shape ``(m,)``.
     """
 
-    sight: Sight
+    sight: RayCaster
     normal: NDArray[np.float32]
     kind: NDArray[np.uint8]
     _uv: NDArray[np.float32]
@@ -43,7 +43,7 @@ class Seen:
     _picture: NDArray[np.int32]
     _pictures: tuple[NDArray[np.uint8], ...]
 
-    def colours(self, hits: Hits) -> NDArray[np.float32]:
+    def colours(self, hits: RayHits) -> NDArray[np.float32]:
         """Return the colours at what rays met, sRGB 0..1, shape ``(n, 3)``; zeros where they met nothing."""
         out = np.zeros((len(hits.triangle), 3), np.float32)
         met = np.flatnonzero(hits.triangle >= 0)
@@ -120,7 +120,7 @@ def seen_world(
             pictures.append(_as_seen(surface, texel))
         which.append(np.full(len(surface.triangles), numbers.get(name, -1), np.int32))
     return Seen(
-        Sight(points, faces),
+        RayCaster(points, faces),
         normal.astype(np.float32),
         np.concatenate([np.full(len(s.triangles), kind, np.uint8) for kind, s in layers]),
         np.concatenate([s.uv[s.triangles] for _, s in layers]),

@@ -17,7 +17,7 @@ from vico.sim.traffic.stopping_places import places_in_car_parks, with_places
 from vico.world.heights import HeightField
 from vico.world.model import ParkingSpot
 from vico.world.objects import Objects
-from vico.worldgen.objects.car_park_ways import with_ways
+from vico.worldgen.objects.parking_paths import with_parking_paths
 
 _ROWS, _PITCH = (14.0, 25.5), 2.5  # m from the lane's middle, and from spot to spot
 
@@ -51,7 +51,7 @@ def _spots() -> tuple[list[ParkingSpot], int]:
         streets=[],
     )
     alone = replace(lanes, zone=np.where(np.arange(len(lanes)) == lane, -1, lanes.zone))
-    return with_ways(
+    return with_parking_paths(
         spots,
         streets=streets,
         lanes=alone,

@@ -12,18 +12,15 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.seeds import rng
 from vico.world.check.buildings import coplanar_overlaps, open_edges
-from vico.worldgen.buildings.projections import projections, water_tank
-from vico.worldgen.buildings.roofs.dormers import dormers
-from vico.worldgen.buildings.roofs.eaves import eaves, edges_of, slopes_of
+from vico.worldgen.buildings.details import projections, water_tank
+from vico.worldgen.buildings.roof_details import dormers, eaves, edges_of, slopes_of
 from vico.worldgen.buildings.solids import Footing, Mesh, part_mesh
 from vico.worldgen.buildings.stage import clad
-from vico.worldgen.buildings.storeys import storeys_of
-from vico.worldgen.facades.catalogue import styles
-from vico.worldgen.facades.cuts import cut_at_heights, without_needless
-from vico.worldgen.facades.looks import FacadeStyle, look_of, told_apart
+from vico.worldgen.buildings.walls import cut_at_heights, storeys_of, without_needless
+from vico.worldgen.facades.facade_styles import FacadeStyle, distinct_styles, facade_style_of, styles
 from vico.worldgen.facades.textures.materials import PAINTERS
-from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
-from vico.worldgen.facts.outlines.roof_shapes import Roof
+from vico.worldgen.facts.building_plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.roofs import Roof
 from vico.worldgen.ground.terrain import flat_terrain
 
 NO_STREETS = shapely.STRtree([])
@@ -55,7 +52,7 @@ def volume(mesh: Mesh) -> float:
 
 def look(wall: str, region: str) -> FacadeStyle:
     tags = {"building:material": {"wall_brick": "brick"}.get(wall, "")}
-    made = look_of("residential", tags, levels=5, area=300.0, region=region, random=rng(0, "look"))
+    made = facade_style_of("residential", tags, levels=5, area=300.0, region=region, random=rng(0, "look"))
     return made.__class__(**{**made.__dict__, "wall": wall, "bay": 3.0, "hall": False})
 
 
@@ -240,11 +237,11 @@ def test_a_cut_wall_keeps_closed_with_the_fewest_triangles() -> None:
 
 def test_neighbours_in_the_same_clothes_are_told_apart_unless_the_map_says_so() -> None:
     same = look("wall_shuttered", "southern")
-    palette_colour = look_of("residential", {}, levels=3, area=90.0, region="southern", random=rng(3, "x"))
+    palette_colour = facade_style_of("residential", {}, levels=3, area=90.0, region="southern", random=rng(3, "x"))
     one = palette_colour
-    made = told_apart([one, one, one], [(0, 1), (1, 2)], [True, True, True])
+    made = distinct_styles([one, one, one], [(0, 1), (1, 2)], [True, True, True])
     assert made[0].tint != made[1].tint != made[2].tint
-    kept = told_apart([one, one], [(0, 1)], [True, False])
+    kept = distinct_styles([one, one], [(0, 1)], [True, False])
     assert kept[0].tint == kept[1].tint
     assert same.wall == "wall_shuttered"
 

@@ -21,7 +21,7 @@ from vico.seeds import rng
 from vico.world.model import FIRST_BUILDING
 from vico.worldgen.buildings.solids import convex_pieces
 from vico.worldgen.buildings.stage import BuildingsResult, Cladding, clad
-from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.building_outlines import building_plans
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vico.worldgen.ground.contours import region_above
+from vico.worldgen.ground.polygons import region_above
 
 
 def test_a_cone_gives_a_circle() -> None:

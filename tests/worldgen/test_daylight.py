@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vico.world.mesh import Surface
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, unwrap
 from vico.worldgen.photos.daylight import sun_in, without_sun
 from vico.worldgen.photos.streetview.projection import texel_centres
@@ -24,7 +24,7 @@ def block(x: float, y: float, height: float, entity: int) -> list[Surface]:
 
 
 @pytest.fixture(scope="module")
-def city() -> tuple[Atlas, Sight]:
+def city() -> tuple[Atlas, RayCaster]:
     """Nine blocks of different grey without any light in it, all of it photographed."""
     pytest.importorskip("embreex", reason="casts rays")
     surfaces = [s for k in range(9) for s in block(32.0 * (k % 3), 32.0 * (k // 3), 12.0 + 4 * (k % 4), entity=100 + k)]
@@ -33,11 +33,11 @@ def city() -> tuple[Atlas, Sight]:
     for chart in atlas.charts:
         pages[chart.page][chart.box] = 90 + 8 * (chart.entity - 100)
     corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).reshape(-1, 3)
-    sight = Sight(corners, np.arange(len(corners)).reshape(-1, 3))
+    sight = RayCaster(corners, np.arange(len(corners)).reshape(-1, 3))
     return Atlas(tuple(pages), atlas.inside, atlas.inside, atlas.charts, atlas.texel, atlas.pieces), sight
 
 
-def sunny(atlas: Atlas, sight: Sight) -> Atlas:
+def sunny(atlas: Atlas, sight: RayCaster) -> Atlas:
     """The same in the light of a sun as strong as the sky, shadows and all."""
     pages = [page.copy() for page in atlas.pages]
     for chart in atlas.charts:
@@ -49,7 +49,7 @@ def sunny(atlas: Atlas, sight: Sight) -> Atlas:
     return Atlas(tuple(pages), atlas.inside, atlas.known, atlas.charts, atlas.texel, atlas.pieces)
 
 
-def test_the_sun_is_where_it_was_and_its_shadows_go(city: tuple[Atlas, Sight]) -> None:
+def test_the_sun_is_where_it_was_and_its_shadows_go(city: tuple[Atlas, RayCaster]) -> None:
     atlas, sight = city
     photos = sunny(atlas, sight)
     sun = sun_in(photos, sight)
@@ -68,7 +68,7 @@ def test_the_sun_is_where_it_was_and_its_shadows_go(city: tuple[Atlas, Sight]) -
     assert error(mended) < 0.25 * error(photos)
 
 
-def test_under_clouds_there_is_no_sun(city: tuple[Atlas, Sight]) -> None:
+def test_under_clouds_there_is_no_sun(city: tuple[Atlas, RayCaster]) -> None:
     atlas, sight = city
     random = np.random.default_rng(1)
     pages = tuple(np.clip(p * 0.7 + random.normal(0, 6, p.shape), 0, 255).astype(np.uint8) for p in atlas.pages)

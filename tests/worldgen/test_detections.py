@@ -18,8 +18,7 @@ from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.heights import HeightField
 from vico.world.world import World, detected_objects
-from vico.worldgen.objects.detections.classes import detected_classes
-from vico.worldgen.objects.detections.matching import DetectedThings, things_from_detections
+from vico.worldgen.objects.detections import DetectedThings, detected_classes, things_from_detections
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions

@@ -15,8 +15,8 @@ from vico.world.check import check_world
 from vico.world.folder import read_world
 from vico.world.model import Dropped
 from vico.world.world import World
-from vico.worldgen.buildings import drafts
-from vico.worldgen.facts.expendable import NamedShape, expendable, listening, united, widened
+from vico.worldgen.buildings import solids
+from vico.worldgen.facts.fault_isolation import NamedShape, buffer_named, collect_losses, drop_on_failure, union_named
 from vico.worldgen.pipeline import build_world
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
@@ -24,14 +24,14 @@ EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pb
 
 def built_with(error: Exception, share: int, out: Path, monkeypatch: pytest.MonkeyPatch) -> World:
     """A world in which every `share`-th building can't be seated."""
-    seat_of, count = drafts.seat_of, iter(range(10_000))
+    seat_of, count = solids.seat_of, iter(range(10_000))
 
     def failing(*given: object) -> object:
         if next(count) % share == 0:
             raise error
         return seat_of(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(drafts, "seat_of", failing)
+    monkeypatch.setattr(solids, "seat_of", failing)
     build_world(EXTRACT, lat=60.1690, lon=24.9435, half=60, out=out)
     return read_world(out)
 
@@ -70,7 +70,7 @@ def test_more_than_a_few_are_a_finding(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_what_is_about_the_whole_build_ends_it() -> None:
     for error in (InputError("no such file"), OSError(28, "No space left on device"), MemoryError()):
-        with pytest.raises(type(error)), expendable("w1"):
+        with pytest.raises(type(error)), drop_on_failure("w1"):
             raise error
 
 
@@ -100,27 +100,27 @@ BOXES = [NamedShape(f"w{k}", shapely.box(3 * k, 0, 3 * k + 2, 2)) for k in range
 @pytest.mark.parametrize("culprit", [0, 2, 4])
 def test_the_one_that_the_engine_refuses_is_found_among_many(culprit: int, monkeypatch: pytest.MonkeyPatch) -> None:
     refusing("union_all", BOXES[culprit].shape, monkeypatch)
-    with listening() as losses:
-        whole = united(BOXES)
+    with collect_losses() as losses:
+        whole = union_named(BOXES)
     assert losses.ids == {f"w{culprit}"}
     assert shapely.area(whole) == pytest.approx(16.0)
 
 
 def test_the_others_keep_their_own_amounts(monkeypatch: pytest.MonkeyPatch) -> None:
     refusing("buffer", BOXES[1].shape, monkeypatch)
-    with listening() as losses:
-        wide = widened(BOXES, np.array([0.1, 0.2, 0.3, 0.4, 0.5]), join_style="mitre")
+    with collect_losses() as losses:
+        wide = buffer_named(BOXES, np.array([0.1, 0.2, 0.3, 0.4, 0.5]), join_style="mitre")
     assert losses.ids == {"w1"}
     assert {one.id: round(one.shape.bounds[3] - 2.0, 3) for one in wide} == {"w0": 0.1, "w2": 0.3, "w3": 0.4, "w4": 0.5}
 
 
 def test_what_is_lost_twice_is_told_once_and_only_to_who_listens() -> None:
-    with listening() as outer:
-        with listening() as inner:
+    with collect_losses() as outer:
+        with collect_losses() as inner:
             for _ in range(2):
-                with expendable("w1"):
+                with drop_on_failure("w1"):
                     raise OverlayError("side location conflict")
-        with expendable("w2"):
+        with drop_on_failure("w2"):
             pass
     assert [one.id for one in inner.dropped] == ["w1"]
     assert (inner.tried, outer.tried, outer.dropped) == ({"w1"}, {"w2"}, [])

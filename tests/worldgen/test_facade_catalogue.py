@@ -10,9 +10,7 @@ import pytest
 
 from vico.errors import SchemaError
 from vico.seeds import rng
-from vico.worldgen.facades.catalogue import region_of, styles
-from vico.worldgen.facades.families import RULES, House
-from vico.worldgen.facades.looks import look_of
+from vico.worldgen.facades.facade_styles import RULES, House, facade_style_of, region_of, styles
 from vico.worldgen.facades.textures.materials import PAINTERS, material
 from vico.worldgen.stages import code_digest
 
@@ -39,7 +37,9 @@ def test_a_region_of_ones_own_lines_its_streets_with_its_own_family(own_data: Pa
     assert region_of(*LISBON) == "portuguese"
     assert region_of(41.9, 12.5) == "italian"
     looks = [
-        look_of("residential", {"start_date": "1890"}, levels=5, area=500.0, region="portuguese", random=rng(k, "look"))
+        facade_style_of(
+            "residential", {"start_date": "1890"}, levels=5, area=500.0, region="portuguese", random=rng(k, "look")
+        )
         for k in range(200)
     ]
     tiled = [look for look in looks if look.wall == "wall_tiled"]

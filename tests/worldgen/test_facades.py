@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 
 from vico.seeds import rng
-from vico.worldgen.buildings.roofs.solid import building_solid
-from vico.worldgen.facades.catalogue import region_of, styles
-from vico.worldgen.facades.cuts import cut_at_heights
-from vico.worldgen.facades.families import family_of
-from vico.worldgen.facades.looks import look_of
-from vico.worldgen.facades.sheets import bay_coordinates, bays, storey_coordinates
-from vico.worldgen.facades.tags import colour_of, year_of
+from vico.worldgen.buildings.roofs import building_solid
+from vico.worldgen.buildings.walls import cut_at_heights
+from vico.worldgen.facades.facade_styles import colour_of, facade_style_of, family_of, region_of, styles, year_of
 from vico.worldgen.facades.textures.materials import PAINTERS, material
 from vico.worldgen.facades.textures.walls import BAYS, STOREYS
-from vico.worldgen.facts.outlines.roof_shapes import Roof
+from vico.worldgen.facades.walls import bay_coordinates, bays, storey_coordinates
+from vico.worldgen.facts.roofs import Roof
 
 
 def test_a_wall_holds_a_whole_number_of_bays() -> None:
@@ -101,7 +98,7 @@ def test_what_a_facade_looks_like_follows_its_neighbours_left_and_right() -> Non
 
 
 def test_a_tagged_colour_tints_the_wall() -> None:
-    red = look_of(
+    red = facade_style_of(
         "residential", {"building:colour": "#ff0000"}, levels=4, area=300, region="northern", random=rng(0, "a")
     )
     assert red.tint[0] > 250
@@ -117,7 +114,9 @@ def test_colours_of_tags_are_read(text: str | None, expected: tuple[int, int, in
 
 
 def test_material_tags_decide_the_wall() -> None:
-    look = look_of("office", {"building:material": "brick"}, levels=4, area=300, region="northern", random=rng(0, "a"))
+    look = facade_style_of(
+        "office", {"building:material": "brick"}, levels=4, area=300, region="northern", random=rng(0, "a")
+    )
     assert look.wall == "wall_brick"
 
 
@@ -168,7 +167,7 @@ def test_every_family_has_all_its_materials_in_every_region() -> None:
     for k in range(600):
         region = ("northern", "southern", "american", "british", "german", "nordic")[k % 6]
         use = ("residential", "office", "retail", "hotel", "industrial", "civic", "religious", "garage")[k % 8]
-        look = look_of(
+        look = facade_style_of(
             use, {}, levels=int(random.integers(1, 20)), area=float(random.uniform(20, 900)), region=region,
             random=rng(k, "look"),
         )  # fmt: skip

@@ -9,11 +9,10 @@ import pytest
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Entrance, Place
 from vico.worldgen.facades.fronts import street_fronts
-from vico.worldgen.facades.pieces import cell_uv
 from vico.worldgen.facades.textures.materials import material
 from vico.worldgen.facades.textures.walls import BAYS
-from vico.worldgen.facades.walls import GroundFloors
-from vico.worldgen.facts.expendable import listening
+from vico.worldgen.facades.walls import GroundFloors, cell_uv
+from vico.worldgen.facts.fault_isolation import collect_losses
 
 _FACING = math.radians(-60.0)
 _OUT = np.array([math.cos(_FACING), math.sin(_FACING)])
@@ -193,7 +192,7 @@ def test_fronts_are_the_same_for_the_same_seed() -> None:
 def test_of_two_houses_fronts_in_one_plane_the_later_one_is_left_out() -> None:
     other = _building("residential").model_copy(update={"id": "w2", "entity": 1001})
     doors = [_entrance(7.0), _entrance(7.5, "e2").model_copy(update={"building": "w2"})]
-    with listening() as losses:
+    with collect_losses() as losses:
         made = street_fronts([], doors, [_building("residential"), other], [_wall("ground_plain")], seed=0)
     assert losses.ids == {"e2"}
     assert made.counts["doors"] == 1

@@ -16,19 +16,16 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay, read_osm
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.worldgen.facts.expendable import NamedShape
-from vico.worldgen.facts.ground_kinds import ground_partition, water_of_map, water_pieces
-from vico.worldgen.facts.levels import CLEARANCE, OVER_A_STREET, overpasses, passages
-from vico.worldgen.facts.outlines.buildings import building_plans
-from vico.worldgen.facts.site import site_facts
+from vico.worldgen.facts.building_outlines import building_plans
+from vico.worldgen.facts.fault_isolation import NamedShape
+from vico.worldgen.facts.land_cover import ground_partition, water_of_map, water_pieces
+from vico.worldgen.facts.site import CLEARANCE, OVER_A_STREET, WaterBody, overpasses, passages, site_facts
 from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.facts.waters import WaterBody
-from vico.worldgen.ground.bridges.decks import decks_of
-from vico.worldgen.ground.bridges.portals import portal_feet, portals_of
-from vico.worldgen.ground.grading import graded
-from vico.worldgen.ground.kerbs import KERB, lowered_kerbs
+from vico.worldgen.ground.bridges import decks_of
+from vico.worldgen.ground.grade_separation import portal_feet, portals_of
+from vico.worldgen.ground.grading import grade_ground
+from vico.worldgen.ground.kerbs_and_banks import KERB, lowered_kerbs, open_water, water_bodies
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
-from vico.worldgen.ground.waters import open_water, water_bodies
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import is_traffic_street, streets_from_osm
 
@@ -49,7 +46,7 @@ def streets(osm: OsmData) -> StreetPolygons:
 
 @pytest.fixture(scope="module")
 def level(osm: OsmData, streets: StreetPolygons) -> HeightField:
-    return graded(flat_terrain(half=HALF), site_facts(osm), streets)
+    return grade_ground(flat_terrain(half=HALF), site_facts(osm), streets)
 
 
 def drawn(surfaces: list[Surface], count: int = 3000) -> np.ndarray:
@@ -110,7 +107,7 @@ def test_streets_of_a_mountain_town_are_level_across(shared_data: Path) -> None:
     osm = read_osm(folder / "andorra.osm.pbf", frame, HALF)
     rough = terrain_from_dem(read_elevation(folder / "dem_srtm.tif", frame, HALF), half=HALF)
     streets = road_polygons(site_facts(osm))
-    field = graded(rough, site_facts(osm), streets)
+    field = grade_ground(rough, site_facts(osm), streets)
     tilts = []
     for street in streets.streets:
         line = shapely.LineString(street.line)
@@ -146,7 +143,7 @@ def crossroads() -> OsmData:
 def test_a_bridge_over_a_street_is_high_and_left_out_of_the_traffic(crossroads: OsmData) -> None:
     assert overpasses(crossroads) == {3}
     streets = road_polygons(site_facts(crossroads))
-    field = graded(flat_terrain(half=HALF), site_facts(crossroads), streets)
+    field = grade_ground(flat_terrain(half=HALF), site_facts(crossroads), streets)
     (deck,) = decks_of(site_facts(crossroads), field)
     over = np.abs(deck.line[:, 0]) < 4.0
     assert (deck.z[over] - deck.slab - field.smooth(deck.line[over])).min() > CLEARANCE - 0.2
@@ -169,7 +166,7 @@ def test_a_bridge_over_nothing_mapped_is_the_ground(crossroads: OsmData) -> None
 def test_a_place_without_streets_has_a_ground(osm: OsmData) -> None:
     empty = replace(osm, ways=[w for w in osm.ways if "highway" not in w.tags and "railway" not in w.tags])
     streets = road_polygons(site_facts(empty))
-    field = graded(flat_terrain(half=HALF), site_facts(empty), streets)
+    field = grade_ground(flat_terrain(half=HALF), site_facts(empty), streets)
     assert sum(len(s.triangles) for s in ground_of(empty, field, streets)) > 100
     window = shapely.box(-HALF, -HALF, HALF, HALF)
     pieces = ground_partition(site_facts(empty), streets, window)
@@ -178,7 +175,7 @@ def test_a_place_without_streets_has_a_ground(osm: OsmData) -> None:
 
 def test_ramps_of_a_bridge_over_a_street_climb_gently(crossroads: OsmData) -> None:
     streets = road_polygons(site_facts(crossroads), [])
-    field = graded(flat_terrain(half=180.0), site_facts(crossroads), streets)
+    field = grade_ground(flat_terrain(half=180.0), site_facts(crossroads), streets)
     (deck,) = decks_of(site_facts(crossroads), field)
     x = np.arange(-150.0, 150.0, 3.0)
     ground = field.smooth(np.stack([x, np.zeros_like(x)], axis=1))
@@ -191,7 +188,7 @@ def test_ramps_of_a_bridge_over_a_street_climb_gently(crossroads: OsmData) -> No
 def test_a_footway_beside_a_bridge_lies_as_high_and_has_no_parapet_between(crossroads: OsmData) -> None:
     beside = _way(9, [40, 50], [(-40, 6.6), (40, 6.6)], highway="footway", bridge="yes", layer="1")
     osm = replace(crossroads, ways=[*crossroads.ways, beside])
-    field = graded(flat_terrain(half=180.0), site_facts(osm), road_polygons(site_facts(osm), []))
+    field = grade_ground(flat_terrain(half=180.0), site_facts(osm), road_polygons(site_facts(osm), []))
     road, walk = sorted(decks_of(site_facts(osm), field), key=lambda deck: deck.way.id)
     middle = np.abs(walk.line[:, 0]) < 30.0
     level = np.interp(walk.line[middle, 0], road.line[:, 0], road.z)
@@ -216,7 +213,7 @@ def test_water_flows_on_below_a_bridge_without_a_hole(shared_data: Path) -> None
     place = shared_data / "places" / "andorra"
     osm = read_osm(place / "andorra.osm.pbf", frame, 60.0, need_buildings=False)
     streets = road_polygons(site_facts(osm), [])
-    field = graded(
+    field = grade_ground(
         terrain_from_dem(read_elevation([place / "dem_srtm.tif"], frame, 60.0), half=60.0), site_facts(osm), streets
     )
     surfaces = ground_of(osm, field, streets)

@@ -15,8 +15,8 @@ from vico.geo.osm import OsmData, OsmWay, read_osm
 from vico.geo.osm_parts import OsmParts
 from vico.world.mesh import Surface
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD
-from vico.worldgen.facts.expendable import NamedShape
-from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, sea_of_map, sea_polygons
+from vico.worldgen.facts.fault_isolation import NamedShape
+from vico.worldgen.facts.land_cover import ground_partition, mapped_areas, sea_of_map, sea_polygons
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width, lane_count
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem

@@ -3,9 +3,8 @@
 import numpy as np
 import shapely
 
-from vico.worldgen.ground.conform import PlanMesh, conforming
-from vico.worldgen.ground.drape import triangulated
-from vico.worldgen.ground.thinning import thinned
+from vico.worldgen.ground.decimation import decimate_mesh
+from vico.worldgen.ground.mesh import PlanMesh, conforming_mesh, triangulate
 
 
 def area_of(plan: PlanMesh) -> float:
@@ -16,11 +15,11 @@ def area_of(plan: PlanMesh) -> float:
 def pieces(n: int = 6) -> list[tuple[np.ndarray, np.ndarray]]:
     """A large square beside a column of small ones."""
     small = [shapely.box(8, 8 * k / n, 10, 8 * (k + 1) / n) for k in range(n)]
-    return [triangulated([shapely.box(0, 0, 8, 8)]), triangulated(small)]
+    return [triangulate([shapely.box(0, 0, 8, 8)]), triangulate(small)]
 
 
 def test_neighbours_share_their_corners() -> None:
-    plan = conforming(pieces())
+    plan = conforming_mesh(pieces())
     edges = np.concatenate([plan.triangles[:, [0, 1]], plan.triangles[:, [1, 2]], plan.triangles[:, [2, 0]]])
     known = {tuple(edge) for edge in edges.tolist()}
     alone = np.array([edge for edge in edges.tolist() if (edge[1], edge[0]) not in known])
@@ -31,12 +30,12 @@ def test_neighbours_share_their_corners() -> None:
 
 
 def test_a_plane_needs_few_corners_and_a_bump_keeps_its_own() -> None:
-    plan = conforming(pieces())
+    plan = conforming_mesh(pieces())
     used, tolerance = np.zeros(2, np.int64), np.full(2, 0.02)
-    slope = thinned(plan, [lambda xy: 0.3 * xy[:, 0]], used, tolerance)
+    slope = decimate_mesh(plan, [lambda xy: 0.3 * xy[:, 0]], used, tolerance)
     assert len(slope.triangles) <= 6
     assert abs(area_of(slope) - 80.0) < 1e-6
-    bump = thinned(plan, [lambda xy: np.abs(xy[:, 1] - 4.0)], used, tolerance)
+    bump = decimate_mesh(plan, [lambda xy: np.abs(xy[:, 1] - 4.0)], used, tolerance)
     top = np.flatnonzero(np.abs(bump.corners[:, 1] - 4.0) < 1e-9)
     assert np.isin(top, bump.triangles).any()
 
@@ -47,7 +46,7 @@ def test_what_lies_along_a_side_stays_on_it() -> None:
     stone = shapely.Polygon([bend, (4.6, 9.925), (6.0, 10.0), (4.0, 10.0), tip])
     pavement = shapely.Polygon([(0, 9.7), bend, (2.0, 10.0), (0, 10.0)])
     street = shapely.Polygon([(0, 0), (10, 0), (10, 10), (6.0, 10.0), (4.6, 9.925), bend, (0, 9.7)])
-    plan = conforming([triangulated([shape]) for shape in (stone, pavement, street)])
-    made = thinned(plan, [lambda xy: np.zeros(len(xy))], np.zeros(3, np.int64), np.full(3, 0.02))
+    plan = conforming_mesh([triangulate([shape]) for shape in (stone, pavement, street)])
+    made = decimate_mesh(plan, [lambda xy: np.zeros(len(xy))], np.zeros(3, np.int64), np.full(3, 0.02))
     corners = made.corners[np.unique(made.triangles[made.piece == 0])]
     assert sorted(corners[corners[:, 1] == 10.0, 0].tolist()) == [2.058, 6.0]

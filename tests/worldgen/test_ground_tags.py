@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vico.worldgen.facts.tags import on_the_ground
+from vico.worldgen.facts.site import on_the_ground
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vico.worldgen.ground.halving import halved
+from vico.worldgen.ground.polygons import split_polygons
 
 
 @st.composite
@@ -28,7 +28,7 @@ def test_two_parts_make_the_whole(shapes: list[shapely.Polygon], at: float, axis
     if not len(whole):
         return
     middle = np.full(len(whole), at)
-    below, beyond = halved(whole, middle, axis)
+    below, beyond = split_polygons(whole, middle, axis)
     for shape, low, high in zip(whole, below, beyond, strict=True):
         assert abs(low.area + high.area - shape.area) < 1e-6
         assert low.bounds[2 + axis] <= at + 1e-9
@@ -41,7 +41,7 @@ def test_a_comb_comes_apart_into_its_teeth() -> None:
     comb = shapely.Polygon(
         [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)]
     )
-    below, beyond = halved(np.array([comb], object), np.array([2.0]), 1)
+    below, beyond = split_polygons(np.array([comb], object), np.array([2.0]), 1)
     assert len(shapely.get_parts(beyond[0])) == 3
     assert below[0].area == 5 + 3
     assert beyond[0].area == 3

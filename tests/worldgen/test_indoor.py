@@ -14,12 +14,11 @@ from vico.rules import REACH
 from vico.world.check.indoors import walkable_inside
 from vico.world.model import FIRST_FURNITURE, Category, Entrance
 from vico.world.world import World
-from vico.worldgen.facts.expendable import listening
+from vico.worldgen.facts.fault_isolation import collect_losses
 from vico.worldgen.indoor import catalogue, stage
 from vico.worldgen.indoor.catalogue import use_of
 from vico.worldgen.indoor.floorplans import OUTSIDE, sketch_of
-from vico.worldgen.indoor.layouts import plan_of, uses
-from vico.worldgen.indoor.rooms import rooms_of_plan
+from vico.worldgen.indoor.furnished_plans import plan_of, rooms_of_plan, uses
 from vico.worldgen.indoor.stage import furnish
 
 SMALL = set(read_models(PACKAGED / "models" / "indoor" / "small_things.toml"))
@@ -209,7 +208,7 @@ def test_a_place_without_room_under_its_house_is_left_out_and_told(
     building = helsinki.buildings[0]
     template = next(p for p in helsinki.places if p.kind == "apartments")
     many = [template.model_copy(update={"id": f"p{k}", "building": building.id}) for k in range(60)]
-    with listening() as losses:
+    with collect_losses() as losses:
         made = furnish(many, buildings=helsinki.buildings, height=helsinki.height)
     housed = {place.id for place in made.places}
     assert 0 < len(housed) < 60

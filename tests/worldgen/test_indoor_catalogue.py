@@ -12,10 +12,9 @@ from vico.world.check.indoors import walkable_inside
 from vico.world.model import Category
 from vico.worldgen.indoor import catalogue
 from vico.worldgen.indoor.catalogue import use_of
-from vico.worldgen.indoor.compositions import COMPOSITIONS
 from vico.worldgen.indoor.floorplans import sketch_of
-from vico.worldgen.indoor.layouts import plan_of
-from vico.worldgen.indoor.rooms import rooms_of_plan
+from vico.worldgen.indoor.furnished_plans import plan_of, rooms_of_plan
+from vico.worldgen.indoor.recipes import COMPOSITIONS
 
 PAGE = Path(__file__).parents[2] / "docs" / "adding_a_room.md"
 USE = "[use.x]\nsizes = [[6, 8]]\nplan = "

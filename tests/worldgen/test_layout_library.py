@@ -17,18 +17,18 @@ from vico.errors import InputError, MissingFileError, SchemaError, VicoError
 from vico.world.check.indoors import walkable_inside
 from vico.world.model import Category
 from vico.world.world import World
+from vico.worldgen.indoor.furnished_plans import rooms_of_plan
 from vico.worldgen.indoor.layout_library import (
     Layout,
     LayoutRequest,
-    authored,
     findings_of,
+    layout_from_author,
     layout_guide,
     layout_schema,
     parse_layout,
     read_library,
     write_layout,
 )
-from vico.worldgen.indoor.rooms import rooms_of_plan
 from vico.worldgen.indoor.stage import furnish
 
 BAR: dict[str, Any] = {
@@ -175,7 +175,7 @@ class Scripted:
 def test_an_author_is_told_what_is_wrong_until_the_layout_is_good(helsinki: World) -> None:
     pub = next(p for p in helsinki.places if p.kind in ("pub", "bar"))
     author = Scripted("not json", json.dumps(changed(rooms__1__rect=[0, 3, 8, 6])), json.dumps(BAR))
-    layout = authored(author, pub, use="bar", area=100.0)
+    layout = layout_from_author(author, pub, use="bar", area=100.0)
     assert layout is not None
     assert layout.name == "Corner bar"
     assert author.heard[0] == ()

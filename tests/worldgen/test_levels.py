@@ -16,10 +16,9 @@ from vico.sim.traffic import Traffic
 from vico.sim.traffic.network import TrafficNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.worldgen.facts.levels import CLEARANCE
-from vico.worldgen.facts.site import site_facts
-from vico.worldgen.ground.bridges.stage import Bridges, bridges_of
-from vico.worldgen.ground.grading import graded
+from vico.worldgen.facts.site import CLEARANCE, site_facts
+from vico.worldgen.ground.grade_separation import Bridges, bridges_of
+from vico.worldgen.ground.grading import grade_ground
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
@@ -61,7 +60,7 @@ def _long_bridge() -> OsmData:
 def _levels(make: Callable[[], OsmData] = _town) -> tuple[Bridges, HeightField, LaneGraph]:
     site = site_facts(make())
     streets = road_polygons(site)
-    ground = graded(flat_terrain(half=HALF), site, streets)
+    ground = grade_ground(flat_terrain(half=HALF), site, streets)
     bridges = bridges_of(site, ground, streets)
     height = replace(ground, decks=bridges.levels())
     return bridges, height, lanes_of(road_network(site, streets_from_osm(site, (), bridges.usable), height))
@@ -163,7 +162,7 @@ def test_a_bridge_too_steep_or_in_the_air_stays_closed() -> None:
     short = [way for way in _town().ways if way.id in (1, 3)]
     site = site_facts(replace(_town(), ways=short))
     streets = road_polygons(site)
-    ground = graded(flat_terrain(half=HALF), site, streets)
+    ground = grade_ground(flat_terrain(half=HALF), site, streets)
     bridges = bridges_of(site, ground, streets)
     assert bridges.usable == frozenset()
     assert bridges.levels() is None

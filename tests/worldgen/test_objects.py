@@ -14,14 +14,14 @@ from vico.world.heights import HeightField
 from vico.world.objects import Objects
 from vico.world.transit import TramLine, Transit
 from vico.world.world import World
-from vico.worldgen.objects.stage import Grounds, objects_from_osm
+from vico.worldgen.objects.stage import Surroundings, objects_from_osm
 
 NOTHING = shapely.Polygon()
 
 
 def placed(nodes: list[OsmNode], *, ways: Sequence[OsmWay] = (), **given: object) -> tuple[Objects, list[str]]:
     osm = OsmData(LocalFrame(60.0, 25.0), 50.0, 60.0, nodes, list(ways), [], [])
-    grounds = Grounds(**{name: given.pop(name) for name in ("solids", "carriageway", "openings") if name in given})
+    grounds = Surroundings(**{name: given.pop(name) for name in ("solids", "carriageway", "openings") if name in given})
     objects, dropped = objects_from_osm(osm, grounds, **{"height": HeightField.flat(60.0)} | given)
     return objects, [entry.reason for entry in dropped]
 

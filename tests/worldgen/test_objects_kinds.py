@@ -16,9 +16,9 @@ from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
 from vico.worldgen.objects import catalogue
-from vico.worldgen.objects.kinds import region, sign_of, thing_of
-from vico.worldgen.objects.stage import Grounds, objects_from_osm
-from vico.worldgen.objects.trees import climate, spread, tree_wish
+from vico.worldgen.objects.mapped_objects import region, sign_of, thing_of
+from vico.worldgen.objects.stage import Surroundings, objects_from_osm
+from vico.worldgen.objects.trees import blue_noise_points, climate, tree_placement
 
 NOTHING = shapely.Polygon()
 
@@ -33,7 +33,7 @@ def placed(
     solids: list[shapely.Polygon] | None = None,
 ) -> Objects:
     osm = OsmData(LocalFrame(50.0, 10.0), 60.0, 60.0, nodes or [], ways or [], areas or [], [])
-    objects, _ = objects_from_osm(osm, Grounds(solids or [], carriageway, openings), height=HeightField.flat(60.0))
+    objects, _ = objects_from_osm(osm, Surroundings(solids or [], carriageway, openings), height=HeightField.flat(60.0))
     return objects
 
 
@@ -170,7 +170,7 @@ def test_post_boxes_look_as_in_their_country() -> None:
 
 
 def wish(**tags: str) -> tuple[str, float]:
-    found = tree_wish("n1", tags, np.zeros(2), 0, "temperate")
+    found = tree_placement("n1", tags, np.zeros(2), 0, "temperate")
     return found.prototype, found.scale * street_models()[found.prototype].size[2]
 
 
@@ -202,14 +202,14 @@ def test_palms_grow_in_monaco_and_conifers_in_helsinki() -> None:
              climate(LocalFrame(42.5, 1.53), high), climate(LocalFrame(40.7, -74.0), flat)]  # fmt: skip
     assert zones == ["mediterranean", "boreal", "alpine", "temperate"]
     planted = [
-        {tree_wish(f"n{k}", {}, np.array([70.0 * k, 0.0]), 0, zone).prototype for k in range(60)} for zone in zones
+        {tree_placement(f"n{k}", {}, np.array([70.0 * k, 0.0]), 0, zone).prototype for k in range(60)} for zone in zones
     ]
     assert [any(name in catalogue.trees().palms for name in names) for names in planted] == [True, False, False, False]
 
 
 def test_blue_noise_keeps_its_distance() -> None:
     ground = shapely.Point(0, 0).buffer(40.0)
-    points = spread(ground, 50.0, 500, np.random.default_rng(1))
+    points = blue_noise_points(ground, 50.0, 500, np.random.default_rng(1))
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)[np.triu_indices(len(points), 1)]
     assert 60 <= len(points) <= 101
     assert apart.min() >= 0.72 * np.sqrt(50.0)
@@ -298,5 +298,5 @@ def test_what_vehicles_sweep_is_kept_free_beyond_the_carriageway() -> None:
             return np.array([[-60.0, 0.0, 0.0], [60.0, 0.0, 0.0]])
 
     osm = OsmData(LocalFrame(50.0, 10.0), 60.0, 60.0, [OsmNode(1, np.zeros(2), {"amenity": "bench"})], [], [], [])
-    objects, _ = objects_from_osm(osm, Grounds(), height=HeightField.flat(60.0), lanes=Lanes())
+    objects, _ = objects_from_osm(osm, Surroundings(), height=HeightField.flat(60.0), lanes=Lanes())
     assert shapely.distance(shapely.Polygon(objects.feet()[0]), shapely.LineString([(-60, 0), (60, 0)])) > 1.2

@@ -15,11 +15,9 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.geo.overlay import OverlayError
 from vico.worldgen.buildings.stage import buildings_from_plans
-from vico.worldgen.facts.outlines import apart, buildings
-from vico.worldgen.facts.outlines.buildings import building_plans
-from vico.worldgen.facts.outlines.needles import without_needles
-from vico.worldgen.facts.outlines.parts import bearing_of
-from vico.worldgen.facts.outlines.plans import RULES, BuildingPlan
+from vico.worldgen.facts import building_outlines
+from vico.worldgen.facts.building_outlines import building_plans, without_needles
+from vico.worldgen.facts.building_plans import RULES, BuildingPlan, bearing_of
 from vico.worldgen.ground.terrain import flat_terrain
 
 Things = list[tuple[Polygon | MultiPolygon, Mapping[str, str]]]
@@ -276,7 +274,13 @@ def test_what_goes_on_under_a_part_has_no_sliver_beside_another() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "function"), [(apart, "_settled"), (apart, "_beside"), (buildings, "_pieces"), (buildings, "part_of")]
+    ("module", "function"),
+    [
+        (building_outlines, "_settled"),
+        (building_outlines, "_beside"),
+        (building_outlines, "_pieces"),
+        (building_outlines, "part_of"),
+    ],
 )
 def test_an_outline_that_cant_be_cut_costs_its_building_alone(
     module: ModuleType, function: str, monkeypatch: pytest.MonkeyPatch

@@ -13,9 +13,8 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.transit import Transit
-from vico.worldgen.facts.bays import kerb_bays, lot_bays
 from vico.worldgen.facts.site import SiteFacts, site_facts
-from vico.worldgen.facts.streets import Street, StreetPolygons
+from vico.worldgen.facts.streets import Street, StreetPolygons, kerb_bays, lot_bays
 from vico.worldgen.objects.parking import Parking, parking_from_osm
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons

@@ -21,15 +21,14 @@ from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.heights import HeightField
 from vico.world.world import World
-from vico.worldgen.buildings.fitting import moves, nudging
-from vico.worldgen.buildings.fitting.nudging import fit_to_tiles, plans_on_tiles, settled
-from vico.worldgen.buildings.solids import leaky, seat_of, solid_meshes
+from vico.worldgen.buildings import fitting
+from vico.worldgen.buildings.fitting import fit_to_tiles, lower_onto_terrain, plans_on_tiles
+from vico.worldgen.buildings.solids import leaky_plans, seat_of, solid_meshes
 from vico.worldgen.buildings.stage import buildings_from_plans
-from vico.worldgen.facts.outlines.buildings import building_plans
-from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans
-from vico.worldgen.facts.sight import Sight
-from vico.worldgen.ground.terrain import terrain_from_tiles
-from vico.worldgen.ground.tile_ground import on_ground
+from vico.worldgen.facts.building_outlines import building_plans
+from vico.worldgen.facts.building_plans import BuildingPlan, BuildingPlans
+from vico.worldgen.facts.ray_casting import RayCaster
+from vico.worldgen.ground.terrain import on_ground, terrain_from_tiles
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
 from vico.worldgen.sources import Sources
@@ -71,7 +70,7 @@ def test_a_ball_has_the_surface_of_a_ball() -> None:
 def test_the_skin_is_near_the_world_it_was_made_of(helsinki: World, helsinki_tiles: TileMesh) -> None:
     layers = [s for name in ("ground", "buildings", "roofs") for s in helsinki.surfaces(name) if len(s.triangles)]
     first = np.cumsum([0, *(len(s.positions) for s in layers)])
-    world = Sight(
+    world = RayCaster(
         np.concatenate([s.positions for s in layers]),
         np.concatenate([s.triangles + n for s, n in zip(layers, first, strict=False)]),
     )
@@ -80,7 +79,7 @@ def test_the_skin_is_near_the_world_it_was_made_of(helsinki: World, helsinki_til
     down = np.array([0.0, 0.0, -1.0])
     off = (
         world.first(start, down).distance
-        - Sight(helsinki_tiles.positions, helsinki_tiles.triangles).first(start, down).distance
+        - RayCaster(helsinki_tiles.positions, helsinki_tiles.triangles).first(start, down).distance
     )
     off = off[np.isfinite(off)]
     assert len(off) > 3500
@@ -226,7 +225,7 @@ def test_shifted_footprints_are_moved_back(helsinki_tiles: TileMesh, map_of_hels
     assert np.hypot(*shifts.T).max() < 2.01
     assert report.after < report.before
     mesh = solid_meshes(fitted, [seat_of(p, ground) for p in fitted])
-    assert leaky(mesh) == set()
+    assert leaky_plans(mesh) == set()
 
 
 def test_a_building_that_cant_be_fitted_stays_as_planned_and_is_told(
@@ -242,8 +241,8 @@ def test_a_building_that_cant_be_fitted_stays_as_planned_and_is_told(
     def unmoved(*_: Any) -> None:
         raise OverlayError("side location conflict")
 
-    monkeypatch.setattr(nudging, "raised_to_mesh", failing)
-    monkeypatch.setattr(moves, "_displaced", unmoved)
+    monkeypatch.setattr(fitting, "raised_to_mesh", failing)
+    monkeypatch.setattr(fitting, "_displaced", unmoved)
     by = replace(helsinki_tiles, positions=helsinki_tiles.positions + np.array([1.1, -0.7, 0.0]))
     decided, report = plans_on_tiles(BuildingPlans(plans, []), by, HeightField.flat(200.0))
     assert decided.plans == plans
@@ -276,12 +275,12 @@ def test_a_city_model_without_ground_is_lowered_onto_the_terrain(map_of_helsinki
         solid.points + np.array([0.0, 0.0, 36.7]), solid.faces.astype(np.int32), np.zeros((count, 2), np.float32),
         np.full(len(solid.faces), -1, np.int32), (), np.full((count, 3), 255, np.uint8),
     )  # fmt: skip
-    lowered, by = settled(model, plans, ground)
+    lowered, by = lower_onto_terrain(model, plans, ground)
     # The feet of what was built are 0.3 m under the lowest ground, up to 0.4 of its fall under the ground floor.
     assert by == pytest.approx(-36.7, abs=1.0)
     assert np.allclose(lowered.positions[:, 2] - model.positions[:, 2], by)
     with pytest.raises(EmptyInputError, match="place and crs"):
-        settled(replace(model, positions=model.positions + 5000.0), plans, ground)
+        lower_onto_terrain(replace(model, positions=model.positions + 5000.0), plans, ground)
 
 
 def test_buildings_on_tiles_are_closed(helsinki_tiles: TileMesh, map_of_helsinki: OsmData) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from vico.errors import SchemaError
 from vico.world.model import Category
-from vico.worldgen.facts import place_words
+from vico.worldgen.facts import named_places
 from vico.worldgen.facts.named_places import category_of
 from vico.worldgen.places.kinds import meaning_of
 
@@ -38,7 +38,7 @@ def test_the_page_s_examples_add_a_kind_of_place_with_german_names(own_data: Pat
     assert meaning_of("overture", "bicycle_coop") == (Category.STORE, kind)
     assert meaning_of("google", "bicycle_parking_lot") is None
     assert meaning_of("overture", "holz_werkstatt") == (Category.STORE, "repair")
-    names = place_words.place_names()
+    names = named_places.place_names()
     assert names.called(names.of(kind), street="Gasse") == "Fahrradwerkstatt in der Gasse"
     assert names.called(names.home, where="Gasse 3") == "Wohnungen, Gasse 3"
     assert names.of("ice_cream") == "Ice cream"
@@ -56,6 +56,10 @@ def test_the_page_s_examples_add_a_kind_of_place_with_german_names(own_data: Pat
 def test_a_wrong_entry_is_told(own_data: Path, name: str, text: str, message: str) -> None:
     path = own_data / f"{name}_mine.toml"
     path.write_text(text)
-    reads = {"categories": place_words.categories, "words": place_words.source_words, "names": place_words.place_names}
+    reads = {
+        "categories": named_places.categories,
+        "words": named_places.source_words,
+        "names": named_places.place_names,
+    }
     with pytest.raises(SchemaError, match=rf"{re.escape(str(path))}: {message}"):
         reads[name]()

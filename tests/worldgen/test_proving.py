@@ -17,10 +17,10 @@ from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import OverlayError
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated
 from vico.world.world import World
-from vico.worldgen.buildings import details, drafts, proving, stage
+from vico.worldgen.buildings import repair, solids, stage
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans, clad
-from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
-from vico.worldgen.facts.outlines.roof_shapes import Roof
+from vico.worldgen.facts.building_plans import BuildingPlan, BuildingPlans, PartPlan
+from vico.worldgen.facts.roofs import Roof
 from vico.worldgen.ground.terrain import flat_terrain
 
 TERRAIN = flat_terrain(half=60.0)
@@ -78,7 +78,7 @@ def test_a_building_with_a_wall_in_its_neighbours_plane_is_cut_there() -> None:
 
 
 def test_a_building_that_stays_in_anothers_plane_when_cut_becomes_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(proving, "_cut", lambda plan, _: plan.parts)
+    monkeypatch.setattr(repair, "_cut", lambda plan, _: plan.parts)
     flap = Polygon([(-8, 0), (9, 0), (9, 10), (0, 10), (0, 0.003), (-8, 0.003)])
     built, told = built_of(house("w1", shapely.box(-12, 0, 0, 10)), house("w2", flap))
     assert [record.roof_shape for record in built.records] == ["hipped", "flat"]
@@ -115,7 +115,7 @@ def test_a_part_that_hovers_is_brought_down() -> None:
 
 
 def test_a_small_solid_at_fault_goes_and_its_building_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    of = details.details_of
+    of = stage.details_of
 
     def with_sheets(*given: Any, **more: Any) -> list[list[PartPlan]]:
         made = of(*given, **more)
@@ -140,20 +140,20 @@ def test_what_cant_be_cut_costs_a_building_its_details_alone(monkeypatch: pytest
             raise OverlayError("side location conflict")
         return []
 
-    monkeypatch.setattr(details, "rooftop_parts", failing)
+    monkeypatch.setattr(stage, "rooftop_parts", failing)
     built, told = built_of(house("w1"), house("w2", shapely.box(12, 0, 20, 10)))
     assert [record.id for record in built.records] == ["w1", "w2"]
     assert told == {"w2 details": "can't be made: OverlayError: side location conflict"}
 
 
 def test_a_small_solid_that_cant_be_meshed_is_left_out_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = drafts.part_mesh
+    made = solids.part_mesh
 
     def failing(part: PartPlan, seat: Any) -> Any:
         if part.finish == "chimney":
             raise OverlayError("side location conflict")
         return made(part, seat)
 
-    monkeypatch.setattr(drafts, "part_mesh", failing)
+    monkeypatch.setattr(solids, "part_mesh", failing)
     _, told = built_of(house("w1"))
     assert told == {"w1 chimney": "can't be made: OverlayError: side location conflict"}

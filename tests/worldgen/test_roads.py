@@ -14,10 +14,9 @@ from road_city import HALF, PLACES, STRIP, lanes_of, network_of, road_city, road
 from vico.errors import MissingExtraError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
-from vico.worldgen.facts.driving_side import drives_left, keeps_left
-from vico.worldgen.facts.expendable import listening
-from vico.worldgen.facts.levels import OVER_A_STREET
-from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.facts.fault_isolation import collect_losses
+from vico.worldgen.facts.site import OVER_A_STREET, SiteFacts, site_facts
+from vico.worldgen.facts.street_habits import drives_left, keeps_left
 from vico.worldgen.streets import netconvert
 from vico.worldgen.streets.netconvert import RoadNetwork, netconvert_binary
 from vico.worldgen.streets.roads import (
@@ -280,7 +279,7 @@ def test_a_street_that_netconvert_refuses_costs_itself_alone(monkeypatch: pytest
         return converted(binary, site, some, height, kerbs)
 
     monkeypatch.setattr(netconvert, "_converted", refusing)
-    with listening() as losses:
+    with collect_losses() as losses:
         network = netconvert.road_network(site, streets)
     assert losses.ids == {f"w{bad}"}
     monkeypatch.undo()

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from vico.world.check.buildings import open_edges
-from vico.worldgen.buildings.roofs.solid import building_solid
-from vico.worldgen.facts.outlines.roof_shapes import SHAPES, Roof, shape_named
+from vico.worldgen.buildings.roofs import building_solid
+from vico.worldgen.facts.roofs import SHAPES, Roof, shape_named
 
 RECTANGLE = shapely.box(-10, -4, 10, 4)
 ELL = Polygon([(0, 0), (20, 0), (20, 8), (8, 8), (8, 20), (0, 20)])

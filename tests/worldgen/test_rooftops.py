@@ -8,11 +8,11 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.seeds import rng
 from vico.world.check.buildings import coplanar_overlaps
-from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
+from vico.worldgen.buildings.details import cornices, posts, rooftop_parts
 from vico.worldgen.buildings.solids import Footing, part_mesh
 from vico.worldgen.buildings.stage import clad
-from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
-from vico.worldgen.facts.outlines.roof_shapes import Roof
+from vico.worldgen.facts.building_plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.roofs import Roof
 from vico.worldgen.ground.terrain import flat_terrain
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vico.errors import EmptyInputError, InputError, MissingExtraError
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 
 SQUARE = np.array([(0, 0, 2), (4, 0, 2), (4, 4, 2), (0, 4, 2)], np.float64), np.array([(0, 1, 2), (0, 2, 3)])
 
@@ -14,17 +14,17 @@ SQUARE = np.array([(0, 0, 2), (4, 0, 2), (4, 4, 2), (0, 4, 2)], np.float64), np.
 def test_a_missing_package_is_one_sentence_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "embreex", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'virtual-community\[photos\]'"):
-        Sight(*SQUARE)
+        RayCaster(*SQUARE)
 
 
 def test_meshes_that_cannot_be_seen_are_refused() -> None:
     pytest.importorskip("embreex", reason="rays need embreex")
     with pytest.raises(EmptyInputError, match="no triangles"):
-        Sight(SQUARE[0], np.zeros((0, 3), int))
+        RayCaster(SQUARE[0], np.zeros((0, 3), int))
     with pytest.raises(InputError, match=r"outside 0\.\.3"):
-        Sight(SQUARE[0], np.array([(0, 1, 4)]))
+        RayCaster(SQUARE[0], np.array([(0, 1, 4)]))
     with pytest.raises(InputError, match="triangle 1 "):
-        Sight(np.where(np.arange(4)[:, None] == 3, np.nan, SQUARE[0]), SQUARE[1])
+        RayCaster(np.where(np.arange(4)[:, None] == 3, np.nan, SQUARE[0]), SQUARE[1])
 
 
 @settings(max_examples=40, deadline=None)
@@ -32,7 +32,7 @@ def test_meshes_that_cannot_be_seen_are_refused() -> None:
 def test_a_ray_meets_the_square_where_geometry_says(x: float, y: float, z: float, speed: float, far: float) -> None:
     pytest.importorskip("embreex", reason="rays need embreex")
     away = np.array([far, -far, 0.0])  # far from the origin nothing is lost
-    sight = Sight(SQUARE[0] + away, SQUARE[1])
+    sight = RayCaster(SQUARE[0] + away, SQUARE[1])
     start = np.array([[x, y, z]]) + away
     hits = sight.first(start, np.array([0, 0, speed]))
     if z > 2 - 1e-3:
@@ -45,7 +45,7 @@ def test_a_ray_meets_the_square_where_geometry_says(x: float, y: float, z: float
 
 def test_limits_directions_and_both_sides() -> None:
     pytest.importorskip("embreex", reason="rays need embreex")
-    sight = Sight(*SQUARE)
+    sight = RayCaster(*SQUARE)
     start = np.array([(1, 1, 0), (1, 1, 5), (1, 1, 0), (9, 1, 0)], np.float64)
     along = np.array([(0, 0, 1), (0, 0, -1), (0, 0, -1), (0, 0, 1)], np.float64)
     assert sight.first(start, along).distance.tolist() == pytest.approx([2, 3, np.inf, np.inf])

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from vico.world.model import Category, Place
-from vico.worldgen.facades.lettering import lettered, spelled
-from vico.worldgen.facades.signs import Lettering, board_text, paint_boards
+from vico.worldgen.facades.signs import Lettering, board_text, draw_text, drawable_text, paint_boards
 
 
 def _place(name: str, key: str = "n1", category: Category = Category.STORE, kind: str = "clothes") -> Place:
@@ -30,27 +29,27 @@ def _place(name: str, key: str = "n1", category: Category = Category.STORE, kind
     ],
 )
 def test_latin_greek_and_cyrillic_names_are_spelled(name: str, drawn: str) -> None:
-    assert spelled(name) == drawn
+    assert drawable_text(name) == drawn
 
 
 @pytest.mark.parametrize("name", ["東京ラーメン", "مقهى", "한식당", "", "🍕", "ไทย"])
 def test_names_in_other_scripts_are_not_turned_into_boxes(name: str) -> None:
-    assert spelled(name) is None
+    assert drawable_text(name) is None
 
 
 @settings(max_examples=60, deadline=None)
 @given(st.text(max_size=24))
 def test_any_name_is_drawn_or_refused(name: str) -> None:
-    text = spelled(name)
+    text = drawable_text(name)
     if text is not None:
-        picture = lettered(text, 12)
+        picture = draw_text(text, 12)
         assert picture.dtype == np.uint8
         assert picture.shape[0] == 18
 
 
 @pytest.mark.parametrize("pair", ["eé", "oö", "aå", "cç", "sš", "oø", "lł", "ПГ", "ШЩ", "ΛΔ"])
 def test_letters_that_differ_look_different(pair: str) -> None:
-    a, b = (lettered(c, 40) for c in pair)
+    a, b = (draw_text(c, 40) for c in pair)
     wide = max(a.shape[1], b.shape[1])
     a, b = (np.pad(p, ((0, 0), (0, wide - p.shape[1]))) for p in (a, b))
     assert np.abs(a.astype(int) - b).max() > 100

@@ -19,11 +19,10 @@ from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import OverlayError
 from vico.io.data_files import PACKAGED
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
-from vico.worldgen.facts.outlines.buildings import building_plans
-from vico.worldgen.facts.outlines.measured_roofs import parts_of_roof
-from vico.worldgen.facts.outlines.merging import MergedBuildings, merged_buildings
-from vico.worldgen.facts.outlines.roof_cells import measured_solid
-from vico.worldgen.facts.precedence import Precedence, read_precedence
+from vico.worldgen.facts.building_outlines import building_plans
+from vico.worldgen.facts.building_plans import parts_of_roof
+from vico.worldgen.facts.conflation import ConflatedMap, Precedence, conflate_buildings, read_precedence
+from vico.worldgen.facts.roofs import measured_solid
 from vico.worldgen.ground.terrain import flat_terrain
 
 FRAME = LocalFrame(52.51, 13.39)
@@ -59,7 +58,7 @@ def found(
     return FoundBuilding(f"{kind}:{key}", kind, file, outline, more.pop("tags", {}), **more)
 
 
-def built(merged: MergedBuildings) -> BuildingsResult:
+def built(merged: ConflatedMap) -> BuildingsResult:
     plans = building_plans(merged.osm, seed=0, measured=merged.facets, origins=merged.origins)
     return buildings_from_plans(plans, merged.osm, flat_terrain(half=100.0), seed=0)
 
@@ -71,7 +70,7 @@ MAPPED = {"building": "apartments", "name": "Linden House", "addr:street": "Lind
 def test_a_measured_roof_is_built_and_the_map_s_tags_stay() -> None:
     shifted = shapely.affinity.translate(HOUSE, 0.4, 0.3)
     house = found(shifted, facets=gable(shifted, 6.0, 9.0), tags={"height": "9.00", "roof:shape": "gabled"})
-    merged = merged_buildings(town(("w1", HOUSE, MAPPED)), [model(house)], USUAL)
+    merged = conflate_buildings(town(("w1", HOUSE, MAPPED)), [model(house)], USUAL)
     (record,) = built(merged).records
     assert record.name == "Linden House"
     assert record.tags["addr:street"] == "Lindenweg"
@@ -101,7 +100,7 @@ def test_every_building_says_where_its_facts_are_from_and_the_town_is_watertight
         found(box(5, 3, 11, 9), kind="overture", file="o.parquet", key="half", tags={}),
         kind="overture", file="o.parquet",
     )  # fmt: skip
-    merged = merged_buildings(osm, [lod2, footprints], USUAL)
+    merged = conflate_buildings(osm, [lod2, footprints], USUAL)
     result = built(merged)
     sources = {record.id: record.sources for record in result.records}
     assert result.watertight == len(result.records) == 5
@@ -118,7 +117,7 @@ def test_every_building_says_where_its_facts_are_from_and_the_town_is_watertight
 
 def test_what_half_overlaps_is_neither_the_same_nor_another() -> None:
     aside = model(found(box(0, -4, 16, 4), tags={"height": "9"}))
-    merged = merged_buildings(town(("w1", HOUSE, MAPPED)), [aside], replace_precedence(same=0.6))
+    merged = conflate_buildings(town(("w1", HOUSE, MAPPED)), [aside], replace_precedence(same=0.6))
     assert merged.osm.areas[0].tags == MAPPED
     assert len(merged.osm.areas) == 1
     assert [(one.id, "w1 covers 31 %" in one.reason) for one in merged.dropped] == [("citygml:a", True)]
@@ -132,7 +131,7 @@ def test_another_order_gives_the_map_its_word_back() -> None:
     house = found(HOUSE, facets=gable(HOUSE, 9.0, 12.0), tags={"height": "12.00"})
     osm_first = ("osm", "lod2")
     order = replace_precedence(footprint=osm_first, height=osm_first, roof=osm_first)
-    merged = merged_buildings(town(("w1", HOUSE, MAPPED)), [model(house)], order)
+    merged = conflate_buildings(town(("w1", HOUSE, MAPPED)), [model(house)], order)
     assert merged.osm.areas[0].tags == MAPPED
     assert merged.facets == {}
     (record,) = built(merged).records
@@ -142,7 +141,8 @@ def test_another_order_gives_the_map_its_word_back() -> None:
     # A source that a list does not name does not count, not even the map.
     nobody = replace_precedence(height=(), roof=())
     assert (
-        "building:levels" not in merged_buildings(town(("w1", HOUSE, MAPPED)), [model(house)], nobody).osm.areas[0].tags
+        "building:levels"
+        not in conflate_buildings(town(("w1", HOUSE, MAPPED)), [model(house)], nobody).osm.areas[0].tags
     )
 
 
@@ -150,7 +150,7 @@ def test_a_file_s_own_name_goes_before_its_kind() -> None:
     old = found(HOUSE, file="old.gml", tags={"height": "7"})
     new = found(HOUSE, file="new.gml", tags={"height": "11"})
     order = replace_precedence(height=("new.gml", "lod2"))
-    merged = merged_buildings(
+    merged = conflate_buildings(
         town(("w1", HOUSE, MAPPED)), [model(old, file="old.gml"), model(new, file="new.gml")], order
     )
     assert merged.osm.areas[0].tags["height"] == "11"
@@ -162,11 +162,11 @@ def test_two_models_in_one_outline_are_its_roof_together_and_one_over_two_is_eac
         found(west, key="w", facets=(level(west, 6.0),), tags={"height": "6"}),
         found(east, key="e", facets=(level(east, 12.0),), tags={"height": "12"}),
     )
-    (record,) = built(merged_buildings(town(("w1", HOUSE, MAPPED)), [two], USUAL)).records
+    (record,) = built(conflate_buildings(town(("w1", HOUSE, MAPPED)), [two], USUAL)).records
     assert record.height == pytest.approx(12.0, abs=0.7)
     one = model(found(HOUSE, facets=gable(HOUSE, 6.0, 9.0), tags={"height": "9"}))
     osm = town(("w1", west, {"building": "house"}), ("w2", east, {"building": "house"}))
-    merged = merged_buildings(osm, [one], USUAL)
+    merged = conflate_buildings(osm, [one], USUAL)
     assert set(merged.facets) == {"w1", "w2"}
     assert {origin.footprint for origin in merged.origins.values()} == {"osm"}
     assert [record.height for record in built(merged).records] == pytest.approx([9.0, 9.0], abs=0.01)
@@ -174,7 +174,7 @@ def test_two_models_in_one_outline_are_its_roof_together_and_one_over_two_is_eac
 
 def test_parts_that_the_map_draws_give_way_to_a_measured_roof() -> None:
     osm = town(("w1", HOUSE, MAPPED), ("w2", box(-5, -4, 0, 4), {"building:part": "yes", "height": "30"}))
-    merged = merged_buildings(osm, [model(found(HOUSE, facets=gable(HOUSE, 6.0, 9.0)))], USUAL)
+    merged = conflate_buildings(osm, [model(found(HOUSE, facets=gable(HOUSE, 6.0, 9.0)))], USUAL)
     assert [area.id for area in merged.osm.areas] == ["w1"]
     assert merged.dropped[0].reason == "part of w1, whose roof is measured"
 
@@ -195,7 +195,7 @@ def test_a_roof_under_the_floor_is_refused_and_the_house_gets_a_fitted_one() -> 
     sunk = (RoofFacet(HOUSE, (3.0, 1.0, 0.0)),)
     with pytest.raises(OverlayError, match="below its floor"):
         parts_of_roof(HOUSE, sunk, {})
-    merged = merged_buildings(
+    merged = conflate_buildings(
         town(("w1", HOUSE, MAPPED)),
         [model(found(HOUSE, facets=sunk, tags={"height": "9", "roof:shape": "hipped"}))],
         USUAL,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from vico.worldgen.facts.outlines.heights import level_estimates
+from vico.worldgen.facts.building_heights import level_estimates
 
 
 def _storeys(wide: float, deep: float, gap: float, lon: float = 15.6, **tags: str) -> tuple[set[int], set[str]]:

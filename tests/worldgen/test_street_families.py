@@ -15,19 +15,15 @@ from vico.seeds import rng
 from vico.world.check.buildings import coplanar_overlaps
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BUILDING
-from vico.worldgen.buildings.chimneys import height_of, party_wall_stacks, ridge_chimneys
-from vico.worldgen.buildings.gables import stepped_gables
-from vico.worldgen.buildings.projections import projections
-from vico.worldgen.buildings.roofs.customs import is_flat_town, with_customary_roofs
+from vico.worldgen.buildings.details import height_of, party_wall_stacks, projections, ridge_chimneys
+from vico.worldgen.buildings.roof_details import stepped_gables
 from vico.worldgen.buildings.solids import Footing, part_mesh
-from vico.worldgen.buildings.stage import clad
-from vico.worldgen.facades.catalogue import region_of, styles
-from vico.worldgen.facades.families import family_of
-from vico.worldgen.facades.looks import look_of
+from vico.worldgen.buildings.stage import clad, is_flat_town, with_customary_roofs
+from vico.worldgen.facades.facade_styles import facade_style_of, family_of, region_of, styles
 from vico.worldgen.facades.textures.materials import material
 from vico.worldgen.facades.textures.walls import STOREYS
-from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
-from vico.worldgen.facts.outlines.roof_shapes import Roof
+from vico.worldgen.facts.building_plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.roofs import Roof
 from vico.worldgen.ground.terrain import flat_terrain
 
 STREET = shapely.STRtree([shapely.LineString([(-40, -8), (40, -8)])])
@@ -184,7 +180,9 @@ def test_british_stacks_carry_pots_and_stand_inside_the_walls_between_houses() -
 
 def test_oriels_are_canted_hang_above_heads_and_wear_the_colour_of_their_wall() -> None:
     plan = plan_of(shapely.box(0, 0, 18, 12))
-    look = look_of("residential", {"start_date": "1890"}, levels=4, area=600.0, region="german", random=rng(0, "x"))
+    look = facade_style_of(
+        "residential", {"start_date": "1890"}, levels=4, area=600.0, region="german", random=rng(0, "x")
+    )
     look = look.__class__(**{**look.__dict__, "wall": "wall_tenement_palace", "bay": 2.5})
     front = [np.ones(4, bool)]
     made = [

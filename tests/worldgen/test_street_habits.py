@@ -19,14 +19,11 @@ from vico.world.heights import HeightField
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.street_habits import Markings, habits_at, street_habits
 from vico.worldgen.facts.streets import Crossing, Street, StreetPolygons
-from vico.worldgen.ground.crossing_paint import crossing_paint
-from vico.worldgen.ground.markings import Quads, road_markings
+from vico.worldgen.ground.markings import Quads, clip_quads, crossing_paint, road_markings
 from vico.worldgen.ground.pavings import LOOKS, look_of
-from vico.worldgen.ground.strokes import cut_to
-from vico.worldgen.ground.tactile import street_bearing, tactile_fields
-from vico.worldgen.ground.tree_pits import tree_pits
+from vico.worldgen.ground.stage import street_bearing, tactile_fields, tree_pits
 from vico.worldgen.ground.wires import CONTACT, contact_wires
-from vico.worldgen.objects.kinds import thing_of
+from vico.worldgen.objects.mapped_objects import thing_of
 from vico.worldgen.streets.crossings import crossings_of
 
 WINDOW = shapely.box(-100.0, -100.0, 100.0, 100.0)
@@ -108,7 +105,7 @@ def test_marks_across_a_border_are_drawn_by_both_tiles_up_to_it(turned: float) -
     bars = [
         np.array([(-3, y), (3, y), (3, y + 0.5), (-3, y + 0.5)]) @ np.array([[c, s], [-s, c]]) for y in range(-4, 4)
     ]
-    west, east = cut_to(bars, shapely.box(-50, -50, 0, 50)), cut_to(bars, shapely.box(0, -50, 50, 50))
+    west, east = clip_quads(bars, shapely.box(-50, -50, 0, 50)), clip_quads(bars, shapely.box(0, -50, 50, 50))
     assert west[..., 0].max() == pytest.approx(0.0, abs=1e-9)
     assert east[..., 0].min() == pytest.approx(0.0, abs=1e-9)
     shapes = [shapely.Polygon(quad) for quad in (*west, *east)]

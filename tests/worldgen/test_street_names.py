@@ -11,12 +11,11 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building, Road, Roads
 from vico.world.objects import Objects
-from vico.worldgen.facades.pieces import Pieces
 from vico.worldgen.facades.signs import paint_boards
 from vico.worldgen.facades.street_names import NamePlate, Streets, name_plates
 from vico.worldgen.facades.textures.materials import material
 from vico.worldgen.facades.textures.walls import BAYS
-from vico.worldgen.facades.walls import GroundFloors
+from vico.worldgen.facades.walls import GroundFloors, Pieces
 from vico.worldgen.facts.street_habits import Plates
 
 HALF, HIGH = 6.0, 3.6  # metres from a street's axis to a house, and a ground floor's height

@@ -12,7 +12,7 @@ from vico.geo.street_images import StreetImage, camera_rotation, cut_panorama, p
 from vico.render import Cameras, Scene, render
 from vico.seeds import rng
 from vico.world.mesh import Surface
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap
 from vico.worldgen.photos.streetview.blending import Blending, Layer, paint_chart
 from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, PhotoView, StandingDifferences
@@ -61,7 +61,7 @@ class Street:
     walls: list[Surface]
     true: Atlas
     model: Atlas
-    sight: Sight
+    sight: RayCaster
 
 
 @cache
@@ -78,7 +78,7 @@ def street() -> Street:
     solids = [GROUND, *WALLS]
     starts = np.cumsum([0, *(len(s.positions) for s in solids)])
     faces = np.concatenate([s.triangles + k for s, k in zip(solids, starts, strict=False)])
-    return Street(walls, true, model, Sight(np.concatenate([s.positions for s in solids]), faces))
+    return Street(walls, true, model, RayCaster(np.concatenate([s.positions for s in solids]), faces))
 
 
 def photographer(atlas: Atlas, extra: tuple[Surface, ...] = ()) -> Photographer:

@@ -14,7 +14,7 @@ from vico.errors import MissingExtraError
 from vico.io.files import sha256_of, write_json
 from vico.world.glb import write_glb
 from vico.world.objects import Objects
-from vico.worldgen.objects.models import models_of
+from vico.worldgen.objects.stage import models_of
 from vico.worldgen.sources import Sources
 
 

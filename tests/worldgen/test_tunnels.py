@@ -17,12 +17,12 @@ from vico.sim.traffic.network import TrafficNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.worldgen.facts.site import site_facts
-from vico.worldgen.ground.bridges.stage import Bridges, bridges_of
-from vico.worldgen.ground.bridges.tunnels import HEADROOM
-from vico.worldgen.ground.grading import graded
+from vico.worldgen.ground.grade_separation import Bridges, bridges_of
+from vico.worldgen.ground.grading import grade_ground
 from vico.worldgen.ground.stage import APRON, ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain
+from vico.worldgen.ground.tunnels import HEADROOM
 from vico.worldgen.ground.yards import Yards
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
@@ -56,7 +56,7 @@ def _town(*, mouth: float = 70.0) -> OsmData:
 def _bridges(town: OsmData, terrain: HeightField | None = None) -> tuple[Bridges, HeightField]:
     site = site_facts(town)
     streets = road_polygons(site)
-    ground = graded(terrain or flat_terrain(half=HALF), site, streets)
+    ground = grade_ground(terrain or flat_terrain(half=HALF), site, streets)
     bridges = bridges_of(site, ground, streets)
     return bridges, replace(ground, decks=bridges.levels())
 

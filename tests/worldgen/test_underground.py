@@ -2,7 +2,7 @@
 
 import pytest
 
-from vico.worldgen.facts.tags import is_underground
+from vico.worldgen.facts.site import is_underground
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.world.heights import HeightField
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.ground.yards import Yards, yards_of
-from vico.worldgen.objects.stage import Grounds, objects_from_osm
-from vico.worldgen.objects.trees import lawn_wishes
+from vico.worldgen.objects.stage import Surroundings, objects_from_osm
+from vico.worldgen.objects.trees import lawn_placements
 
 _NONE = shapely.MultiPolygon()
 _HALF = 100.0
@@ -83,14 +83,14 @@ def test_trees_and_shrubs_grow_on_lawns_and_off_streets() -> None:
     street = shapely.MultiPolygon([shapely.box(-100.0, -4.0, 100.0, 4.0)])
     lawns = _yards(osm, street, reach=_HALF).green()
     houses, height = [area.polygon for area in osm.areas], HeightField.flat(160.0)
-    bare, _ = objects_from_osm(osm, Grounds(houses, street), height=height)
-    grown, dropped = objects_from_osm(osm, Grounds(houses, street, lawns=lawns), height=height)
+    bare, _ = objects_from_osm(osm, Surroundings(houses, street), height=height)
+    grown, dropped = objects_from_osm(osm, Surroundings(houses, street, lawns=lawns), height=height)
     plants = np.isin(grown.kind, ("tree", "shrub"))
     assert not np.isin(bare.kind, ("tree", "shrub")).any()
     assert plants.sum() > 30
     assert not dropped
     assert shapely.contains_xy(lawns, *grown.position[plants, :2].T).all()
-    again, _ = objects_from_osm(osm, Grounds(houses, street, lawns=lawns), height=height)
+    again, _ = objects_from_osm(osm, Surroundings(houses, street, lawns=lawns), height=height)
     assert np.array_equal(grown.position, again.position)
 
 
@@ -103,7 +103,9 @@ def test_nothing_grows_in_water_nor_beside_rails() -> None:
     ]
     osm = replace(_map(28.0, 75.0, pond), ways=ways)
     yards = _yards(osm, _NONE, reach=_HALF)
-    grown, _ = objects_from_osm(osm, Grounds(lawns=yards.green(), mapped=yards.mapped), height=HeightField.flat(160.0))
+    grown, _ = objects_from_osm(
+        osm, Surroundings(lawns=yards.green(), mapped=yards.mapped), height=HeightField.flat(160.0)
+    )
     points = shapely.points(grown.position[:, :2])
     assert len(points) > 20
     assert not shapely.intersects(pond.polygon, points).any()
@@ -117,7 +119,7 @@ def test_tiles_of_a_city_do_not_draw_their_lawns_alike() -> None:
     def grown(east: float) -> NDArray[np.float64]:
         frame = LocalFrame(55.8, 37.6, east=east)
         osm = OsmData(frame, _HALF, 100.0, [], [], [], [])
-        return np.array([wish.xy for wish in lawn_wishes(osm, lawn, nothing, [], 0, "temperate")])
+        return np.array([wish.xy for wish in lawn_placements(osm, lawn, nothing, [], 0, "temperate")])
 
     here, there = grown(0.0), grown(2 * _HALF)
     assert min(len(here), len(there)) > 20

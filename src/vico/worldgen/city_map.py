@@ -12,8 +12,8 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, checked_extract, read_osm
 from vico.io.files import sha256_of
 from vico.worldgen.city_request import CityRequest
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.ground_kinds import sea_of_map
+from vico.worldgen.facts.fault_isolation import drop_on_failure
+from vico.worldgen.facts.land_cover import sea_of_map
 from vico.worldgen.seams.grid import HALO
 from vico.worldgen.stages import code_digest
 
@@ -40,7 +40,7 @@ class RegionMap:
         whole = read_osm(self._path, self._frame, self._reach, need_buildings=False)
         # The sea is found for all tiles at once: of one that no coastline meets nobody could say whether it is land.
         # Where that fails each tile looks for its own, and reports what is wrong.
-        with expendable("sea"):
+        with drop_on_failure("sea"):
             reach = self._reach
             return replace(whole, sea=sea_of_map(whole, shapely.box(-reach, -reach, reach, reach)))
         return whole

@@ -19,8 +19,8 @@ from vico.world.heights import HeightField
 from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_request import CityRequest
 from vico.worldgen.facts.site import site_facts
-from vico.worldgen.ground.bridges.tunnels import Bore, Box, bored_ways, bores_of, paved_of
 from vico.worldgen.ground.terrain import APRON
+from vico.worldgen.ground.tunnels import Bore, Box, bores_of, paved_of, tunnel_ways
 from vico.worldgen.product import read_head
 from vico.worldgen.seams.grid import Tile, TileGrid, tile_name
 from vico.worldgen.seams.join import BORES, JOINED, Seamless
@@ -68,7 +68,7 @@ def _window(grid: TileGrid) -> Box:
 
 
 def _tiles_with_tunnels(region: RegionMap, grid: TileGrid) -> list[Tile]:
-    lines = [shapely.LineString(way.line) for way in bored_ways(region.whole, _window(grid))]
+    lines = [shapely.LineString(way.line) for way in tunnel_ways(region.whole, _window(grid))]
     tree = shapely.STRtree([grid.box(tile) for tile in grid])
     near = tree.query(np.array(lines, object), predicate="dwithin", distance=_BESIDE)[1] if lines else []
     chosen = set(np.asarray(near, np.int64).tolist())
@@ -79,7 +79,7 @@ def _bores(region: RegionMap, joined: _Joined) -> list[Bore]:
     if not joined.tiles:
         return []
     osm, window = region.whole, _window(joined.request.grid)
-    ends = np.concatenate([way.line[[0, -1]] for way in bored_ways(osm, window)])
+    ends = np.concatenate([way.line[[0, -1]] for way in tunnel_ways(osm, window)])
     ground = joined.ground(ends)
     return bores_of(site_facts(osm), ground, window, ground.paved)
 

@@ -14,9 +14,9 @@ from vico.geo.overlay import polygons_of
 from vico.world.heights import HeightField
 from vico.worldgen.city_map import RegionMap
 from vico.worldgen.city_request import CityRequest
-from vico.worldgen.facts.ground_kinds import water_of_map
-from vico.worldgen.facts.waters import WaterBody
-from vico.worldgen.ground.waters import piped_waters, water_bodies
+from vico.worldgen.facts.land_cover import water_of_map
+from vico.worldgen.facts.site import WaterBody
+from vico.worldgen.ground.kerbs_and_banks import piped_waters, water_bodies
 from vico.worldgen.seams.grid import HALO, tile_name
 from vico.worldgen.seams.join import WATERS
 from vico.worldgen.stages import Stages, keep_product

@@ -29,7 +29,7 @@ from vico.io.files import sha256_of
 from vico.io.http import HttpClient
 from vico.world.model import Dropped, Source
 from vico.worldgen.as_typed import quantities_as_typed
-from vico.worldgen.facts.precedence import Precedence, read_precedence
+from vico.worldgen.facts.conflation import Precedence, read_precedence
 from vico.worldgen.product import digest_of
 from vico.worldgen.sources import SERVICES, Sources
 from vico.worldgen.stages import Stages

@@ -29,10 +29,9 @@ from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
 from vico.worldgen.laying import cladding_in, ground_in, yards_in
-from vico.worldgen.objects.detections.matching import things_from_detections
-from vico.worldgen.objects.models import models_of
+from vico.worldgen.objects.detections import things_from_detections
 from vico.worldgen.objects.parking import parking_from_osm
-from vico.worldgen.objects.stage import Grounds, objects_from_osm
+from vico.worldgen.objects.stage import Surroundings, models_of, objects_from_osm
 from vico.worldgen.photos.streetview.renders import photographer_of
 from vico.worldgen.photos.texturing import (
     Texturing,
@@ -82,7 +81,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         "objects",
         objects_from_osm,
         _with_detections(site.osm, evidence, height, seed, folder, stages),
-        Grounds([*solids, *bridges.cuts], streets.carriageway, streets.footways(), yards.green(), yards.mapped),
+        Surroundings([*solids, *bridges.cuts], streets.carriageway, streets.footways(), yards.green(), yards.mapped),
         height=height,
         transit=transit,
         lanes=lanes,

@@ -13,16 +13,16 @@ from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
 from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
-from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
+from vico.worldgen.buildings.fitting import lower_onto_terrain, plans_on_tiles
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
 from vico.worldgen.evidence import Evidence
-from vico.worldgen.facts.outlines.buildings import building_plans
-from vico.worldgen.facts.outlines.merging import merged_buildings
-from vico.worldgen.facts.outlines.plans import BuildingPlans
+from vico.worldgen.facts.building_outlines import building_plans
+from vico.worldgen.facts.building_plans import BuildingPlans
+from vico.worldgen.facts.conflation import conflate_buildings
 from vico.worldgen.facts.site import SiteFacts, site_facts
 from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.ground.bridges.stage import Bridges, bridges_of
-from vico.worldgen.ground.grading import graded
+from vico.worldgen.ground.grade_separation import Bridges, bridges_of
+from vico.worldgen.ground.grading import grade_ground
 from vico.worldgen.ground.stairs import Flights, flights_of
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.request import WorldRequest
@@ -75,7 +75,7 @@ def planned(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan:
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
     streets = run("streets", road_polygons, site, plans.standing())
     site = _left(site, stages)
-    height = run("grading", graded, bare, site, streets)
+    height = run("grading", grade_ground, bare, site, streets)
     return Plan(evidence, _left(site, stages), plans, tiles, streets, height)
 
 
@@ -149,7 +149,7 @@ def _merged(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict[str, Any
     """Merge what other sources know of buildings into the map; also what their plans need to know beside it."""
     if evidence.precedence is None:
         return evidence, {}
-    merged = stages.run("sources", merged_buildings, evidence.data, evidence.buildings, evidence.precedence)
+    merged = stages.run("sources", conflate_buildings, evidence.data, evidence.buildings, evidence.precedence)
     stages.report("sources", merged.counts, merged.dropped)
     data = stages.given(merged.osm, f"map of {stages.digest(merged)}")
     return replace(evidence, data=data), {"measured": merged.facets, "origins": merged.origins}
@@ -204,4 +204,4 @@ def _ground_of_tiles(
             height = flat_terrain(half=half)
     else:
         height = terrain_from_dem(samples, half=half)
-    return height, settled(mesh, plans.plans, height)[1]
+    return height, lower_onto_terrain(mesh, plans.plans, height)[1]

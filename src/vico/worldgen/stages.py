@@ -25,7 +25,7 @@ from vico.geo.overlay import OverlayError
 from vico.io.data_files import VARIABLE
 from vico.version import __version__
 from vico.world.model import TRIED, Dropped, StageReport
-from vico.worldgen.facts.expendable import Losses, listening
+from vico.worldgen.facts.fault_isolation import Losses, collect_losses
 from vico.worldgen.product import digest_of, read_head, read_product, write_product
 
 Progress = Callable[[str, int, int], None]
@@ -271,7 +271,7 @@ def kept_product(folder: Path, name: str) -> tuple[Any, str]:
 def _as_a_whole(name: str) -> Iterator[Losses]:
     """Listen to a stage; what fails in it, for no object in particular, ends the build in a sentence."""
     try:
-        with listening() as losses:
+        with collect_losses() as losses:
             yield losses
     except OverlayError as error:
         _log.info("stage %s failed", name, exc_info=True)

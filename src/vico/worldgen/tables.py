@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from vico.assets.models.library import INDOOR, OUTDOOR, read_all
 from vico.io.data_files import own_files
-from vico.worldgen.facades import catalogue as facades
-from vico.worldgen.facts import place_words
+from vico.worldgen.facades import facade_styles as facades
+from vico.worldgen.facts import named_places
 from vico.worldgen.indoor import catalogue as rooms
 from vico.worldgen.objects import catalogue as objects
-from vico.worldgen.objects.detections.classes import detected_classes
+from vico.worldgen.objects.detections import detected_classes
 
 
 def read_tables() -> None:
@@ -26,9 +26,9 @@ def read_tables() -> None:
             _ = model.surfaces
     for read in (
         facades.styles,
-        place_words.categories,
-        place_words.source_words,
-        place_words.place_names,
+        named_places.categories,
+        named_places.source_words,
+        named_places.place_names,
         objects.kinds,
         objects.signs,
         objects.standing,

@@ -41,7 +41,7 @@ from vico.render.portals import show_rooms
 from vico.render.records import CABIN_STEPS
 from vico.render.scene import Scene
 from vico.render.shading.post_processing import draw_weather, occlude, smooth_edges
-from vico.render.shadows import casters
+from vico.render.shadows.casters import CABIN_BLUE, CABIN_GREEN, CABIN_LAMP, CABIN_TILT, UNDER_ROOF
 from vico.render.uniforms import Light, Record, camera_uniforms
 
 _HERE = Path(__file__).parent
@@ -227,11 +227,11 @@ def _with_sky(places: NDArray[np.float64], depth: NDArray[np.float32], camera: R
 _CONSTANTS = {
     "CASTER_ROWS": CASTER_ROWS,
     "CABIN_STEPS": CABIN_STEPS,
-    "UNDER_ROOF": casters.UNDER_ROOF,
-    "CABIN_LAMP": casters.CABIN_LAMP,
-    "CABIN_TILT": casters.CABIN_TILT,
-    "CABIN_GREEN": casters.CABIN_GREEN,
-    "CABIN_BLUE": casters.CABIN_BLUE,
+    "UNDER_ROOF": UNDER_ROOF,
+    "CABIN_LAMP": CABIN_LAMP,
+    "CABIN_TILT": CABIN_TILT,
+    "CABIN_GREEN": CABIN_GREEN,
+    "CABIN_BLUE": CABIN_BLUE,
     "CELL": CELL,
     "AROUND_CORNER": AROUND_CORNER,
     "BEFORE": BEFORE,

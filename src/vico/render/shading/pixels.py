@@ -63,7 +63,7 @@ from vico.render.shadows.casters import CABIN_BLUE, CABIN_GREEN, CABIN_LAMP, CAB
 from vico.render.shadows.moving import CABINS, NO_SHADOWS
 
 _ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
-_EPSILON, _ONE_U32 = np.float32(1e-12), np.uint32(1)
+_TINY, _UNIT = np.float32(1e-12), np.uint32(1)
 _TONE_SCALE = np.float32((TONE_STEPS - 1) / TONE_RANGE)
 _TONE_LAST = np.float32(TONE_STEPS - 1)
 # A bay and a storey as rooms have them, metres; what is farther away shows no rooms, and begins to before.
@@ -101,7 +101,7 @@ def look_into_windows(light: Any, camera: Any, textured: bool, real: Any, whole:
         code = whole[WINDOW + i]
         nx, ny = real[NX + i], real[NY + i]
         gx, gy, gz = real[X + i] - vx, real[Y + i] - vy, real[Z + i] - vz
-        length = max(np.sqrt(gx * gx + gy * gy + gz * gz), _EPSILON)
+        length = max(np.sqrt(gx * gx + gy * gy + gz * gz), _TINY)
         inverse = _ONE / length
         ahead = max(-(gx * nx + gy * ny) * inverse, np.float32(0.02))
         aside, up = (gy * nx - gx * ny) * inverse, gz * inverse
@@ -121,7 +121,7 @@ def look_into_windows(light: Any, camera: Any, textured: bool, real: Any, whole:
         bay_number, storey_number = np.uint32(np.int32(bay) & 7), np.uint32(np.int32(storey) & 3)
         number = np.uint32(np.uint32(code >> WINDOW_SHIFT) * np.uint32(0x9E3779B1))
         number = np.uint32(
-            number ^ np.uint32(np.uint32(bay_number * np.uint32(4) + storey_number + _ONE_U32) * np.uint32(0x85EBCA6B))
+            number ^ np.uint32(np.uint32(bay_number * np.uint32(4) + storey_number + _UNIT) * np.uint32(0x85EBCA6B))
         )
         number = np.uint32(np.uint32(number ^ (number >> np.uint32(15))) * np.uint32(0x2C1B3C6D))
         number = np.uint32(number ^ (number >> np.uint32(13)))
@@ -212,8 +212,7 @@ class MovingShadows(NamedTuple):
     found: int
 
 
-_TINY = np.float32(1e-12)
-_UNIT, _EIGHT, _TWO_CHANNELS = np.uint32(1), np.uint32(8), np.uint32(0xFF00FF)
+_EIGHT, _TWO_CHANNELS = np.uint32(8), np.uint32(0xFF00FF)
 # sRGB to linear light as a polynomial of the byte / 255: off by less than 0.003.
 _P1, _P2, _P3 = np.float32(0.012522878), np.float32(0.682171111), np.float32(0.305306011)
 

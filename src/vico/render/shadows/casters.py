@@ -126,7 +126,6 @@ def _within(depth: Any) -> Any:
     return min(max(depth + _HALF, _ZERO), _ONE)
 
 
-_ZERO_F32, _HALF_F32, _ONE_F32 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 # Width of a rim where it begins, and what it grows by for each metre on the way: the sun is half a degree wide.
 _RIM, _SPREAD = np.float32(0.03), np.float32(0.012)
 # A rim is at most so many times a limb's radius wide.
@@ -182,12 +181,12 @@ def _place_limb(frame: Any, axis: int, limb: Any, end: int) -> float:
 def limb_shadow(limb: Any, p: Any, q: Any, r: Any) -> Any:
     """Return how dark a limb makes a point, 0..1; all float32, in the frame across and along the light."""
     x, y = p - limb[0], q - limb[1]
-    way = min(max((x * limb[2] + y * limb[3]) * limb[4], _ZERO_F32), _ONE_F32)
+    way = min(max((x * limb[2] + y * limb[3]) * limb[4], _ZERO), _ONE)
     x, y = x - way * limb[2], y - way * limb[3]
     ahead = limb[5] + way * limb[6] - r
-    rim = min(_RIM + _SPREAD * max(ahead, _ZERO_F32), _WIDEST * limb[7])
-    dark = min(max((limb[7] - np.sqrt(x * x + y * y)) / rim + _HALF_F32, _ZERO_F32), _ONE_F32)
-    return dark * min(max(ahead * _BEHIND, _ZERO_F32), _ONE_F32)
+    rim = min(_RIM + _SPREAD * max(ahead, _ZERO), _WIDEST * limb[7])
+    dark = min(max((limb[7] - np.sqrt(x * x + y * y)) / rim + _HALF, _ZERO), _ONE)
+    return dark * min(max(ahead * _BEHIND, _ZERO), _ONE)
 
 
 # An avatar's shadow, where it is that of an ellipsoid, is of at most this half width, metres: arms and coats are thin.

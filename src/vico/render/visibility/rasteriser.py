@@ -19,6 +19,7 @@ _NUMBER_MASK = np.uint64(0xFFFFFFFF)
 _RUN = 8
 _OPAQUE = np.uint32(0x80000000)
 # An index, masked so that the compiler knows it is not negative: else it allows for indices from the end.
+# Masked so, an index is not negative for all the compiler knows.
 _INDEX, _LONG_INDEX = 0x7FFFFFFF, 0x7FFFFFFFFFFF
 
 
@@ -253,7 +254,6 @@ def box_in_picture(place: Any, across: Any, inward: Any, camera: Any) -> Any:
 
 # Farther away than this a door looks closed, metres.
 _FARTHEST_OPENING = 120.0
-_INDEX_MASK = 0x7FFFFFFF  # masked so, an index is not negative for all the compiler knows
 
 
 @kernel
@@ -311,7 +311,7 @@ def _cut_opening(opening: Any, camera: Any, part: Any, empty: Any, keys: Any) ->
     a0, b0 = dx * iy - dy * ix, dx * ix + dy * iy
     for row in range(first_row, end_row):
         for column in range(first_column, end_column):
-            pixel = (row * width + column) & _INDEX_MASK
+            pixel = (row * width + column) & _INDEX
             if triangle_number(keys[pixel]) == 0:
                 continue
             depth = 1.0 / float(inverse_depth(keys[pixel]))

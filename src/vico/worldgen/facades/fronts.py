@@ -15,12 +15,19 @@ from vico.seeds import rng
 from vico.world.check.buildings import overlapping_faces
 from vico.world.mesh import Surface
 from vico.world.model import FAILED, Building, Category, Entrance, Place
-from vico.worldgen.facades.lettering import spelled
-from vico.worldgen.facades.pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
-from vico.worldgen.facades.signs import Board, Boards, Lettering, colours_of, paint_boards
+from vico.worldgen.facades.signs import Board, Boards, Lettering, colours_of, drawable_text, paint_boards
 from vico.worldgen.facades.street_names import Streets, name_plates
-from vico.worldgen.facades.walls import GroundFloors, Wall
-from vico.worldgen.facts.expendable import expendable, leave_out
+from vico.worldgen.facades.walls import (
+    Face,
+    GroundFloors,
+    Pieces,
+    Rgb,
+    Wall,
+    cell_uv,
+    cover_with_blank_wall,
+    is_blank_wall,
+)
+from vico.worldgen.facts.fault_isolation import drop_on_failure, leave_out
 from vico.worldgen.facts.street_habits import Plates
 
 _WHITE: Rgb = (255, 255, 255)
@@ -117,12 +124,12 @@ def street_fronts(
             at_door.setdefault(place.entrance, []).append(place)
     spots = []
     for entrance in entrances:
-        with expendable(entrance.id):
+        with drop_on_failure(entrance.id):
             building = known[entrance.building]
             names = tuple(at_door.get(entrance.id, ()))
             wall = ground.at(building.entity, entrance.position[0], entrance.position[1], entrance.facing)
             spots.append(_Spot(entrance, building, wall, _kind(building, names), names))
-    spots = _apportioned(spots)
+    spots = _assign_bays(spots)
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
     plates = Plates() if streets is None else streets.plates
     hung = [] if streets is None else name_plates(streets, buildings, ground)
@@ -132,7 +139,7 @@ def street_fronts(
     materials = {m.name: m for m in (*(s.material for s in walls), *boards.materials)}
     built: list[_Built] = []
     for spot in spots:
-        with expendable(spot.entrance.id):
+        with drop_on_failure(spot.entrance.id):
             one = _Built(spot, Pieces(materials), Counter())
             front = _Front(spot, one.pieces, boards, one.counts, rng(seed, "front", spot.entrance.id))
             front.build()
@@ -194,7 +201,7 @@ def _near_others(built: Sequence[_Built], buildings: Sequence[Building]) -> tupl
 
 def _number(building: Building, plates: Plates) -> Lettering | None:
     """Return the plate with a house's number; None where the map names none, or one that no plate has room for."""
-    text = spelled(building.tags.get("addr:housenumber", "").split(";")[0].split(",")[0])
+    text = drawable_text(building.tags.get("addr:housenumber", "").split(";")[0].split(",")[0])
     if text is None or len(text) > _LONGEST_NUMBER:
         return None
     return Lettering(text, plates.number_ground, plates.number_letters, shines=False)
@@ -250,7 +257,7 @@ _WIDTH = {
 }
 
 
-def _apportioned(spots: Sequence[_Spot]) -> list[_Spot]:
+def _assign_bays(spots: Sequence[_Spot]) -> list[_Spot]:
     """Give every door the whole bays it touches; where two want the same, they meet halfway."""
     made: list[_Spot] = []
     by_wall: dict[tuple[int, float, float, float, float], list[_Spot]] = {}
@@ -272,7 +279,7 @@ def _apportioned(spots: Sequence[_Spot]) -> list[_Spot]:
             # Nothing of a doorway, its lintel and canopy included, hangs over the wall's end.
             clear = min(_WIDTH[spot.kind] / 2 + 0.46, wall.length / 2)
             s = min(max(wall.along(*spot.entrance.position[:2]), clear), wall.length - clear)
-            s = _settled(wall, s, half)
+            s = _snap_to_bay(wall, s, half)
             a, b = wall.bay_edges(s - half, s + half)
             if spot.kind == "shop" and b - a < 3.4:  # a shop has a window beside its door
                 a, b = wall.bay_edges(s - half - 0.9, s + half + 0.9)
@@ -286,12 +293,12 @@ def _apportioned(spots: Sequence[_Spot]) -> list[_Spot]:
     return sorted(made, key=lambda spot: rank[spot.entrance.id])
 
 
-def _settled(wall: Wall, s: float, half: float) -> float:
+def _snap_to_bay(wall: Wall, s: float, half: float) -> float:
     """Move a door that would cost two bays their windows into one of them, if that is a small step away."""
     phase = wall.first - math.floor(wall.first)
     place = s / wall.bay + phase
     low, high = math.floor(place) + half / wall.bay, math.floor(place) + 1 - half / wall.bay
-    if low > high or low <= place <= high or is_bare(wall, s - half, s + half):
+    if low > high or low <= place <= high or is_blank_wall(wall, s - half, s + half):
         return s
     moved = (min(max(place, low), high) - phase) * wall.bay
     on_wall = half <= moved <= wall.length - half
@@ -325,8 +332,8 @@ class _Front:
         if wall is not None:
             margin = self.width / 2 + 0.25
             whole = not shop or wall.material not in _SHARED_MATERIALS
-            if whole and not is_bare(wall, spot.s - margin, spot.s + margin):
-                bare(self.face, wall, spot.a, spot.b)
+            if whole and not is_blank_wall(wall, spot.s - margin, spot.s + margin):
+                cover_with_blank_wall(self.face, wall, spot.a, spot.b)
         if shop:
             self._shop()
         elif spot.kind in ("hotel", "hall"):
@@ -359,7 +366,7 @@ class _Front:
         kind = self.spot.kind
         height = min(2.5 if kind != "house" else 2.25, max(self.top - self.z - 0.35, 1.95))
         colour = _DOOR_COLOURS[int(self.random.integers(len(_DOOR_COLOURS)))]
-        stone = _mixed(_STONE, self._tint(), 0.6)
+        stone = _mix_colours(_STONE, self._tint(), 0.6)
         if kind == "office" or (kind == "shop"):
             self._door("glass" if kind == "shop" else "office", height, 0.05)
             self._surround(height, (96, 98, 100), wide=0.12, deep=0.12)
@@ -524,7 +531,7 @@ class _Front:
     def _awning(self, a: float, b: float, low: float, ground: Rgb) -> None:
         self.counts["awnings"] += 1
         striped = self.random.random() < 0.5
-        colour = _lift(ground)
+        colour = _awning_colour(ground)
         uv = cell_uv("stripes" if striped else "paint")
         self.face.slope(a, b, (low - 0.5, 1.05), (low + 0.02, 0.14), uv=uv, colour=colour)
         self.face.slope(a, b, (low - 0.72, 1.06), (low - 0.5, 1.05), uv=uv, colour=colour)
@@ -553,7 +560,7 @@ class _Front:
         self.counts["projecting_signs"] += 1
 
 
-def _mixed(a: Rgb, b: Rgb, share: float) -> Rgb:
+def _mix_colours(a: Rgb, b: Rgb, share: float) -> Rgb:
     r, g, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
     return r, g, blue
 
@@ -563,7 +570,7 @@ def _dim(colour: Rgb, factor: float) -> Rgb:
     return r, g, b
 
 
-def _lift(colour: Rgb) -> Rgb:
+def _awning_colour(colour: Rgb) -> Rgb:
     """Return an awning's colour: a cloth is brighter than a painted board."""
     r, g, b = (min(round(c * 1.15 + 26), 255) for c in colour)
     return r, g, b

@@ -13,10 +13,8 @@ from vico.geometry import distance
 from vico.world.heights import HeightField
 from vico.world.model import Building, Road, Roads
 from vico.world.objects import Objects
-from vico.worldgen.facades.lettering import spelled
-from vico.worldgen.facades.pieces import Face, Pieces
-from vico.worldgen.facades.signs import Boards, Lettering
-from vico.worldgen.facades.walls import GroundFloors, Wall
+from vico.worldgen.facades.signs import Boards, Lettering, drawable_text
+from vico.worldgen.facades.walls import Face, GroundFloors, Pieces, Wall
 from vico.worldgen.facts.street_habits import Plates
 
 _TALL, _LONGEST = 0.22, 2.2  # metres; longer names have lower plates
@@ -135,7 +133,7 @@ def name_plates(streets: Streets, buildings: Sequence[Building], ground: GroundF
 
 
 def _lettering(name: str, plates: Plates) -> Lettering | None:
-    text = spelled(name.split(";")[0])
+    text = drawable_text(name.split(";")[0])
     if text is None or len(text) > _MOST_CHARACTERS:
         return None
     return Lettering(text, plates.ground, plates.letters, plates.rim, shines=False)

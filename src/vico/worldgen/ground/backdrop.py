@@ -21,8 +21,8 @@ from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, merge_surfaces, quad_triangles
 from vico.world.model import ENTITY_BACKDROP, Building
-from vico.worldgen.facts.expendable import united
-from vico.worldgen.facts.ground_kinds import mapped_areas
+from vico.worldgen.facts.fault_isolation import union_named
+from vico.worldgen.facts.land_cover import mapped_areas
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.texture_canvas import Canvas
@@ -83,8 +83,8 @@ def backdrop_of(
     half = site.osm.half
     reach = half + _APRON
     soft = mapped_areas(site, shapely.box(-reach, -reach, reach, reach))
-    water = united(soft["water"], grid=0.01)
-    green = united([one for name in ("woods", "grass", "garden", "farmland") for one in soft[name]], grid=0.01)
+    water = union_named(soft["water"], grid=0.01)
+    green = union_named([one for name in ("woods", "grass", "garden", "farmland") for one in soft[name]], grid=0.01)
     for shape in (water, green, streets.carriageway):
         shapely.prepare(shape)
     shapes = np.array([shapely.Polygon(b.footprint[0]) for b in buildings], object)
@@ -99,7 +99,9 @@ def backdrop_of(
         like = np.sort(tree.query(around, predicate="intersects"))
         leaves = bool(streets.carriageway.intersects(slot.strip(_FRONT, _APRON)))
         fronts = (_APRON - _BEHIND,) if leaves else (_APRON - _FRONT, _APRON - _BEHIND)
-        near = next((far for far in fronts if not _taken(slot.strip(far - 1.5, far + _DEPTH), shapes[like])), None)
+        near = next(
+            (far for far in fronts if not _is_occupied(slot.strip(far - 1.5, far + _DEPTH), shapes[like])), None
+        )
         if near is None:
             continue
         built = bool(len(tree.query(overlay.buffer(shapely.Point(slot.middle), _TOWN), predicate="intersects")))
@@ -111,7 +113,7 @@ def backdrop_of(
     return merge_surfaces([part.of_entity(ENTITY_BACKDROP) for part in parts])
 
 
-def _taken(ground: shapely.Polygon, shapes: NDArray[np.object_]) -> bool:
+def _is_occupied(ground: shapely.Polygon, shapes: NDArray[np.object_]) -> bool:
     return bool(shapely.intersects(shapes, ground).any())
 
 

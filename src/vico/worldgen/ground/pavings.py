@@ -159,7 +159,7 @@ def _patch_field(seed: int) -> NDArray[np.float64]:
     return rng(seed, "ground", "patches").uniform(-1.0, 1.0, (256, 256))
 
 
-def coloured(look: GroundStyle, xy: NDArray[np.float64]) -> NDArray[np.uint8]:
+def vertex_colours(look: GroundStyle, xy: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Vertex colours of a kind of ground, shape ``(n, 3)``."""
     colour = np.asarray(look.tint, np.float64) * patches(xy, look.patches)
     return np.clip(np.round(colour), 0, 255).astype(np.uint8)

@@ -1,51 +1,150 @@
 """The ground as people see it: streets, pavements, squares, lawns and water, draped on the terrain.
 
 A partition: every spot belongs to one kind of surface, so nothing flickers. Only paint lies on top, two centimetres
-up. Where two kinds meet at different heights an upright face closes the step: kerbs, quays, the edges of bridges.
+up. Where two kinds meet at different heights an upright face closes the step: kerbs, quays, the edges of bridges. Into
+the paving go ribbed fields before crossings, and pits of bare earth in which trees stand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
-from shapely import Polygon
+from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData
 from vico.geo.overlay import polygons_of
+from vico.geometry import distance
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, merge_surfaces, quad_triangles
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
-from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
-from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas, pieces_in
-from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, named_parts, overlay_named, union_named
+from vico.worldgen.facts.land_cover import ground_partition, mapped_areas, pieces_in
+from vico.worldgen.facts.site import SiteFacts, on_the_ground
 from vico.worldgen.facts.street_habits import street_habits
-from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.facts.tags import on_the_ground
-from vico.worldgen.ground.bridges.decks import spans_over_water
-from vico.worldgen.ground.bridges.stage import Bridges
-from vico.worldgen.ground.conform import PlanMesh, conforming
-from vico.worldgen.ground.contours import region_above
-from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Grid, Heights, curtain, triangulated
+from vico.worldgen.facts.streets import Crossing, StreetPolygons
+from vico.worldgen.ground.bridges import spans_over_water
+from vico.worldgen.ground.decimation import decimate_mesh
+from vico.worldgen.ground.grade_separation import Bridges
 from vico.worldgen.ground.grading import is_level
-from vico.worldgen.ground.kerbs import RAMP, lowered_kerbs
-from vico.worldgen.ground.markings import Quads, road_markings
-from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
-from vico.worldgen.ground.pitches import pitch_lines
+from vico.worldgen.ground.kerbs_and_banks import RAMP, Water, lowered_kerbs, open_water, piped_waters
+from vico.worldgen.ground.markings import Quads, clip_quads, pitch_lines, road_markings
+from vico.worldgen.ground.mesh import (
+    CLOSE,
+    NEAR,
+    ROUGH,
+    Grid,
+    Heights,
+    PlanMesh,
+    border_chains,
+    conforming_mesh,
+    curtain,
+    curtain_surface,
+    lowered_heights,
+    oriented_outlines,
+    split_by_area,
+    triangulate,
+)
+from vico.worldgen.ground.pavings import LOOKS, GroundStyle, ground_material, look_of, vertex_colours
+from vico.worldgen.ground.polygons import region_above
 from vico.worldgen.ground.stairs import Flights
-from vico.worldgen.ground.strokes import cut_to
-from vico.worldgen.ground.tactile import street_bearing, tactile_fields
-from vico.worldgen.ground.thinning import thinned
-from vico.worldgen.ground.tree_pits import tree_pits
-from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
-from vico.worldgen.ground.waters import Water, open_water, piped_waters
 from vico.worldgen.ground.yards import Yards
+
+_FROM_KERB, _DEEP = 0.25, 0.6  # metres: behind the kerb stone, and on from there
+_WIDEST = 3.0
+_LEAST = 0.25  # square metres of a field worth laying
+
+
+def street_bearing(streets: StreetPolygons) -> float:
+    """Return the direction that most of the streets have, or are square to, radians from east within 45 degrees."""
+    turn = 0j
+    for street in streets.streets:
+        steps = np.diff(street.line, axis=0)
+        along = steps[:, 0] + 1j * steps[:, 1]
+        length = np.abs(along)
+        keep = length > 1e-6
+        turn += complex((length[keep] * (along[keep] / length[keep]) ** 4).sum())
+    return round(float(np.angle(turn)) / 4.0, 3) if abs(turn) > 1e-6 else 0.0
+
+
+def tactile_fields(streets: StreetPolygons, window: Polygon) -> list[Polygon]:
+    """Lay out ribbed fields at both ends of painted crossings: along the kerb, on the pavement, none over another."""
+    pavement = overlay.union_all([streets.sidewalk, streets.pedestrian])
+    shapely.prepare(pavement)
+    found: list[BaseGeometry] = []
+    for crossing in streets.crossings:
+        if crossing.painted:
+            with drop_on_failure(crossing.id):
+                found += _tactile_strips(crossing, streets.carriageway, pavement)
+    inside = [shape for shape in found if window.contains(shape)]
+    return polygons_of(overlay.union_all(inside, grid=0.001), _LEAST) if inside else []
+
+
+def _tactile_strips(crossing: Crossing, carriageway: BaseGeometry, pavement: BaseGeometry) -> list[BaseGeometry]:
+    a, b = np.array(crossing.start), np.array(crossing.end)
+    along = (b - a) / max(distance(b, a), 1e-9)
+    reach = _FROM_KERB + _DEEP
+    found: list[BaseGeometry] = []
+    for end, out in ((a, -along), (b, along)):
+        if not shapely.intersects_xy(pavement, *(end + out * (_FROM_KERB + _DEEP / 2))):
+            continue
+        # Slanting crossings meet the kerb before or behind their end.
+        strip = overlay.buffer(
+            LineString([end - out * 1.5, end + out * 2.0]), min(crossing.width, _WIDEST) / 2, cap_style="flat"
+        )
+        x, y = end
+        road = shapely.clip_by_rect(carriageway, x - 6.0, y - 6.0, x + 6.0, y + 6.0)
+        band = overlay.difference(
+            overlay.buffer(road, reach, quad_segs=3), overlay.buffer(road, _FROM_KERB, quad_segs=3)
+        )
+        field = overlay.areas_of(overlay.intersection(overlay.intersection(strip, band), pavement))
+        found += [part for part in shapely.get_parts(field) if part.area > _LEAST]
+    return found
+
+
+_KINDS_WITH_PITS = ("sidewalk", "pedestrian", "yard", "parking")
+_FRAME, _EARTH = 1.7, 1.4  # metres, outer sides
+_WHOLE = 0.98  # share of a pit's frame on paving
+_STONE_COLOUR, _EARTH_COLOUR = (150, 147, 141), (86, 72, 56)
+
+
+def tree_pits(trees: NDArray[np.float64], pieces: Mapping[str, Sequence[Polygon]], bearing: float) -> list[Quads]:
+    """Lay out pits around the trees that stand on paving.
+
+    Parameters
+    ----------
+    trees
+        Their places, metres, shape ``(n, 2)``.
+    pieces
+        `ground_partition` of the map: a pit lies on paving as a whole, or there is none.
+    bearing
+        Direction of the paving, radians from east.
+    """
+    paved = [shape for name, shapes in pieces.items() if name.partition(":")[0] in _KINDS_WITH_PITS for shape in shapes]
+    if not len(trees) or not paved:
+        return []
+    c, s = np.cos(bearing), np.sin(bearing)
+    square = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) @ np.array([[c, s], [-s, c]])
+    frames = trees[:, None, :] + square * _FRAME
+    squares = shapely.polygons(frames)
+    covered = np.zeros(len(trees))
+    for own, under in shapely.STRtree(paved).query(squares, predicate="intersects").T.tolist():
+        covered[own] += overlay.common_area(squares[own], paved[under])
+    kept = np.flatnonzero(covered > _WHOLE * _FRAME**2)
+    if not len(kept):
+        return []
+    earth = trees[kept][:, None, :] + square * _EARTH
+    return [
+        Quads(frames[kept], _STONE_COLOUR, low=False, rank=0),
+        Quads(earth, _EARTH_COLOUR, low=False, rank=1),
+    ]
+
 
 #: Metres of ground beyond the square of a world by itself: its edge is not in sight from within streets.
 APRON = 40.0
@@ -66,7 +165,7 @@ _SHOWN = 2.0  # metres along the window's sides where ground within buildings is
 _NO_TREES = np.zeros((0, 2))
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
 _BEFORE_CROSSINGS = ("sidewalk", "pedestrian")
-_PAVED = ("kerb", "tactile", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
+_PAVED_KINDS = ("kerb", "tactile", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 
 
 def ground_from_osm(
@@ -124,11 +223,13 @@ def ground_from_osm(
         pieces = _with_tactile(pieces, tactile_fields(streets, window), window)
     waters = open_water(site, terrain, pieces.get("water", [])) if terrain.steps is not None else []
     # Along the window's sides all is drawn: who draws what lies beyond may know of other walls.
-    hidden = overlay.intersection(_hidden(osm, standing), overlay.buffer(window, -_SHOWN, join_style="mitre"))
-    laid = _laid(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, yards=yards)
+    hidden = overlay.intersection(
+        _ground_under_buildings(osm, standing), overlay.buffer(window, -_SHOWN, join_style="mitre")
+    )
+    laid = _ground_pieces(pieces, terrain, waters, reach, hidden=hidden, stairs=flights.area, look=look, yards=yards)
     wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [
-        shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
+        shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED_KINDS for shape in shapes
     ]
     grid = Grid.of(terrain, reach, NEAR, exact=exact, free=[wet, flights.area])
     street_grid = Grid.of(terrain, reach, np.inf, sunken=[streets.carriageway])
@@ -139,10 +240,12 @@ def ground_from_osm(
         for chosen in [[k for k, piece in enumerate(laid) if piece.carriageway == low]]
         for number, shapes in zip(chosen, own.cut_each([laid[k].shapes for k in chosen]), strict=True)
     }
-    parts = [triangulated(cut[number]) for number in range(len(laid))]
-    plan = _thinned(conforming(parts, _ends_of_kerbs(streets)), laid, terrain)
+    parts = [triangulate(cut[number]) for number in range(len(laid))]
+    plan = _decimated_plan(conforming_mesh(parts, _ends_of_kerbs(streets)), laid, terrain)
     surfaces = [
-        _covered(plan, number, piece, terrain) for number, piece in enumerate(laid) if (plan.piece == number).any()
+        _draped_surface(plan, number, piece, terrain)
+        for number, piece in enumerate(laid)
+        if (plan.piece == number).any()
     ]
     under = _under_bridges(site, wet, window) if waters else []
     dry = overlay.difference(window, overlay.buffer(overlay.union_all([wet, *under]), 0.6, quad_segs=1))
@@ -162,19 +265,19 @@ def ground_from_osm(
         left_driving=site.left_driving,
         stepped=flights.area,
     )
-    quads += _fields(osm, window)
+    quads += _field_lines(osm, window)
     quads += tree_pits(trees, {**pieces, "yard": _without(pieces.get("yard", []), yards.green(), window)}, bearing)
     lift = _LIFT if level else _LIFT_SLOPED
-    surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
+    surfaces += [_paint_surface(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return merge_surfaces(surfaces)
 
 
-def _thinned(plan: PlanMesh, laid: Sequence[_Piece], terrain: HeightField) -> PlanMesh:
+def _decimated_plan(plan: PlanMesh, laid: Sequence[_Piece], terrain: HeightField) -> PlanMesh:
     """Leave out what the drawn ground doesn't need."""
     used = np.array([0 if piece.carriageway else 2 if piece.water >= 0 else 1 for piece in laid], np.int64)
     natural = np.array([piece.natural for piece in laid], bool)
     level: Heights = lambda xy: np.zeros(len(xy))  # noqa: E731
-    return thinned(plan, (terrain.lower, terrain.upper, level), used, np.where(natural, NEAR, CLOSE))
+    return decimate_mesh(plan, (terrain.lower, terrain.upper, level), used, np.where(natural, NEAR, CLOSE))
 
 
 @dataclass(frozen=True)
@@ -189,7 +292,7 @@ class _Piece:
     natural: bool = False
 
 
-def _laid(
+def _ground_pieces(
     pieces: dict[str, list[Polygon]],
     terrain: HeightField,
     waters: Sequence[Water],
@@ -229,7 +332,7 @@ def _laid(
             shapes = _without(shapes, stairs, window)
             laid.append(_Piece(lower, look(name), lambda xy: terrain.upper(xy) - _UNDER_STAIRS))
         street = base == "carriageway"
-        natural = not street and base not in _PAVED
+        natural = not street and base not in _PAVED_KINDS
         laid.append(_Piece(shapes, look(name), terrain.lower if street else terrain.upper, street, natural=natural))
     laid += [_Piece(shapes, LOOKS[kind], terrain.upper, natural=True) for kind, shapes in open_ground.items()]
     laid.append(_Piece(hills, LOOKS["field"], terrain.upper, natural=True))
@@ -275,13 +378,13 @@ def _ends_of_kerbs(streets: StreetPolygons) -> NDArray[np.float64]:
 def _underlay(dry: BaseGeometry, terrain: HeightField, reach: float) -> list[Surface]:
     """Make what shows through hairlines between surfaces instead of the sky."""
     below = _UNDERLAY if is_level(terrain) else _UNDERLAY_SLOPED
-    flat, faces = triangulated(Grid.of(terrain, reach, ROUGH).cut([dry]))
+    flat, faces = triangulate(Grid.of(terrain, reach, ROUGH).cut([dry]))
     if not len(faces):
         return []
     return [_surface(flat, terrain.smooth(flat) - below, terrain_normals(terrain, flat), faces, LOOKS["yard"])]
 
 
-def _hidden(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
+def _ground_under_buildings(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
     """Ground well within buildings, which nobody sees."""
     if not len(standing):
         return shapely.MultiPolygon()
@@ -292,10 +395,10 @@ def _hidden(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
         and not any(key in area.tags for key in ("min_height", "building:min_level"))
         and on_the_ground(area.tags)
     ]
-    deep = changed(built, lambda shapes: overlay.buffer(shapes, -1.5, join_style="mitre"))
-    mapped = united([one for one in deep if not one.shape.is_empty], grid=0.01)
+    deep = overlay_named(built, lambda shapes: overlay.buffer(shapes, -1.5, join_style="mitre"))
+    mapped = union_named([one for one in deep if not one.shape.is_empty], grid=0.01)
     # Not every building of the map is built whole, or at all: people walk on what is left of its ground.
-    whole = united(changed(named_parts("buildings", standing), overlay.make_valid), grid=0.01)
+    whole = union_named(overlay_named(named_parts("buildings", standing), overlay.make_valid), grid=0.01)
     both = overlay.intersection(mapped, overlay.buffer(whole, -1.5, join_style="mitre"), grid=0.01)
     return shapely.MultiPolygon(polygons_of(both))
 
@@ -312,22 +415,22 @@ def _tracks(site: SiteFacts) -> list[NDArray[np.float64]]:
         if way.id in above:
             continue
         line: BaseGeometry = shapely.LineString(way.line)
-        with expendable(f"w{way.id}"):
+        with drop_on_failure(f"w{way.id}"):
             if tags.get("bridge", "no") == "no":
                 line = overlay.difference(line, spans)
             found += [np.asarray(part.coords) for part in shapely.get_parts(line) if part.geom_type == "LineString"]
     return [line for line in found if len(line) > 1]
 
 
-def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
+def _field_lines(osm: OsmData, window: Polygon) -> list[Quads]:
     """Lay out the lines of sports fields."""
     lines: list[NDArray[np.float64]] = []
     for area in osm.areas:
         if area.tags.get("leisure") == "pitch" and on_the_ground(area.tags) and window.intersects(area.polygon):
-            with expendable(area.id):
+            with drop_on_failure(area.id):
                 sport = area.tags.get("sport", "")
                 lines += [quad for shape in polygons_of(area.polygon) for quad in pitch_lines(shape, sport)]
-    corners = cut_to(lines, window)
+    corners = clip_quads(lines, window)
     return [Quads(corners, (236, 236, 230), low=False)] if len(corners) else []
 
 
@@ -350,7 +453,7 @@ def _surface(
     return Surface.from_triangles(
         np.c_[flat, z],
         faces,
-        colour=coloured(look, flat),
+        colour=vertex_colours(look, flat),
         entity=look.entity,
         uv=look.uv(flat) if uv is None else uv / look.tile,
         normals=normals,
@@ -358,9 +461,9 @@ def _surface(
     )
 
 
-def _covered(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightField) -> Surface:
+def _draped_surface(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightField) -> Surface:
     """Lay a piece of the plan on its heights."""
-    flat, faces = _used(plan.corners, plan.triangles[plan.piece == number])
+    flat, faces = _compact_vertices(plan.corners, plan.triangles[plan.piece == number])
     z = piece.heights(flat)
     if piece.water >= 0:
         up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
@@ -378,7 +481,9 @@ def _covered(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightField) -
     return _surface(flat[corner], z[corner], normals[corner], own, piece.look, uv)
 
 
-def _used(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _compact_vertices(
+    flat: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Keep the points that triangles use, numbered anew."""
     kept, index = np.unique(faces, return_inverse=True)
     return flat[kept], index.reshape(-1, 3)
@@ -395,7 +500,7 @@ def _kerbs(
     """Make the faces of kerb stones: between the very corners of what lies on both sides."""
     numbers = np.array([k for k, piece in enumerate(laid) if piece.carriageway], np.int64)
     lines = border_chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
-    return hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), look)
+    return curtain_surface(curtain(lines, terrain.lower, terrain.upper, least=0.004), look)
 
 
 def _under_bridges(site: SiteFacts, wet: BaseGeometry, window: Polygon) -> list[Polygon]:
@@ -405,7 +510,7 @@ def _under_bridges(site: SiteFacts, wet: BaseGeometry, window: Polygon) -> list[
     maps call what flows under a bridge a tunnel.
     """
     shapes = [*mapped_areas(site, window)["water"], *piped_waters(site.osm)]
-    below = united(changed(shapes, lambda each: overlay.on_grid(each, grid=0.001)))
+    below = union_named(overlay_named(shapes, lambda each: overlay.on_grid(each, grid=0.001)))
     hidden = overlay.difference(overlay.intersection(below, window), overlay.buffer(wet, 0.001))
     spans = spans_over_water(site)
     beneath = overlay.intersection(hidden, overlay.buffer(spans, _OVERHANG, quad_segs=2))
@@ -433,19 +538,19 @@ def _banks(
             continue
         water = waters[piece.water]
         rims = plan.border(np.array([number]), outline)
-        over, bank = parted_by(border_chains(plan, rims[:, ::-1], window.bounds[2]), over_spans)
-        found += hung(curtain(bank, lowered(water.level, 0.3), terrain.upper), LOOKS["quay"])
-        found += hung(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
+        over, bank = split_by_area(border_chains(plan, rims[:, ::-1], window.bounds[2]), over_spans)
+        found += curtain_surface(curtain(bank, lowered_heights(water.level, 0.3), terrain.upper), LOOKS["quay"])
+        found += curtain_surface(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
     for shape in under:
         water = waters[int(tree.nearest(shape))]
-        flat, faces = triangulated([shape])
+        flat, faces = triangulate([shape])
         up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
         found.append(_surface(flat, water.level(flat), np.asarray(up), faces, LOOKS["water"]))
         found.append(_surface(flat, terrain.smooth(flat) - _SLAB, -np.asarray(up), faces[:, ::-1], LOOKS["kerb"]))
-        edges = faced_lines([shape], water.level, terrain.smooth, 3.0)
-        _, walls = parted_by(edges, overlay.buffer(dry, _AT_EDGE))
-        found += hung(
-            curtain(walls, lowered(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
+        edges = oriented_outlines([shape], water.level, terrain.smooth, 3.0)
+        _, walls = split_by_area(edges, overlay.buffer(dry, _AT_EDGE))
+        found += curtain_surface(
+            curtain(walls, lowered_heights(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
             LOOKS["quay"],
         )
     return found
@@ -472,7 +577,7 @@ def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), np.float64)
 
 
-def _painted(quads: Quads, terrain: HeightField, *, lift: float) -> Surface:
+def _paint_surface(quads: Quads, terrain: HeightField, *, lift: float) -> Surface:
     """Paint and rails: quads a little above the ground."""
     corners = quads.corners.reshape(-1, 2)
     triangles = quad_triangles(4 * np.arange(len(quads.corners)), by_halves=True)

@@ -15,10 +15,9 @@ from vico.geo.osm import OsmWay
 from vico.geo.quantities import quantity
 from vico.world.heights import HeightField, Stairs
 from vico.world.mesh import Surface, surface_of_quads
-from vico.worldgen.facts.expendable import NamedShape, expendable, united
-from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.tags import on_the_ground
-from vico.worldgen.ground.pavings import LOOKS, coloured, ground_material
+from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, union_named
+from vico.worldgen.facts.site import SiteFacts, on_the_ground
+from vico.worldgen.ground.pavings import LOOKS, ground_material, vertex_colours
 
 Floats = NDArray[np.float64]
 Face = tuple[Floats, Floats, float]
@@ -73,7 +72,7 @@ class Flights:
                 self.quads,
                 self.normals,
                 uv / look.tile,
-                colour=np.clip(coloured(look, plan.reshape(-1, 2)) * shade, 0, 255).astype(np.uint8),
+                colour=np.clip(vertex_colours(look, plan.reshape(-1, 2)) * shade, 0, 255).astype(np.uint8),
                 entity=look.entity,
                 material=ground_material(look.material),
                 by_halves=True,
@@ -106,12 +105,12 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
         tags = way.tags
         if tags.get("highway") != "steps" or not on_the_ground(tags) or way.id in above or way.closed:
             continue
-        with expendable(f"w{way.id}"):
+        with drop_on_failure(f"w{way.id}"):
             for area, own in _flights(way, terrain, where):
                 areas.append(NamedShape(f"w{way.id}", area))
                 faces += own
     return Flights(
-        united(areas) if areas else shapely.MultiPolygon(),
+        union_named(areas) if areas else shapely.MultiPolygon(),
         np.array([quad for quad, _, _ in faces]).reshape(-1, 4, 3),
         np.array([normal for _, normal, _ in faces]).reshape(-1, 3),
         np.array([going for *_, going in faces], np.float64),

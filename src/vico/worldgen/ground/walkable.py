@@ -22,8 +22,8 @@ from vico.world.walkable import (
     fill_polygon,
     stroke,
 )
-from vico.worldgen.facts.expendable import NamedShape, united
-from vico.worldgen.facts.ground_kinds import mapped_areas
+from vico.worldgen.facts.fault_isolation import NamedShape, union_named
+from vico.worldgen.facts.land_cover import mapped_areas
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
 
@@ -37,7 +37,7 @@ def walkable_from_site(
     return walkable_map(
         half=half,
         solids=solids,
-        roadway=united(
+        roadway=union_named(
             [
                 NamedShape("carriageways", streets.carriageway),
                 NamedShape("car parks", streets.parking),
@@ -47,7 +47,7 @@ def walkable_from_site(
         ),
         sidewalk=streets.footways(),
         crossing=streets.crossing,
-        water=united(ground["water"], grid=None),
+        water=union_named(ground["water"], grid=None),
         objects=objects,
     )
 

@@ -14,9 +14,8 @@ from vico.geometry import distance, distances
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, quad_triangles
 from vico.world.model import ENTITY_WIRE
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.tags import on_the_ground
+from vico.worldgen.facts.fault_isolation import drop_on_failure
+from vico.worldgen.facts.site import SiteFacts, on_the_ground
 
 CONTACT = 5.5
 """Metres above the rail: 4.2 to 6 over streets (EN 50119)."""
@@ -61,7 +60,7 @@ def contact_wires(
             continue
         if tags.get("bridge", "no") != "no" or way.id in site.levels.above:
             continue
-        with expendable(f"w{way.id}"):
+        with drop_on_failure(f"w{way.id}"):
             # Of the whole way, so that wires go on where the next tile of a city begins.
             track = overlay.simplify(shapely.LineString(way.line), 0.1)
             for piece in shapely.get_parts(overlay.intersection(track, window)):

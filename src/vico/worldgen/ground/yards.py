@@ -14,12 +14,11 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import polygons_of
-from vico.worldgen.facts.expendable import NamedShape, united
-from vico.worldgen.facts.ground_kinds import mapped_areas
-from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.tags import on_the_ground
-from vico.worldgen.ground.contours import region_above
-from vico.worldgen.ground.kerbs import filled
+from vico.worldgen.facts.fault_isolation import NamedShape, union_named
+from vico.worldgen.facts.land_cover import mapped_areas
+from vico.worldgen.facts.site import SiteFacts, on_the_ground
+from vico.worldgen.ground.kerbs_and_banks import nodes_in_polygons
+from vico.worldgen.ground.polygons import region_above
 
 _SMALL = 320.0  # square metres of houses, wall to wall, up to which they have gardens
 _MOSTLY = 0.55  # share of the built ground near by that such houses have, at least
@@ -86,7 +85,7 @@ def yards_of(site: SiteFacts, carriageway: BaseGeometry, *, reach: float) -> Yar
     built = [area for area in osm.areas if _is_house(area)]
     if not built:
         return Yards(reach)
-    houses = polygons_of(united([NamedShape(area.id, area.polygon) for area in built], grid=0.01))
+    houses = polygons_of(union_named([NamedShape(area.id, area.polygon) for area in built], grid=0.01))
     beyond = min(_BEYOND, max(osm.half + osm.margin - reach, 0.0) // _CELL * _CELL)
     n = round(2 * (reach + beyond) / _CELL)
     cell = 2 * (reach + beyond) / n
@@ -118,7 +117,7 @@ def _is_house(area: OsmArea) -> bool:
 
 def _share(shapes: Sequence[shapely.Polygon], n: int, cell: float) -> NDArray[np.float64]:
     """Return what share of the ground near by shapes cover, at the middles of the cells of a grid."""
-    mask = filled(shapes, n, (n - 1) * cell / 2, cell).astype(np.float64)
+    mask = nodes_in_polygons(shapes, n, (n - 1) * cell / 2, cell).astype(np.float64)
     return np.asarray(ndimage.gaussian_filter(mask, _AROUND / cell, mode="nearest"), np.float64)
 
 
@@ -131,7 +130,7 @@ def _region(values: NDArray[np.float64], cell: float, window: shapely.Polygon) -
 def _land(osm: OsmData, uses: set[str], window: shapely.Polygon) -> BaseGeometry:
     """Return the land that is mapped as used for something."""
     found = [NamedShape(area.id, area.polygon) for area in osm.areas if area.tags.get("landuse") in uses]
-    return united([area for area in found if area.shape.intersects(window)], grid=0.01)
+    return union_named([area for area in found if area.shape.intersects(window)], grid=0.01)
 
 
 def _round_sheds(built: Sequence[OsmArea], window: shapely.Polygon) -> BaseGeometry:
@@ -141,4 +140,4 @@ def _round_sheds(built: Sequence[OsmArea], window: shapely.Polygon) -> BaseGeome
         for area in built
         if area.tags["building"] in _SHEDS and area.polygon.area > _SMALL and area.polygon.intersects(window)
     ]
-    return united(found, grid=0.01)
+    return union_named(found, grid=0.01)

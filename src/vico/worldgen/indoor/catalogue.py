@@ -15,8 +15,7 @@ from vico.assets.shapes import Colour
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Category
-from vico.worldgen.indoor.compositions import COMPOSITIONS, Composition
-from vico.worldgen.indoor.recipes import NamedPieces
+from vico.worldgen.indoor.recipes import COMPOSITIONS, Composition, NamedPieces
 from vico.worldgen.indoor.records import (
     DrawnPlan,
     EntryPlan,

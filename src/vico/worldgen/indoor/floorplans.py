@@ -286,10 +286,10 @@ def sketch_of(use: str, size: int = 0, storeys: int = 1, *, mirrored: bool = Fal
     else:
         _DRAWN[wanted.plan.drawn](draft, w, h, floors)
     sketch = draft.done(use, (w, h))
-    return _mirrored(sketch) if mirrored else sketch
+    return _mirror_sketch(sketch) if mirrored else sketch
 
 
-def _mirrored(sketch: Sketch) -> Sketch:
+def _mirror_sketch(sketch: Sketch) -> Sketch:
     w = sketch.size[0]
     rooms, doors = [], []
     for room in sketch.rooms:

@@ -34,9 +34,8 @@ from vico.world.check.indoors import walkable_inside
 from vico.world.model import Category, Place
 from vico.worldgen.indoor.catalogue import UNFURNISHED, room_kinds
 from vico.worldgen.indoor.floorplans import OUTSIDE, Sketch, SketchDoor, SketchRoom
+from vico.worldgen.indoor.furnished_plans import FloorPlan, furnish_sketch, rooms_of_plan, uses
 from vico.worldgen.indoor.furnishing import Furnishing
-from vico.worldgen.indoor.layouts import FloorPlan, furnished, uses
-from vico.worldgen.indoor.rooms import rooms_of_plan
 
 SCHEMA = "vico.layout"
 VERSION = 1
@@ -124,7 +123,7 @@ class Layout(_Strict):
     def plan(self, seed: int) -> FloorPlan:
         """Furnish it."""
         chance = rng(seed, "layout", self.name)
-        return furnished(self.sketch(), chance, int(chance.integers(4)))
+        return furnish_sketch(self.sketch(), chance, int(chance.integers(4)))
 
     def _leads_out(self, room: str) -> bool:
         return any(room in door.between and "outside" in door.between for door in self.doors)
@@ -356,10 +355,10 @@ def _furniture_findings(layout: Layout) -> list[str]:
     for made in plan.rooms:
         if not made.spots:
             wrong.append(f"rooms ({made.kind}): furniture stands in its doorway: leave 1 m before each door free")
-    return wrong or _blocked(plan)
+    return wrong or _walking_findings(plan)
 
 
-def _blocked(plan: FloorPlan) -> list[str]:
+def _walking_findings(plan: FloorPlan) -> list[str]:
     rooms, objects = rooms_of_plan(plan)
     return [f"{f.where}: {f.what}" for f in walkable_inside(rooms, objects)]
 
@@ -445,7 +444,7 @@ class LayoutRequest:
     place: str = ""
 
 
-def misfits(layout: Layout, request: LayoutRequest) -> list[str]:
+def layout_problems(layout: Layout, request: LayoutRequest) -> list[str]:
     """`findings_of` a layout, after whether it is larger than what was asked for."""
     wrong = findings_of(layout)
     w, h = request.size
@@ -454,7 +453,7 @@ def misfits(layout: Layout, request: LayoutRequest) -> list[str]:
     return wrong
 
 
-def authored(
+def layout_from_author(
     author: LayoutAuthor, place: Place, *, use: str, area: float, seed: int = 0, attempts: int = 3
 ) -> Layout | None:
     """Ask an author for a place's layout, telling what is wrong up to `attempts` times.
@@ -476,7 +475,7 @@ def authored(
         except SchemaError as error:
             feedback = [str(error)]
             continue
-        feedback = misfits(layout, request)
+        feedback = layout_problems(layout, request)
         if not feedback:
             return layout
         feedback = feedback[:8]

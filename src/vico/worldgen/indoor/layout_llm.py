@@ -21,7 +21,7 @@ from vico.errors import LlmBudgetError, LlmReplyError, SourceError
 from vico.llm import LanguageModel, Message, system, user
 from vico.world.heights import HeightField
 from vico.world.model import Building, Dropped, Entrance, Place
-from vico.worldgen.indoor.layout_library import Layout, LayoutRequest, layout_guide, layout_schema, misfits
+from vico.worldgen.indoor.layout_library import Layout, LayoutRequest, layout_guide, layout_problems, layout_schema
 from vico.worldgen.indoor.stage import Indoors, furnish
 
 #: A plan that shows what is meant; it passes all checks.
@@ -238,7 +238,7 @@ class _Drawn:
 
 
 def _faults(layout: Layout, request: LayoutRequest) -> list[str]:
-    wrong = misfits(layout, request)
+    wrong = layout_problems(layout, request)
     if layout.use != request.use or layout.category is not None:
         wrong.insert(0, f"use: it has to be {request.use!r}, and category null")
     return wrong

@@ -16,16 +16,14 @@ from vico.geo import overlay
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
-from vico.worldgen.facts.expendable import expendable, leave_out
-from vico.worldgen.facts.place_words import place_names
+from vico.worldgen.facts.fault_isolation import drop_on_failure, leave_out
+from vico.worldgen.facts.named_places import place_names
 from vico.worldgen.indoor.catalogue import use_of, uses
 from vico.worldgen.indoor.floorplans import area_of
-from vico.worldgen.indoor.layout_library import LayoutAuthor, Library, authored, read_library
-from vico.worldgen.indoor.layouts import VARIANTS, FloorPlan, plan_of
-from vico.worldgen.indoor.rooms import Indoors, Slot, assembled
+from vico.worldgen.indoor.furnished_plans import VARIANTS, FloorPlan, Indoors, Slot, place_plans, plan_of
+from vico.worldgen.indoor.layout_library import LayoutAuthor, Library, layout_from_author, read_library
 
 __all__ = ["Indoors", "furnish"]
-
 _COVER = 3.3  # metres of ground over the highest ceiling
 _GAP = 0.4
 _DEEPEST = 3000.0
@@ -116,7 +114,7 @@ def furnish(
         If the library can't be used.
     """
     shelf = read_library(library) if library is not None else None
-    everyone = [*places, *_unnamed(places, buildings, entrances)]
+    everyone = [*places, *_default_places(places, buildings, entrances)]
     by_id = {b.id: b for b in buildings}
     wanted: dict[str, list[int]] = defaultdict(list)
     for k, place in enumerate(everyone):
@@ -129,20 +127,22 @@ def furnish(
             count = len(wanted[building.id])
             chosen: list[tuple[int, FloorPlan]] = []
             for k in wanted[building.id]:
-                with expendable(everyone[k].id):
+                with drop_on_failure(everyone[k].id):
                     chosen.append((k, _plan(everyone[k], building, count, seed, shelf, author)))
-            with expendable(building.id):
-                for k, slot, plan in _stacked(by_id[building.id], chosen, height, ground):
+            with drop_on_failure(building.id):
+                for k, slot, plan in _stack_slots(by_id[building.id], chosen, height, ground):
                     slots[k] = (slot, plan)
             for k, _ in chosen:
                 if k not in slots:
                     leave_out(everyone[k].id, f"no room for it under building {building.id}")
     # A place indoors is its rooms: without them there is nowhere to go in.
     housed = [k for k, place in enumerate(everyone) if place.building is None or k in slots]
-    return assembled([everyone[k] for k in housed], {n: slots[k] for n, k in enumerate(housed) if k in slots})
+    return place_plans([everyone[k] for k in housed], {n: slots[k] for n, k in enumerate(housed) if k in slots})
 
 
-def _unnamed(places: Sequence[Place], buildings: Sequence[Building], entrances: Sequence[Entrance]) -> Iterator[Place]:
+def _default_places(
+    places: Sequence[Place], buildings: Sequence[Building], entrances: Sequence[Entrance]
+) -> Iterator[Place]:
     """Places for buildings that can be entered but hold none."""
     known = {place.building for place in places}
     doors: dict[str, Entrance] = {}
@@ -172,7 +172,7 @@ def _plan(
         if found is not None:
             return found.plan(seed)
     if author is not None:
-        drawn = authored(author, place, use=use, area=min(share, area), seed=seed)
+        drawn = layout_from_author(author, place, use=use, area=min(share, area), seed=seed)
         if drawn is not None:
             return drawn.plan(seed)
     variant = int(chance.integers(VARIANTS))
@@ -204,7 +204,7 @@ def _storeys(use: str, levels: int, share: float) -> int:
     return max(1, min(uses().uses[use].storeys, most, fits))
 
 
-def _stacked(
+def _stack_slots(
     building: Building, wanted: list[tuple[int, FloorPlan]], height: HeightField, ground: _Ground
 ) -> Iterator[tuple[int, Slot, FloorPlan]]:
     """Slots for a building's plans: side by side in rows along its longer side, then the next storey down."""

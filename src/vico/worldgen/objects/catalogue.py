@@ -72,7 +72,7 @@ class FinerKind(DataRecord):
     when
         By tag: its value (the first of several), values it may have, or a `Condition`; all of them have to hold.
     regions
-        Where this holds, as `vico.worldgen.objects.kinds.region` says; everywhere without.
+        Where this holds, as `vico.worldgen.objects.mapped_objects.region` says; everywhere without.
     model
         The model, several of which chance picks one, or "" for nothing that stands in streets.
     by, models

@@ -26,11 +26,18 @@ from vico.world.lanes import LaneGraph
 from vico.world.model import FIRST_OBJECT, FIRST_STOP, ParkingSpot
 from vico.world.objects import Objects
 from vico.world.transit import Transit
-from vico.worldgen.facts.bays import Bay, junction_zones, kerb_bays, lot_bays, stands_across
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.streets import Street, StreetPolygons
-from vico.worldgen.objects.car_park_ways import with_ways
+from vico.worldgen.facts.streets import (
+    Bay,
+    Street,
+    StreetPolygons,
+    is_perpendicular_parking,
+    junction_zones,
+    kerb_bays,
+    lot_bays,
+)
+from vico.worldgen.objects.parking_paths import with_parking_paths
 
 CAR = "parked_car"
 """Kind of the objects that are parked cars."""
@@ -123,11 +130,11 @@ def parking_from_osm(
         entity += row is not None
     cars = Objects.from_rows(rows)
     standing = Objects.joined([objects, cars])
-    found_ways = with_ways(spots, streets=streets, lanes=lanes, objects=standing, solids=solids, height=height)
+    found_ways = with_parking_paths(spots, streets=streets, lanes=lanes, objects=standing, solids=solids, height=height)
     return Parking(cars, found_ways)
 
 
-def _said(tags: Tags, side: str) -> str | None:
+def _parking_tag(tags: Tags, side: str) -> str | None:
     """Return what the map says of parking on a side; None where it says nothing."""
     for key in ("parking", "parking:lane"):
         for where in (side, "both"):
@@ -147,7 +154,7 @@ def _kerb_candidates(osm: OsmData, streets: StreetPolygons, left_driving: bool) 
         raised = any(tags.get(key, "no") != "no" for key in ("bridge", "tunnel", "covered"))
         if raised or not shapely.intersects(window, shapely.LineString(street.line)):
             continue
-        with expendable(f"w{street.way}"):
+        with drop_on_failure(f"w{street.way}"):
             yield from _along_street(street, tags, breaks, left_driving)
 
 
@@ -159,14 +166,14 @@ def _along_street(street: Street, tags: Tags, breaks: BaseGeometry, left_driving
         depth = depths[side]
         mapped = {"left": "right", "right": "left"}[side] if turned else side
         if not depth:
-            if not _by_habit(street, _said(tags, mapped), free):
+            if not _by_habit(street, _parking_tag(tags, mapped), free):
                 continue
             depth = _HABIT_DEPTH
             free -= depth
         elif _for_loading(tags, mapped):
             continue
         against = not street.oneway and (side == "right" if left_driving else side == "left")
-        kind = "across" if stands_across(street, depth) else "kerb"
+        kind = "across" if is_perpendicular_parking(street, depth) else "kerb"
         for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
             if shapely.dwithin(breaks, shapely.Polygon(_rectangle(bay, bay.length, bay.width)), _JUNCTION):
                 continue
@@ -193,7 +200,7 @@ def _lot_candidates(osm: OsmData, streets: StreetPolygons) -> Iterator[_Candidat
     window = shapely.box(-osm.half, -osm.half, osm.half, osm.half)
     for n, shape in enumerate(streets.parking.geoms):
         if shapely.intersects(window, shape):
-            with expendable(f"car park {n}"):
+            with drop_on_failure(f"car park {n}"):
                 for k, bay in enumerate(lot_bays(shape)):
                     yield _Candidate(f"lot{n}.{k}", f"lot{n}", "lot", bay)
 

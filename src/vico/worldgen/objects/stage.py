@@ -17,26 +17,56 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.assets.furniture_pack import credits_of, our_models, read_things
 from vico.assets.models.library import street_models
 from vico.assets.models.model import Model
+from vico.assets.vehicles import vehicle_prototypes
 from vico.geo.osm import OsmData
 from vico.rules import TRAM_WIDTH
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import FIRST_OBJECT, Dropped
+from vico.world.mesh import Surface
+from vico.world.model import FIRST_OBJECT, Dropped, Source
 from vico.world.objects import FEET, Objects
 from vico.world.transit import Transit
-from vico.worldgen.facts.expendable import NamedShape, expendable, widened
-from vico.worldgen.objects.barriers import barrier_wishes
+from vico.worldgen.facts.fault_isolation import NamedShape, buffer_named, drop_on_failure
 from vico.worldgen.objects.catalogue import standing
-from vico.worldgen.objects.groups import group_wishes
-from vico.worldgen.objects.kinds import region, thing_of
-from vico.worldgen.objects.lamps import lamp_wishes
-from vico.worldgen.objects.points import mapped_wishes
-from vico.worldgen.objects.site import Site
-from vico.worldgen.objects.trees import lawn_wishes, planted_wishes, planting
-from vico.worldgen.objects.wishes import Wish
+from vico.worldgen.objects.mapped_objects import (
+    area_placements,
+    barrier_placements,
+    lamp_placements,
+    mapped_placements,
+    region,
+    thing_of,
+)
+from vico.worldgen.objects.placement import FreeSpace, Placement
+from vico.worldgen.objects.trees import lawn_placements, planted_area_placements, planting
+
+
+def models_of(objects: Objects, *, installed: bool) -> tuple[dict[str, Sequence[Surface]], list[Source]]:
+    """Return the surfaces of every prototype that `objects` use, and the sources of those that are not ours."""
+    pack = read_things() if installed else None
+    stand_ins = pack[0] if pack is not None else {}
+    used = set(objects.prototype.tolist())
+    models: dict[str, Sequence[Surface]] = {
+        name: list(stand_ins.get(name, model.surfaces)) for name, model in our_models().items() if name in used
+    }
+    credits = [
+        Source(kind="things", name=name, licence=credit.licence, attribution=credit.words, sha256=credit.sha256)
+        for name, model in our_models().items()
+        if name in models and name not in stand_ins and (credit := model.credit) is not None
+    ]
+    models |= {name: surfaces for name, surfaces in vehicle_prototypes().items() if name in used}
+    foreign = [name for name in models if name in stand_ins]
+    if pack is None or not foreign:
+        return models, credits
+    credits += [
+        Source(kind="things", name=c.collection, licence=c.licence, attribution=c.words, sha256=pack[2])
+        for c in credits_of(foreign)
+    ]
+    return models, credits
+
 
 _PLANTS = "natural"  # the group of their models
 _LAMPS = ("street_lamp", "lamp")  # kinds
@@ -47,7 +77,7 @@ _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a 
 
 
 @dataclass(frozen=True)
-class Grounds:
+class Surroundings:
     """What is there before things are put up.
 
     Attributes
@@ -71,7 +101,7 @@ class Grounds:
 
 def objects_from_osm(
     osm: OsmData,
-    grounds: Grounds,
+    grounds: Surroundings,
     *,
     height: HeightField,
     transit: Transit | None = None,
@@ -104,19 +134,19 @@ def objects_from_osm(
     half, carriageway, openings = osm.half, grounds.carriageway, grounds.openings
     models = street_models()
     swept = [*_swept(lanes), *_tram_beds(transit)]
-    site = Site(solids=grounds.solids, carriageway=carriageway, lanes=swept, openings=openings, half=half)
+    site = FreeSpace(solids=grounds.solids, carriageway=carriageway, lanes=swept, openings=openings, half=half)
     zone, where = planting(osm, height), region(osm)
-    mapped = mapped_wishes(osm, height, seed)
+    mapped = mapped_placements(osm, height, seed)
     lamps = np.array([wish.xy for wish in mapped if models[wish.prototype].kind in _LAMPS]).reshape(-1, 2)
-    lots: list[tuple[list[Wish], bool]] = [
-        (_transit_wishes(transit, carriageway), True),
-        (barrier_wishes(osm, carriageway, openings, half), True),
+    lots: list[tuple[list[Placement], bool]] = [
+        (_transit_placements(transit, carriageway), True),
+        (barrier_placements(osm, carriageway, openings, half), True),
         (mapped, True),
-        (group_wishes(osm, openings, half, seed, where=where), True),
-        (planted_wishes(osm, height, carriageway, openings, half, seed, zone), False),
-        (lawn_wishes(osm, grounds.lawns, openings, grounds.mapped, seed, zone), False),
+        (area_placements(osm, openings, half, seed, where=where), True),
+        (planted_area_placements(osm, height, carriageway, openings, half, seed, zone), False),
+        (lawn_placements(osm, grounds.lawns, openings, grounds.mapped, seed, zone), False),
         (
-            lamp_wishes(
+            lamp_placements(
                 osm, carriageway, grounds.solids, lamps, lamp=thing_of({"highway": "street_lamp"}, where=where)
             ),
             False,
@@ -127,7 +157,7 @@ def objects_from_osm(
     for wishes, listed in lots:
         for wish in wishes:
             if np.abs(wish.xy).max() < half:
-                with expendable(wish.id):
+                with drop_on_failure(wish.id):
                     reason = _settle(wish, models[wish.prototype], site, seed, rows)
                     if reason is not None and listed:
                         dropped.append(Dropped(id=wish.id, reason=reason))
@@ -147,17 +177,17 @@ def _swept(lanes: LaneGraph | None) -> list[BaseGeometry]:
     driven = np.flatnonzero(lanes.inside < 0)
     lines = [NamedShape(lanes.ids[int(k)], shapely.LineString(lanes.line(int(k))[:, :2])) for k in driven]
     widths = np.maximum(lanes.width[driven] / 2 - _SWEPT, 0.1)
-    return [strip.shape for strip in widened(lines, widths, cap_style="flat")]
+    return [strip.shape for strip in buffer_named(lines, widths, cap_style="flat")]
 
 
 def _tram_beds(transit: Transit | None) -> list[BaseGeometry]:
     """Return what trams sweep, in the street and beside it."""
     lines = [] if transit is None else transit.tram_lines
     named = [NamedShape(line.id, shapely.LineString(line.track)) for line in lines]
-    return [strip.shape for strip in widened(named, np.full(len(named), _TRAM), cap_style="flat")]
+    return [strip.shape for strip in buffer_named(named, np.full(len(named), _TRAM), cap_style="flat")]
 
 
-def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str, Any]]) -> str | None:
+def _settle(wish: Placement, model: Model, site: FreeSpace, seed: int, rows: list[dict[str, Any]]) -> str | None:
     """Put a wish where it fits, near where it is mapped; the reason where it fits nowhere."""
     random = rng(seed, "object", wish.id)
     if wish.prototype.startswith("street_lamp") and wish.id.startswith("n") and _far(wish, site, 8.0):
@@ -209,7 +239,7 @@ def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str
 
 
 def _room(
-    wish: Wish, wide: float, deep: float, yaw: float, reach: float, site: Site, keeps_way: bool | None
+    wish: Placement, wide: float, deep: float, yaw: float, reach: float, site: FreeSpace, keeps_way: bool | None
 ) -> tuple[tuple[NDArray[np.float64], shapely.Polygon] | None, str | None]:
     """Find the nearest free spot and the foot there, or None and why there is none where the wish is.
 
@@ -250,12 +280,12 @@ def _rectangles(at: NDArray[np.float64], wide: float, deep: float, yaw: float) -
     return np.asarray(shapely.polygons(at[:, None, :] + turned), object)
 
 
-def _far(wish: Wish, site: Site, distance: float) -> bool:
+def _far(wish: Placement, site: FreeSpace, distance: float) -> bool:
     point = shapely.Point(wish.xy)
     return not site.carriageway.is_empty and not shapely.dwithin(site.carriageway.shape, point, distance)
 
 
-def _facing(wish: Wish, site: Site, random: np.random.Generator) -> float:
+def _facing(wish: Placement, site: FreeSpace, random: np.random.Generator) -> float:
     """Away from a near wall; lamps and stops towards the carriageway; benches to the path, backs to traffic."""
     point = shapely.Point(wish.xy)
     name = wish.prototype
@@ -285,7 +315,7 @@ def _facing(wish: Wish, site: Site, random: np.random.Generator) -> float:
     return yaw + math.pi / 2 if name.startswith(standing().facing_along) else yaw
 
 
-def _to_path(point: shapely.Point, site: Site, free: float) -> float:
+def _to_path(point: shapely.Point, site: FreeSpace, free: float) -> float:
     """Facing of a seat: back to near traffic, else over the path beside it, else to the nearest path."""
     if not site.carriageway.is_empty and not shapely.intersects(site.carriageway.shape, point):
         road = shapely.reverse(site.carriageway.to_edge(point))
@@ -308,7 +338,7 @@ def _heading(line: shapely.LineString) -> float | None:
     return math.atan2(y1 - y0, x1 - x0) if math.hypot(x1 - x0, y1 - y0) > 0.05 else None
 
 
-def _fitting_scale(wish: Wish, model: Model, site: Site) -> float:
+def _fitting_scale(wish: Placement, model: Model, site: FreeSpace) -> float:
     """Trees close to a wall are smaller, so that their crowns don't grow through it."""
     if model.kind != "tree":
         return wish.scale
@@ -319,15 +349,15 @@ def _fitting_scale(wish: Wish, model: Model, site: Site) -> float:
     return float(np.clip(2 * room / max(model.size[0], model.size[1]), min(0.42, wish.scale), wish.scale))
 
 
-def _transit_wishes(transit: Transit | None, carriageway: BaseGeometry) -> list[Wish]:
+def _transit_placements(transit: Transit | None, carriageway: BaseGeometry) -> list[Placement]:
     """Poles between the waiting place and the kerb; docks along the street."""
-    found: list[Wish] = []
+    found: list[Placement] = []
     if transit is None:
         return found
     for stop in transit.stops:
         wait = np.array(stop.wait[:2])
         spot, yaw = wait + np.array([1.0, 0.0]), 0.0
-        with expendable(stop.id):
+        with drop_on_failure(stop.id):
             kerb = _towards(wait, carriageway)
             if kerb is not None:
                 out = kerb - wait
@@ -335,13 +365,13 @@ def _transit_wishes(transit: Transit | None, carriageway: BaseGeometry) -> list[
                 out = out / max(reach, 1e-9)
                 along = np.array([-out[1], out[0]])
                 spot, yaw = wait + out * max(reach - 0.35, 0.0) + along * 0.9, math.atan2(out[1], out[0])
-            found.append(Wish(stop.id, "bus_stop", spot, yaw, 1.0, stop.entity))
+            found.append(Placement(stop.id, "bus_stop", spot, yaw, 1.0, stop.entity))
     for station in transit.bike_stations:
         at = np.array(station.position[:2])
-        with expendable(station.id):
+        with drop_on_failure(station.id):
             kerb = _towards(at, carriageway)
             yaw = math.atan2(*(kerb - at)[::-1]) if kerb is not None else 0.0
-            found.append(Wish(station.id, "bike_station", at, yaw, 1.0, station.entity))
+            found.append(Placement(station.id, "bike_station", at, yaw, 1.0, station.entity))
     return found
 
 

@@ -17,10 +17,10 @@ from vico.geo.osm import OsmArea, OsmData, Tags
 from vico.geo.quantities import metres
 from vico.seeds import rng
 from vico.world.heights import HeightField
-from vico.worldgen.facts.expendable import NamedShape, expendable, united
+from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, union_named
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.objects.catalogue import trees
-from vico.worldgen.objects.wishes import Wish
+from vico.worldgen.objects.placement import Placement
 
 _SHRUB_ROOM = 7.0
 _BARE = {
@@ -68,7 +68,9 @@ def planting(osm: OsmData, height: HeightField) -> str:
     return own if own in trees().mixes else zone
 
 
-def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: str, *, wild: bool = False) -> Wish:
+def tree_placement(
+    key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: str, *, wild: bool = False
+) -> Placement:
     """Wish for a tree with the model and the size its tags and place suggest; `wild` ones grow as in woods."""
     random = rng(seed, "tree", key)
     name = _model(tags, xy, seed, random, zone, wild)
@@ -87,7 +89,7 @@ def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: st
         scale = crown / wide
     elif girth:
         scale = 25.0 * (1.0 - math.exp(-2.5 * girth / math.pi)) / tall
-    return Wish(key, name, xy, None, float(np.clip(scale, 0.35, 2.0)))
+    return Placement(key, name, xy, None, float(np.clip(scale, 0.35, 2.0)))
 
 
 def _by_shape(name: str, ratio: float) -> str:
@@ -139,29 +141,29 @@ def _model(tags: Tags, xy: NDArray[np.float64], seed: int, random: np.random.Gen
     return mix[int(random.integers(len(mix)))]
 
 
-def row_wishes(osm: OsmData, seed: int, zone: str) -> list[Wish]:
+def row_placements(osm: OsmData, seed: int, zone: str) -> list[Placement]:
     """Trees of tree rows: as many as mapped, else one every eight metres; the row has one species."""
-    found: list[Wish] = []
+    found: list[Placement] = []
     mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
     near = shapely.STRtree(shapely.points(mapped)) if mapped else None
     for way in osm.ways:
         if way.tags.get("natural") != "tree_row":
             continue
-        with expendable(f"w{way.id}"):
+        with drop_on_failure(f"w{way.id}"):
             line = shapely.LineString(way.line)
             count = max(2, round(line.length / 8.0) + 1)
-            name = tree_wish(f"w{way.id}", way.tags, way.line[0], seed, zone).prototype
+            name = tree_placement(f"w{way.id}", way.tags, way.line[0], seed, zone).prototype
             for k, d in enumerate(np.linspace(0, line.length, count)):
                 point = line.interpolate(d)
                 if near is not None and len(near.query(point, predicate="dwithin", distance=3.0)):
                     continue
-                wish = tree_wish(f"w{way.id}.{k}", way.tags, np.array(point.coords[0]), seed, zone)
+                wish = tree_placement(f"w{way.id}.{k}", way.tags, np.array(point.coords[0]), seed, zone)
                 wish.prototype = name
                 found.append(wish)
     return found
 
 
-def spread(
+def blue_noise_points(
     ground: BaseGeometry, room: float, most: int, random: np.random.Generator, *, least: float = 0.72
 ) -> NDArray[np.float64]:
     """Points of blue noise in an area, shape ``(n, 2)``: none nearer to another than `least` times its room's side."""
@@ -199,7 +201,7 @@ def _use(area: OsmArea) -> str | None:
     return None
 
 
-def planted_wishes(
+def planted_area_placements(
     osm: OsmData,
     height: HeightField,
     carriageway: BaseGeometry,
@@ -207,7 +209,7 @@ def planted_wishes(
     half: float,
     seed: int,
     zone: str,
-) -> list[Wish]:
+) -> list[Placement]:
     """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways.
 
     Where nothing is mapped and the ground is too steep to be a lawn, it grows wild.
@@ -217,19 +219,19 @@ def planted_wishes(
     mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
     trunks = shapely.points(np.array(mapped).reshape(-1, 2))
     done: BaseGeometry = shapely.Polygon()
-    found: list[tuple[float, Wish]] = []
+    found: list[tuple[float, Placement]] = []
     order = {"wood": 0, "forest": 0, "scrub": 1, "orchard": 1}
     for area in sorted(osm.areas, key=lambda a: order.get(_use(a) or "", 2)):
         use = _use(area)
         if use is None or area.polygon.area < 12.0:
             continue
-        with expendable(area.id):
+        with drop_on_failure(area.id):
             ground = overlay.difference(overlay.difference(overlay.intersection(area.polygon, window), keep_off), done)
             if not ground.is_empty:
                 done = overlay.union(done, ground)
-                found += _planted(area, use, ground, trunks, seed, zone)
+                found += _plant_area(area, use, ground, trunks, seed, zone)
     mown = [NamedShape(area.id, area.polygon) for area in osm.areas if _is_mown(area)]
-    elsewhere = united([NamedShape("kept", keep_off), NamedShape("planted", done), *mown])
+    elsewhere = union_named([NamedShape("kept", keep_off), NamedShape("planted", done), *mown])
     found += _grown_wild(height, elsewhere, half, seed, zone)
     if len(found) <= _MOST:
         return [wish for _, wish in found]
@@ -244,7 +246,7 @@ def _is_mown(area: OsmArea) -> bool:
 
 def _grown_wild(
     height: HeightField, elsewhere: BaseGeometry, half: float, seed: int, zone: str
-) -> list[tuple[float, Wish]]:
+) -> list[tuple[float, Placement]]:
     """Return what grows where the ground is too steep to be mown: trees as in woods, and more shrubs.
 
     Each cell of ground decides for itself, so what is mapped elsewhere changes nothing.
@@ -256,7 +258,7 @@ def _grown_wild(
     east, north = np.diff(level, axis=1) / side, np.diff(level, axis=0) / side
     steep = np.hypot((east[1:] + east[:-1]) / 2, (north[:, 1:] + north[:, :-1]) / 2) > _STEEP
     shapely.prepare(elsewhere)
-    found: list[tuple[float, Wish]] = []
+    found: list[tuple[float, Placement]] = []
     for row, column in np.argwhere(steep).tolist():
         random = rng(seed, "slope", row, column)
         for k in range(int(side * side / _WILD_ROOM + random.random())):
@@ -266,22 +268,22 @@ def _grown_wild(
             key = f"slope.{row}.{column}.{k}"
             if random.random() < _SHRUBS:
                 name = ("shrub", "shrub_tall", "shrub_tall")[int(random.integers(3))]
-                wish = Wish(key, name, xy, None, float(random.uniform(0.8, 1.5)))
+                wish = Placement(key, name, xy, None, float(random.uniform(0.8, 1.5)))
             else:
-                wish = tree_wish(key, {}, xy, seed, zone, wild=True)
+                wish = tree_placement(key, {}, xy, seed, zone, wild=True)
             wish.reach = 0.0
             found.append((float(random.random()), wish))
     return found
 
 
-def lawn_wishes(
+def lawn_placements(
     osm: OsmData,
     lawns: BaseGeometry,
     openings: BaseGeometry,
     mapped: Sequence[BaseGeometry],
     seed: int,
     zone: str,
-) -> list[Wish]:
+) -> list[Placement]:
     """Return what grows on lawns that no map has: a tree or a shrub at most in each cell of them.
 
     Nothing grows on ways for walkers, beside rails, nor within areas that are `mapped` or bare.
@@ -295,7 +297,7 @@ def lawn_wishes(
     taken, tracks = shapely.STRtree([*mapped, *bare]), shapely.STRtree(rails)
     count = max(int(2 * osm.half // _LAWN_CELL), 1)
     side = 2 * osm.half / count
-    found: list[tuple[float, Wish]] = []
+    found: list[tuple[float, Placement]] = []
     # Tiles of a city do not all draw alike.
     aside, up = (round(way / (2 * osm.half)) for way in (osm.frame.east, osm.frame.north))
     tile = f".{aside}.{up}" if aside or up else ""
@@ -312,9 +314,9 @@ def lawn_wishes(
             continue
         if kind < _LAWN_SHRUBS:
             name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
-            wish = Wish(cell, name, xy, None, float(random.uniform(0.8, 1.2)))
+            wish = Placement(cell, name, xy, None, float(random.uniform(0.8, 1.2)))
         else:
-            wish = tree_wish(cell, {}, xy, seed, zone)
+            wish = tree_placement(cell, {}, xy, seed, zone)
         wish.reach = 0.0
         found.append((rank, wish))
     limit = sorted(rank for rank, _ in found)[_MOST] if len(found) > _MOST else 1.0
@@ -331,41 +333,41 @@ def _kept_free(
         bare = _is_bare(area)
         built = ("building" in area.tags or "building:part" in area.tags) and area.polygon.intersects(window)
         if bare or built:
-            with expendable(area.id):
+            with drop_on_failure(area.id):
                 within = overlay.intersection(area.polygon, window)
                 kept.append(NamedShape(area.id, overlay.buffer(within, 2.2 if built else 1.0)))
-    return united(kept)
+    return union_named(kept)
 
 
 def _is_bare(area: OsmArea) -> bool:
     return any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
 
 
-def _planted(
+def _plant_area(
     area: OsmArea, use: str, ground: BaseGeometry, trunks: NDArray[np.object_], seed: int, zone: str
-) -> list[tuple[float, Wish]]:
+) -> list[tuple[float, Placement]]:
     """Plant what is free of an area (`ground`): wishes, each with a rank by which areas are thinned."""
     room, random = trees().room, rng(seed, "scatter", area.id)
-    found: list[tuple[float, Wish]] = []
+    found: list[tuple[float, Placement]] = []
     if use == "scrub":
-        for k, xy in enumerate(spread(ground, _SHRUB_ROOM, 160, random, least=0.6)):
+        for k, xy in enumerate(blue_noise_points(ground, _SHRUB_ROOM, 160, random, least=0.6)):
             name = ("shrub", "shrub_tall", "shrub_tall")[int(random.integers(3))]
-            wish = Wish(f"{area.id}.{k}", name, xy, None, float(random.uniform(0.75, 1.3)), reach=0.0)
+            wish = Placement(f"{area.id}.{k}", name, xy, None, float(random.uniform(0.75, 1.3)), reach=0.0)
             found.append((float(random.random()), wish))
         return found
     wild = use in ("wood", "forest", "nature_reserve")
     there = int(shapely.contains(area.polygon, trunks).sum()) if len(trunks) else 0
     if not wild and there > 0.3 * ground.area / room[use]:
         return found  # somebody mapped them
-    for k, xy in enumerate(spread(ground, room[use], 260, random)):
-        wish = tree_wish(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
+    for k, xy in enumerate(blue_noise_points(ground, room[use], 260, random)):
+        wish = tree_placement(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
         if use == "orchard":
             wish.prototype, wish.scale = "tree_fruit", 1.0
         wish.reach = 0.0
         found.append((float(random.random()), wish))
     if use in ("park", "garden", "cemetery"):
-        for k, xy in enumerate(spread(ground, 2.2 * room[use] if use == "park" else 70.0, 40, random)):
+        for k, xy in enumerate(blue_noise_points(ground, 2.2 * room[use] if use == "park" else 70.0, 40, random)):
             name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
-            wish = Wish(f"{area.id}.s{k}", name, xy, None, float(random.uniform(0.8, 1.2)), reach=0.0)
+            wish = Placement(f"{area.id}.s{k}", name, xy, None, float(random.uniform(0.8, 1.2)), reach=0.0)
             found.append((float(random.random()), wish))
     return found

@@ -20,7 +20,7 @@ from vico.geo.tiles3d import TileMesh
 from vico.io.compiled import compiled
 from vico.threads import in_order
 from vico.world.mesh import Surface
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, Chart, coverage, unwrap
 from vico.worldgen.photos.photo_colours import PhotoColours
 
@@ -136,7 +136,7 @@ def bake(
         raise InputError(f"baking: {least:g} as least coverage; it must lie within 0..1")
     if not len(mesh.triangles):
         raise EmptyInputError("baking: the tile mesh has no triangles; give one that covers the place")
-    sight = Sight(mesh.positions, mesh.triangles)
+    sight = RayCaster(mesh.positions, mesh.triangles)
     photos = PhotoColours(mesh)
     coarse = unwrap(walls, roofs, texel=max(_COARSE, texel), page=page)[2]
     offsets: list[NDArray[np.float32]] = [np.full(known.shape, np.nan, np.float32) for known in coarse.known]
@@ -194,7 +194,7 @@ def _batches(atlas: Atlas) -> Iterator[_Batch]:
 def _paint(
     atlas: Atlas,
     expected: _Expected,
-    sight: Sight,
+    sight: RayCaster,
     photos: PhotoColours,
     cage: float,
     *,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from vico.threads import for_each, in_order
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, Chart
 
 _SAMPLES = 6  # a side of the grid on each wall that the sun is sought with
@@ -61,7 +61,7 @@ class Sun:
         return float(np.degrees(np.arcsin(self.direction[2])))
 
 
-def sun_in(atlas: Atlas, sight: Sight) -> Sun | None:
+def sun_in(atlas: Atlas, sight: RayCaster) -> Sun | None:
     """Find the sun in the photos of an atlas.
 
     Parameters
@@ -107,7 +107,7 @@ def sun_in(atlas: Atlas, sight: Sight) -> Sun | None:
     return Sun(best[1], float(strengths[int(np.argmin(left))]), best[0] / total)
 
 
-def without_sun(atlas: Atlas, sun: Sun, sight: Sight, *, over: bool = False) -> Atlas:
+def without_sun(atlas: Atlas, sun: Sun, sight: RayCaster, *, over: bool = False) -> Atlas:
     """Brighten walls that lie in the shade, or face the sun less than others, until all are as if in the sun.
 
     Roofs stay: nearly all of them are in the sun, and what stands on them is not known well enough to tell its shadow.
@@ -181,7 +181,7 @@ def _within(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np
 
 
 def _shine(
-    points: NDArray[np.float64], normals: NDArray[np.float64], sun: NDArray[np.float64], sight: Sight
+    points: NDArray[np.float64], normals: NDArray[np.float64], sun: NDArray[np.float64], sight: RayCaster
 ) -> NDArray[np.float64]:
     """How squarely the sun shines on points: the cosine, 0 in shadow."""
     cosine = np.maximum(normals @ sun, 0.0)
@@ -192,7 +192,7 @@ def _shine(
     return cosine
 
 
-def _chart_shine(chart: Chart, sun: Sun, sight: Sight) -> NDArray[np.float32]:
+def _chart_shine(chart: Chart, sun: Sun, sight: RayCaster) -> NDArray[np.float32]:
     """Return the same for all texels of a chart, shape ``(height, width)``, with soft edges."""
     cosine = float(chart.normal @ sun.direction)
     if cosine <= 0.0:

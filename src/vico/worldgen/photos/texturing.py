@@ -14,7 +14,7 @@ from vico.geo.street_images import StreetImage
 from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, coverage, repacked, textured
 from vico.worldgen.photos.baking import bake
 from vico.worldgen.photos.daylight import sun_in, without_sun
@@ -251,9 +251,9 @@ def mesh_of(surfaces: Sequence[Surface]) -> TileMesh:
     )
 
 
-def _sight_of(surfaces: Sequence[Surface]) -> Sight:
+def _sight_of(surfaces: Sequence[Surface]) -> RayCaster:
     corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).reshape(-1, 3)
-    return Sight(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    return RayCaster(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
 
 
 def streetview_config(how: Texturing) -> StreetviewConfig:

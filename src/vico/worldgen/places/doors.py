@@ -20,7 +20,7 @@ from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
 from vico.world.routing import Router
 from vico.world.walkable import CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.named_places import NamedPlace
 
 _NO_DOOR = {"no", "service", "garage", "emergency", "exit", "fire_exit", "private"}
@@ -278,7 +278,7 @@ class Finder:
             kind = node.tags.get("entrance") or ("yes" if node.tags.get("building") == "entrance" else "no")
             if kind in _NO_DOOR or node.tags.get("access") in ("no", "private"):
                 continue
-            with expendable(f"n{node.id}"):
+            with drop_on_failure(f"n{node.id}"):
                 point = shapely.Point(node.xy)
                 near = self.tree.query(point, predicate="dwithin", distance=1.0)
                 near = [i for i in near.tolist() if shapely.distance(self.shapes[i].exterior, point) < 1.0]

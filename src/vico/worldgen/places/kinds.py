@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vico.world.model import Category
-from vico.worldgen.facts.place_words import source_words
+from vico.worldgen.facts.named_places import source_words
 
 
 def meaning_of(source: str, kind: str, wider: Sequence[str] = ()) -> tuple[Category, str] | None:

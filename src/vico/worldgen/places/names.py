@@ -10,8 +10,7 @@ import shapely
 
 from vico.geo.osm import Tags
 from vico.world.model import Roads
-from vico.worldgen.facts.named_places import NamedPlace
-from vico.worldgen.facts.place_words import place_names
+from vico.worldgen.facts.named_places import NamedPlace, place_names
 from vico.worldgen.places.doors import MATCH, Finder
 
 

@@ -13,9 +13,8 @@ from vico.world.model import Building, Category, Dropped, Entrance, Place, Roads
 from vico.world.routing import Router
 from vico.world.transit import Transit
 from vico.world.walkable import WalkableMap
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.named_places import NamedPlace
-from vico.worldgen.facts.place_words import place_names
+from vico.worldgen.facts.fault_isolation import drop_on_failure
+from vico.worldgen.facts.named_places import NamedPlace, place_names
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.places.doors import Finder
 from vico.worldgen.places.found import Compared, compared
@@ -68,7 +67,7 @@ def places_from_osm(
     places: list[Place] = []
     seen: set[tuple[str, str | None]] = set()
     for named in [*mapped, *told.added]:
-        with expendable(named.id):
+        with drop_on_failure(named.id):
             named, made = _made(named, finder, streets, told)
             if isinstance(made, Place):
                 key = (made.name.casefold(), made.building or f"{made.category}")
@@ -159,13 +158,13 @@ def _homes(finder: Finder, streets: StreetAddresses) -> list[Place]:
     # In a quarter of small houses not every one needs rooms: an even share of them has.
     stride = max(1, -(-len(houses) // _MOST_HOMES))
     for building, shape in houses[::stride]:
-        with expendable(building.id):
+        with drop_on_failure(building.id):
             add(building, shape)
     # Over shops and offices of old towns people live too.
     for building, shape in rest:
         if len(homes) >= _HOMES_WANTED:
             break
-        with expendable(building.id):
+        with drop_on_failure(building.id):
             add(building, shape)
     return homes
 
@@ -178,7 +177,7 @@ def _transit_places(
     rows = [(s.id, s.name, "bus_stop", s.wait) for s in transit.stops]
     rows += [(b.id, b.name, "bicycle_rental", b.position) for b in transit.bike_stations]
     for key, name, kind, position in rows:
-        with expendable(key):
+        with drop_on_failure(key):
             spot = router.nearest_walkable(position[:2], within=6.0)
             if spot is None:
                 dropped.append(Dropped(id=key, reason=f"{kind} {name!r}: can't be reached on foot"))

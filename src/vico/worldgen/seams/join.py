@@ -9,7 +9,7 @@ import shapely
 from shapely import Polygon
 
 from vico.world.heights import HeightField
-from vico.worldgen.facts.outlines.plans import BuildingPlans
+from vico.worldgen.facts.building_plans import BuildingPlans
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.seams.grid import Tile, TileGrid, tile_name
 from vico.worldgen.seams.heights import blended, cropped

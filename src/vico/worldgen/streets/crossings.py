@@ -13,7 +13,7 @@ from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.geo.quantities import quantity
 from vico.geometry import distances
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.facts.streets import Crossing, Street
 
@@ -32,7 +32,7 @@ def crossings_of(
         node_tags = next((kinds[n] for n in way.nodes if n in kinds), {})
         look = _marking({**node_tags, **way.tags}, "unmarked", with_signals)
         width = min(max(quantity(way.tags, "width") or _CROSSING_WIDTH, 2.0), 8.0)
-        with expendable(f"w{way.id}"):
+        with drop_on_failure(f"w{way.id}"):
             for piece in shapely.get_parts(overlay.intersection(LineString(way.line), carriageway)):
                 if isinstance(piece, LineString) and 2.0 < piece.length < 40.0:
                     (ax, ay), (bx, by) = piece.coords[0], piece.coords[-1]

@@ -21,7 +21,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
 from vico.world.heights import HeightField
 from vico.world.model import FAILED
-from vico.worldgen.facts.expendable import leave_out
+from vico.worldgen.facts.fault_isolation import leave_out
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.streets.opendrive import sound_opendrive
 from vico.worldgen.streets.roads import (

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.overlay import polygons_of
-from vico.worldgen.facts.expendable import NamedShape, changed, united
+from vico.worldgen.facts.fault_isolation import NamedShape, overlay_named, union_named
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.streets.crossings import crossings_of
@@ -50,9 +50,9 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
     """
     reach = site.osm.half + site.osm.margin
     window = shapely.box(-reach, -reach, reach, reach)
-    solid = united(changed(obstacles, overlay.make_valid), grid=_GRID) if len(obstacles) else MultiPolygon()
+    solid = union_named(overlay_named(obstacles, overlay.make_valid), grid=_GRID) if len(obstacles) else MultiPolygon()
     strips = strips_of(site)
-    driven = united(strips.drive, grid=_GRID)
+    driven = union_named(strips.drive, grid=_GRID)
     carriageway = _carriageway(driven, strips.through, solid, window)
     crossings = crossings_of(site.osm, carriageway, strips.streets, strips.crossings)
     left = _Unclaimed(overlay.union(carriageway, solid, grid=_GRID), window)
@@ -67,7 +67,9 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
     return StreetPolygons(
         carriageway=_multi(carriageway),
         sidewalk=sidewalk,
-        crossing=_multi(overlay.intersection(united([NamedShape(c.id, c.polygon) for c in crossings]), carriageway)),
+        crossing=_multi(
+            overlay.intersection(union_named([NamedShape(c.id, c.polygon) for c in crossings]), carriageway)
+        ),
         pedestrian=pedestrian,
         path=path,
         cycleway=cycleway,
@@ -78,7 +80,7 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
         rails=strips.rails,
         sunken=_sunken(strips.kerbed, carriageway),
         paved={
-            name: _multi(overlay.intersection(_multi(united(shapes, grid=_GRID)), window))
+            name: _multi(overlay.intersection(_multi(union_named(shapes, grid=_GRID)), window))
             for name, shapes in sorted(_with_corners(strips, driven, carriageway).items())
         },
     )
@@ -90,7 +92,7 @@ def _carriageway(driven: BaseGeometry, through: list[NamedShape], solid: BaseGeo
     carriageway = overlay.buffer(overlay.buffer(driven, _KERB_RADIUS, quad_segs=4), -_KERB_RADIUS, quad_segs=4)
     carriageway = overlay.on_grid(overlay.simplify(carriageway, 0.08), grid=_GRID)
     if not solid.is_empty:
-        under = overlay.difference(solid, united(through, grid=_GRID), grid=_GRID)
+        under = overlay.difference(solid, union_named(through, grid=_GRID), grid=_GRID)
         carriageway = overlay.difference(carriageway, under, grid=_GRID)
     return _multi(overlay.intersection(_multi(carriageway), window, grid=_GRID))
 
@@ -124,7 +126,7 @@ class _Unclaimed:
 
     def claim(self, shapes: list[NamedShape]) -> MultiPolygon:
         """Claim what is left of `shapes` beside what was claimed before."""
-        shape = overlay.simplify(united(shapes, grid=_GRID), 0.08)
+        shape = overlay.simplify(union_named(shapes, grid=_GRID), 0.08)
         shape = overlay.intersection(overlay.on_grid(shape, grid=_GRID), self._window, grid=_GRID)
         left = _multi(overlay.difference(_multi(shape), self._taken, grid=_GRID), 0.3)
         self._taken = overlay.union(self._taken, left, grid=_GRID)
@@ -147,7 +149,7 @@ def _sunken(kerbed: list[NamedShape], carriageway: BaseGeometry) -> MultiPolygon
     """Return the kerbed part of the carriageways, the rounded corners of their junctions with it."""
     if not kerbed:
         return MultiPolygon()
-    shape = united(kerbed, grid=_GRID)
+    shape = union_named(kerbed, grid=_GRID)
     shape = overlay.buffer(overlay.buffer(shape, 2 * _KERB_RADIUS, quad_segs=3), -2 * _KERB_RADIUS + 0.1, quad_segs=3)
     return _multi(overlay.intersection(_multi(overlay.on_grid(shape, grid=_GRID)), carriageway, grid=_GRID))
 

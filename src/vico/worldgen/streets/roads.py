@@ -17,10 +17,8 @@ from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.geo.quantities import quantity
 from vico.world.model import Dropped, Junction, Road, Roads
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.levels import OVER_A_STREET
-from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.tags import on_the_ground
+from vico.worldgen.facts.fault_isolation import drop_on_failure
+from vico.worldgen.facts.site import OVER_A_STREET, SiteFacts, on_the_ground
 
 UNDERGROUND = "under the ground: no way in leads down gently and in the open, or it is not for everybody"
 THROUGH_A_BUILDING = "leads through a building that stands across it"
@@ -257,7 +255,7 @@ def streets_from_osm(
         if "highway" not in way.tags:
             continue
         pieces, new_id = _cut(way, site.osm, new_id)
-        with expendable(f"w{way.id}"):
+        with drop_on_failure(f"w{way.id}"):
             found = _parts(way, pieces, site, standing)
             streets += [_opened(street) if way.id in usable else street for street in found]
     return _medians_cleared(streets, lefthand=site.left_driving)

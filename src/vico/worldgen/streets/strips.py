@@ -14,10 +14,9 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmWay, means_area
 from vico.geo.quantities import quantity
-from vico.worldgen.facts.expendable import NamedShape, expendable, named_parts
-from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, named_parts
+from vico.worldgen.facts.site import SiteFacts, is_bridge, on_the_ground
 from vico.worldgen.facts.streets import DRIVABLE, PAVINGS, Street, carriageway_width, is_oneway, lane_count
-from vico.worldgen.facts.tags import is_bridge, on_the_ground
 
 _SIDEWALK_WIDTH = 2.6
 _TRAM_REACH = 3.0  # metres from a street's centre line within which tram tracks run in it
@@ -94,11 +93,11 @@ def strips_of(site: SiteFacts) -> Strips:
     tram_tree = shapely.STRtree(trams)
     for way in site.osm.ways:
         if on_the_ground(way.tags) and not (way.closed and means_area(way.tags)) and way.id not in site.levels.above:
-            with expendable(f"w{way.id}"):
+            with drop_on_failure(f"w{way.id}"):
                 strips.add(_strips_of_way(way, tram_tree))
     for area in site.osm.areas:
         if on_the_ground(area.tags) and area.tags.get("building", "no") == "no":
-            with expendable(area.id):
+            with drop_on_failure(area.id):
                 strips.add(_strips_of_area(area))
     return strips
 

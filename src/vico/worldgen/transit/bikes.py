@@ -16,7 +16,7 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.transit import BikeStation
 from vico.world.walkways import SIDEWALK, Walkways
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.plan import k_means, where_people_go
 
@@ -43,7 +43,7 @@ def bike_stations(
     for key, shape, tags in places:
         if tags.get("amenity") != "bicycle_rental":
             continue
-        with expendable(key):
+        with drop_on_failure(key):
             xy = np.array(shape.centroid.coords[0])
             if osm.holds(xy, inset=_INSIDE):
                 size = re.match(r"\d{1,4}", tags.get("capacity", ""))
@@ -79,7 +79,7 @@ def _planned(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.flo
         for way in osm.ways:
             if way.tags.get("highway") in _FOOTWAYS and len(way.line) > 1:
                 # Beside the way, not on it.
-                with expendable(f"w{way.id}"):
+                with drop_on_failure(f"w{way.id}"):
                     beside = overlay.offset_curve(shapely.LineString(way.line), -_ASIDE)
                     stretches += [part for part in shapely.get_parts(overlay.intersection(beside, window))
                                   if part.geom_type == "LineString" and part.length > 15.0]  # fmt: skip

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData
 from vico.geometry import distances
 from vico.seeds import rng
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs
 
@@ -42,7 +42,7 @@ def where_people_go(site: SiteFacts) -> NDArray[np.float64]:
     if len(points) < _FEW:
         for area in site.osm.areas:
             if area.tags.get("building", "no") != "no" and not area.polygon.is_empty:
-                with expendable(area.id):
+                with drop_on_failure(area.id):
                     points.append(np.array(area.polygon.representative_point().coords[0]))
     xy = np.array(points).reshape(-1, 2)
     return xy[site.osm.holds(xy, edge=False)]

@@ -20,9 +20,8 @@ from vico.rules import BUS_DWELL, TRAM_WIDTH
 from vico.world.heights import HeightField
 from vico.world.model import Dropped
 from vico.world.transit import TRAM_LENGTH, Track, TramLine, TramStop, tram_door
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.facts.tags import is_bridge, on_the_ground
+from vico.worldgen.facts.fault_isolation import drop_on_failure
+from vico.worldgen.facts.site import SiteFacts, is_bridge, on_the_ground
 from vico.worldgen.transit.plan import as_many
 from vico.worldgen.transit.routes import interval_of
 
@@ -93,7 +92,7 @@ def trams_from_osm(
     stops: dict[str, TramStop] = {}
     lines: list[TramLine] = []
     for number, route in enumerate(chosen):
-        with expendable(route.id):
+        with drop_on_failure(route.id):
             _find_stops(route, site.osm, feeds)
             travel = _travel(route)
             route.departures = _departures(route, feeds, travel, number)
@@ -142,7 +141,7 @@ def _routes(site: SiteFacts, left_out: list[Dropped]) -> list[_Route]:
         kind = _ROUTES.get(tags.get("route", ""))
         if kind is None or tags.get("type", "route") != "route" or tags.get("state") in ("proposed", "abandoned"):
             continue
-        with expendable(f"r{relation.id}"):
+        with drop_on_failure(f"r{relation.id}"):
             pieces = _pieces(relation, ways)
             runs = [run for piece in pieces for run in _within(piece, osm)]
             name = tags.get("ref") or tags.get("name") or "Tram"

@@ -15,7 +15,7 @@ from vico.geo.gtfs_feed import DAY, Feed, GtfsRoute, Pattern
 from vico.geo.osm import OsmData, OsmRelation, Tags
 from vico.world.model import Dropped
 from vico.world.opening_hours import weekly_hours
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.fault_isolation import drop_on_failure
 
 NOT_ON_THE_MAP = "its rails are not on the map, or not chosen"
 _SAME_STOP = 60.0  # metres within which a platform and a stop position of one name are one stop
@@ -78,7 +78,7 @@ def routes_from_osm(osm: OsmData) -> tuple[list[Route], list[Dropped]]:
             continue
         if any(tags.get(key) == "yes" for key in _GONE) or tags.get("state") in ("proposed", "abandoned"):
             continue
-        with expendable(f"r{relation.id}"):
+        with drop_on_failure(f"r{relation.id}"):
             for run in _runs(relation, spots, osm):
                 grouped[name, tags.get("network", "") or tags.get("operator", "")].append((relation, run))
     routes: list[Route] = []

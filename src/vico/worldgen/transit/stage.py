@@ -18,7 +18,7 @@ from vico.world.lanes import LaneGraph
 from vico.world.model import FAILED, FIRST_STOP, Dropped
 from vico.world.transit import Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
-from vico.worldgen.facts.expendable import expendable, leave_out
+from vico.worldgen.facts.fault_isolation import drop_on_failure, leave_out
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
@@ -162,7 +162,7 @@ def transit_from_osm(
     waiting = _Waiting(lanes, walks, height)
     stops: dict[Berth, Stop] = {}
     for k, berth in enumerate(kept):
-        with expendable(berth.key):
+        with drop_on_failure(berth.key):
             stops[berth] = Stop(
                 id=f"stop_{k}",
                 entity=FIRST_STOP + k,
@@ -178,7 +178,7 @@ def transit_from_osm(
         if lost:
             leave_out(line.ids[0] if line.ids else name, f"{FAILED}: its stop {lost[0]} can't")
             continue
-        with expendable(line.ids[0] if line.ids else name):
+        with drop_on_failure(line.ids[0] if line.ids else name):
             lines.append(_record(k, line, stops))
     stations, racks = bike_stations(site, lanes, walks, height, seed)
     tram_stops, tram_lines, off_rails = trams_from_osm(
@@ -251,7 +251,7 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs, left_out: list[Dropped]) -> list[
         )
         if not stop or not osm.holds(xy):
             continue
-        with expendable(key):
+        with drop_on_failure(key):
             near = kerbs.near(xy, _REACH)
             if near:
                 berth = Berth(key, tags.get("name") or f"Stop {len(berths) + 1}", near[0][1], near[0][2])
@@ -270,7 +270,7 @@ def _driven(
     ways: list[tuple[set[int], int]] = []
     most, wide = as_many(_MOST_LINES, osm), times_as_wide(osm)
     for route in routes:
-        with expendable(route.id):
+        with drop_on_failure(route.id):
             fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)], wide)
             if isinstance(fit, str):
                 left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))

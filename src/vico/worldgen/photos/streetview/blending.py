@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas
 from vico.worldgen.photos.streetview.matching import opencv
 from vico.worldgen.photos.streetview.painting import ColourCurve, lab_of, rgb_of
@@ -72,7 +72,7 @@ def paint_chart(
     atlas: Atlas,
     number: int,
     layers: Sequence[Layer],
-    sight: Sight | None,
+    sight: RayCaster | None,
     how: Blending,
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], list[int], list[Nudge]]:
     """Paint a chart with its cameras, the first on top.
@@ -163,7 +163,7 @@ def _projected(
     atlas: Atlas,
     number: int,
     shot: Shot,
-    sight: Sight | None,
+    sight: RayCaster | None,
     quality: NDArray[np.float32],
     found: NDArray[np.uint8],
     how: Blending,

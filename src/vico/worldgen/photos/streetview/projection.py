@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, Chart
 from vico.worldgen.photos.streetview.matching import opencv
 from vico.worldgen.photos.streetview.painting import lab_of
@@ -122,7 +122,7 @@ def seen_from(
     shot: Shot,
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
-    sight: Sight | None,
+    sight: RayCaster | None,
     *,
     texel: float,
     farthest: float,

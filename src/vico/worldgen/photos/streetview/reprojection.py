@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from vico.geo.street_images import StreetImage
 from vico.world.model import Dropped
-from vico.worldgen.facts.expendable import expendable
-from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.fault_isolation import drop_on_failure
+from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas
 from vico.worldgen.photos.streetview.blending import Blending, Layer, paint_chart
 from vico.worldgen.photos.streetview.matching import opencv
@@ -88,7 +88,7 @@ def reproject(
     atlas: Atlas,
     images: Iterable[StreetImage],
     photograph: Photographer,
-    sight: Sight | None,
+    sight: RayCaster | None,
     *,
     config: StreetviewConfig | None = None,
     ground: Ground | None = None,
@@ -132,7 +132,7 @@ def reproject(
     shots: list[tuple[int, Shot]] = []
     views: list[Seen] = []
     for image in images:
-        with expendable(f"{image.source} {image.id}"):
+        with drop_on_failure(f"{image.source} {image.id}"):
             outcome, shot = prepared(image, photograph, config, ground or flat_ground)
             if shot is not None:
                 seen = _sampled(samples, shot, atlas, sight, config)
@@ -175,7 +175,7 @@ def reproject(
     return new, StreetviewReport(tuple(outcomes), painted_charts, painted_texels)
 
 
-def _sampled(samples: Samples, shot: Shot, atlas: Atlas, sight: Sight | None, config: StreetviewConfig) -> Seen:
+def _sampled(samples: Samples, shot: Shot, atlas: Atlas, sight: RayCaster | None, config: StreetviewConfig) -> Seen:
     """Which samples of the atlas a photo shows: view-frustum clipping by chart, then point by point."""
     charts = in_frustum(samples, shot, config.farthest)
     spans = [np.arange(samples.bounds[c], samples.bounds[c + 1]) for c in charts.tolist()]

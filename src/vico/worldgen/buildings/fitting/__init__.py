@@ -1,1 +1,0 @@
-"""Planned buildings nudged to a photogrammetry mesh: measured, raised, moved."""

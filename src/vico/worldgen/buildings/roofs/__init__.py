@@ -1,1 +1,0 @@
-"""Roofs: their solids by shape, and the eaves and dormers on them."""

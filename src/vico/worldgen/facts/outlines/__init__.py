@@ -1,1 +1,0 @@
-"""Outlines and plans of buildings: what stands where, how high, under what roof."""

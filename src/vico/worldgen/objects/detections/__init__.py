@@ -1,1 +1,0 @@
-"""Things that photos show: where they stand, and which of them the map knows already."""
