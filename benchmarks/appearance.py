@@ -48,15 +48,13 @@ from vico.world.folder import read_world
 from vico.world.walkable import SIDEWALK
 from vico.world.world import World
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.packaged import packaged_extract
-from vico.worldgen.photos.daylight import sun_in, without_sun
-from vico.worldgen.photos.streetview.pose import Correction, Pose, correction
+from vico.worldgen.photos.enhancement import find_sun, remove_sunlight
+from vico.worldgen.photos.streetview.registration import Correction, Pose, correction
 from vico.worldgen.photos.streetview.reprojection import StreetviewReport
-from vico.worldgen.photos.texturing import Painted, Texturing
+from vico.worldgen.photos.texturing import PhotoSurfaces, Texturing
 from vico.worldgen.pipeline import STAGES, build_world
-from vico.worldgen.product import read_product
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources, packaged_extract
+from vico.worldgen.stages import read_product
 
 EYE = 1.6
 WIDE, HIGH = 640, 360
@@ -353,7 +351,7 @@ def poses(work: Path, world: World, reports: StreetviewReport) -> list[str]:
     return lines
 
 
-def texels(truth: World, before: Painted, after: Painted) -> list[str]:
+def texels(truth: World, before: PhotoSurfaces, after: PhotoSurfaces) -> list[str]:
     """Error of the texels that street photos gave, before and after, against the true facades."""
     from streetview import psnr as psnr_of
     from streetview import true_pages
@@ -375,8 +373,8 @@ def texels(truth: World, before: Painted, after: Painted) -> list[str]:
     sight = RayCaster(corners, np.arange(len(corners)).reshape(-1, 3))
     pair = []
     for atlas in (before.atlas, after.atlas):
-        sun = sun_in(atlas, sight)
-        pair.append(atlas.pages if sun is None else without_sun(atlas, sun, sight).pages)
+        sun = find_sun(atlas, sight)
+        pair.append(atlas.pages if sun is None else remove_sunlight(atlas, sun, sight).pages)
     lines = [
         "| texels that street photos painted, against the true facades | n | PSNR, dB "
         "| with each wall's exposure fitted | correlation below 0.5 m | below 2 m |",

@@ -41,10 +41,10 @@ from vico.world.glb import glb_bytes
 from vico.world.mesh import Surface
 from vico.world.world import stage_seconds
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.packaged import packaged_extract
-from vico.worldgen.photos.atlas import Atlas, textured, unwrap
-from vico.worldgen.photos.baking import Baked, _Expected, _paint, _Photos, bake
-from vico.worldgen.photos.enhance.steps import inpainted, padded, upscaled
+from vico.worldgen.photos.atlas import Atlas, unwrap, with_atlas_pages
+from vico.worldgen.photos.baking import BakeResult, _Expected, _paint, _Photos, bake
+from vico.worldgen.photos.enhancement import inpaint_atlas, pad_gutters, upscale_atlas
+from vico.worldgen.request import packaged_extract
 
 _PHOTO_TEXEL = 0.12  # metres: what a city's photogrammetry shows
 _EDGE = 4.0  # metres, the longest edge of its triangles
@@ -100,7 +100,7 @@ def photogrammetry(walls: Sequence[Surface], roofs: Sequence[Surface], *, seed: 
         np.clip(gaussian_filter(page.astype(np.float32), (0.6, 0.6, 0)) + 0.5, 0, 255).astype(np.uint8)
         for page in pages
     )
-    photos = textured([*new_walls, *new_roofs], replace(atlas, pages=pages))
+    photos = with_atlas_pages([*new_walls, *new_roofs], replace(atlas, pages=pages))
     mesh = _cut(as_tile_mesh([s for s in photos if s.material.name.startswith("atlas_")]), _EDGE)
     # Nobody photographs a wall between two houses: a hand's breadth outside of it is inside another building.
     corners = mesh.positions[mesh.triangles]
@@ -197,11 +197,11 @@ def measured(name: str, world: Path, *, texel: float, finer: bool, bent: float, 
     mesh = photogrammetry(walls, roofs, seed=0, bent=bent)
     exact = as_tile_mesh([*walls, *roofs])
     seconds = [time.process_time()]
-    baked: Baked = bake(walls, roofs, mesh, texel=texel, page=2048 if finer else 4096)
+    baked: BakeResult = bake(walls, roofs, mesh, texel=texel, page=2048 if finer else 4096)
     seconds.append(time.process_time())
-    filled = inpainted(baked.atlas)
+    filled = inpaint_atlas(baked.atlas)
     seconds.append(time.process_time())
-    final = upscaled(filled) if finer else padded(filled)
+    final = upscale_atlas(filled) if finer else pad_gutters(filled)
     seconds.append(time.process_time())
     bake_s, fill_s, last_s = np.diff(seconds)
     truth = truth_of(baked.atlas, exact)
@@ -214,10 +214,17 @@ def measured(name: str, world: Path, *, texel: float, finer: bool, bent: float, 
         fine_truth = truth_of(final, exact)
         bicubic = [
             np.asarray(Image.fromarray(page).resize(new.shape[1::-1], Image.Resampling.BICUBIC))
-            for page, new in zip(padded(filled).pages, final.pages, strict=True)
+            for page, new in zip(pad_gutters(filled).pages, final.pages, strict=True)
         ]
         gain = f"{psnr(bicubic, fine_truth, final.known):.1f} -> {psnr(final.pages, fine_truth, final.known):.1f}"
-    glb = len(glb_bytes({"buildings": textured(baked.walls, final), "roofs": textured(baked.roofs, final)})) / 1e6
+    glb = (
+        len(
+            glb_bytes(
+                {"buildings": with_atlas_pages(baked.walls, final), "roofs": with_atlas_pages(baked.roofs, final)}
+            )
+        )
+        / 1e6
+    )
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
         for k, page in enumerate(final.pages):

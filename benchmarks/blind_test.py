@@ -30,8 +30,7 @@ from vico.api import read_world
 from vico.seeds import rng
 from vico.world.mesh import Surface
 from vico.world.world import World
-from vico.worldgen.previews.stage import render_views
-from vico.worldgen.previews.viewpoints import Viewpoint, viewpoints
+from vico.worldgen.previews import Viewpoint, render_views, viewpoints
 
 _SIGNS = "signs_"
 # Pixels of a board that are looked at, and so many of them around each, down and across.

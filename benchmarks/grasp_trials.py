@@ -19,7 +19,7 @@ from vico.assets.shapes import box
 from vico.challenges.pick_place.tasks import TABLE, fitting_kinds, level_field
 from vico.challenges.robot_tasks import team_of
 from vico.envs import Simulation, make
-from vico.quaternions import matrix_of
+from vico.geometry import rotation_matrix
 from vico.seeds import rng
 from vico.world.model import Point3
 
@@ -234,12 +234,12 @@ class Scene:
         """Return the middle of the thing's box: where it lies on its side, that is not above its underside."""
         objects = self.sim.state.objects
         row = objects.index(self.entity)
-        up = matrix_of(objects.orientation[row])[:, 2]
+        up = rotation_matrix(objects.orientation[row])[:, 2]
         return np.asarray(objects.position[row] + up * objects.size[row, 2] / 2)
 
     def _leans(self) -> float:
         row = self.sim.state.objects.index(self.entity)
-        return float(math.acos(np.clip(matrix_of(self.sim.state.objects.orientation[row])[2, 2], -1.0, 1.0)))
+        return float(math.acos(np.clip(rotation_matrix(self.sim.state.objects.orientation[row])[2, 2], -1.0, 1.0)))
 
     def _pressed(self) -> float:
         return float(np.min(self.told["sensors"]["contacts"]))

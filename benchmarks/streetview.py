@@ -36,15 +36,14 @@ from vico.world.folder import read_world
 from vico.world.mesh import Surface
 from vico.world.world import World
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.packaged import packaged_extract
-from vico.worldgen.photos.atlas import Atlas, textured, unwrap
-from vico.worldgen.photos.streetview.masks import PhotoView
+from vico.worldgen.photos.atlas import Atlas, unwrap, with_atlas_pages
+from vico.worldgen.photos.streetview.masking import PhotoView
 from vico.worldgen.photos.streetview.matching import SiftMatcher
-from vico.worldgen.photos.streetview.photo import Photographer, StreetviewConfig
-from vico.worldgen.photos.streetview.pose import Pose, correction, relative_pose
 from vico.worldgen.photos.streetview.projection import texel_centres
-from vico.worldgen.photos.streetview.reprojection import reproject
-from vico.worldgen.previews.viewpoints import viewpoints
+from vico.worldgen.photos.streetview.registration import Pose, correction, relative_pose
+from vico.worldgen.photos.streetview.reprojection import Photographer, StreetviewConfig, reproject
+from vico.worldgen.previews import viewpoints
+from vico.worldgen.request import packaged_extract
 
 MOVER = 1 << 23
 """Entities from here on are cars and people."""
@@ -262,7 +261,8 @@ def measure(world: World, count: int, seed: int, pictures: Path | None) -> list[
     life, movers_placed = street_life(world, cameras, seed)
     photos, movers = photos_of(photographer_of(life, samples=2), cameras, seed)
     plain = World(world.manifest, world.path, layers={
-        "ground": _softened(ground), "buildings": textured(new_walls, model), "roofs": textured(new_roofs, model),
+        "ground": _softened(ground), "buildings": with_atlas_pages(new_walls, model),
+        "roofs": with_atlas_pages(new_roofs, model),
     })  # fmt: skip
     take = photographer_of(scene_of(plain, rooms=False))
     recorder = _Watched(StreetviewConfig())
@@ -399,8 +399,8 @@ def _sheet(
     for atlas in (model, result):
         layers = {
             "ground": world.surfaces("ground"),
-            "buildings": textured(walls, atlas),
-            "roofs": textured(roofs, atlas),
+            "buildings": with_atlas_pages(walls, atlas),
+            "roofs": with_atlas_pages(roofs, atlas),
         }
         takes.append(
             photographer_of(scene_of(World(world.manifest, world.path, layers=layers), rooms=False), samples=2)

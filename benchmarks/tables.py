@@ -36,7 +36,7 @@ from vico.challenges.tables.results import published_rows, write_results
 from vico.challenges.windows import window_list
 from vico.errors import InputError, VicoError
 from vico.io.files import write_bytes
-from vico.worldgen.many import build_many
+from vico.worldgen.batch import build_many
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from typing import Any
 
 from reporting import machine, publish
 
-from vico.viewer.browser import BrowserPage, open_page
 from vico.viewer.city import city_folder
+from vico.viewer.headless import BrowserPage, open_page
 from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.source import Source

@@ -28,7 +28,7 @@ from reporting import machine, publish, row, vico
 
 from vico.world.check import check_world
 from vico.world.folder import read_world
-from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.request import packaged_extract
 
 GOAL = 90.0
 # Averages of the paper's scenes (its tables "Average counts of object categories per scene", "Averaged number of

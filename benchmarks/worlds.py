@@ -14,8 +14,8 @@ from pathlib import Path
 
 from vico.challenges.windows import PACKAGED_MAP, Window, WindowList, overlaps, window_list
 from vico.errors import VicoError
-from vico.worldgen.many import Outcome, PlaceRow, build_many
-from vico.worldgen.packaged import map_for
+from vico.worldgen.batch import Outcome, PlaceRow, build_many
+from vico.worldgen.request import map_for
 
 
 def locate(lat: float, lon: float, half: float) -> Path:

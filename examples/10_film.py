@@ -37,8 +37,7 @@ from vico.sim.loop.simulation import Simulation
 from vico.sim.people.placement import carries_umbrella, habit_of
 from vico.sim.recording import read_run
 from vico.sim.recording.recorder import Recorder
-from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, film_frames
+from vico.viewer.run_film import FilmSettings, RepeatedRun, film_frames
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY
@@ -70,8 +69,8 @@ class Scene:
     start
         Second of the day at which its run begins.
     follow, views
-        Who is seen, and from where (`vico.viewer.follow.VIEWS`): one shot each, equally long. `follow` may be told by
-        how things are as the scene begins; of several, whoever has the best part is seen.
+        Who is seen, and from where (`vico.viewer.follow_camera.VIEWS`): one shot each, equally long. `follow` may be
+        told by how things are as the scene begins; of several, whoever has the best part is seen.
     seconds
         How long it is.
     begins

@@ -17,10 +17,8 @@ import shapely
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, read_osm
 from vico.geo.overlay import polygons_of
-from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources, packaged_extract
 
 LAT, LON = 60.1690, 24.9435
 EAVES, RIDGE = 19.0, 26.0

@@ -20,8 +20,7 @@ from scipy import ndimage
 from vico.world.folder import read_world
 from vico.world.walkable import OPEN, SIDEWALK
 from vico.world.world import World
-from vico.worldgen.previews.stage import render_views
-from vico.worldgen.previews.viewpoints import Viewpoint, viewpoints
+from vico.worldgen.previews import Viewpoint, render_views, viewpoints
 
 _EYE, _LABEL = 1.7, 22
 _TURNS = (-0.7, -0.35, 0.35, 0.7)  # directions in which houses are to stand along a street, radians

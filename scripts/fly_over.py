@@ -24,8 +24,7 @@ from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
 from vico.sim.recording.recorder import Recorder
-from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, film_frames
+from vico.viewer.run_film import FilmSettings, RepeatedRun, film_frames
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 from vico.world.world import World

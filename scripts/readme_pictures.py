@@ -18,7 +18,7 @@ from vico.sim.loop.simulation import Simulation
 from vico.sim.pictures.scene import SceneRenderer
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
-from vico.worldgen.previews.viewpoints import viewpoints
+from vico.worldgen.previews import viewpoints
 
 WIDTH, HEIGHT = 1280, 640
 

@@ -30,7 +30,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from vico.agents.commute.learning import CommuteVectorEnv, training_city
 from vico.challenges.learning.commute import ShardedCommuters, shard_makers
 from vico.envs.workers import Workers
-from vico.jobs.actors import RayActors
+from vico.jobs.cluster import RayActors
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 

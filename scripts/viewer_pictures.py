@@ -15,8 +15,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from vico.viewer.browser import BrowserPage, open_page
 from vico.viewer.city import city_folder
+from vico.viewer.headless import BrowserPage, open_page
 from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.source import Source

@@ -15,7 +15,7 @@ from vico.sim.environment import weather_kinds
 from vico.sim.loop.simulation import Simulation
 from vico.sim.pictures.scene import SceneRenderer
 from vico.world.folder import read_world
-from vico.worldgen.previews.viewpoints import viewpoints
+from vico.worldgen.previews import viewpoints
 
 WIDTH, HEIGHT = 320, 200
 NOON, EVENING = 12 * 3600, 18 * 3600

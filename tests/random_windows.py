@@ -27,8 +27,7 @@ from vico.world.check import check_world
 from vico.world.folder import read_world
 from vico.worldgen.facades.textures import materials
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources
 
 PACKAGED = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 PLACES = Path(__file__).parents[2] / "shared" / "data" / "places"

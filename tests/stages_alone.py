@@ -10,7 +10,7 @@ from vico.worldgen.facts.building_outlines import building_plans
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.grade_separation import bridges_of
-from vico.worldgen.ground.stage import APRON, ground_from_osm
+from vico.worldgen.ground.stage import GROUND_APRON, ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.yards import yards_of
 
@@ -24,5 +24,5 @@ def ground_of(osm: OsmData, terrain: HeightField, streets: StreetPolygons) -> li
     """The ground of a map, its bridges with it."""
     site = site_facts(osm)
     flights = flights_of(site, terrain, streets.steps)
-    yards = yards_of(site, streets.carriageway, reach=osm.half + APRON)
+    yards = yards_of(site, streets.carriageway, reach=osm.half + GROUND_APRON)
     return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets), flights, yards)

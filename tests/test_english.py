@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vico.english import participle, split_name, uncapitalized, with_article
+from vico.english import participle, split_name, uncapitalize, with_article
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_a_participle_follows_the_rules_of_spelling(verb: str, turned: str) -> N
 
 
 def test_abbreviations_stay_capitals() -> None:
-    assert [uncapitalized(text) for text in ("Write code", "UX designer", "F1 races", "I")] == [
+    assert [uncapitalize(text) for text in ("Write code", "UX designer", "F1 races", "I")] == [
         "write code", "UX designer", "F1 races", "I",
     ]  # fmt: skip
 

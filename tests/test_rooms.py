@@ -17,9 +17,7 @@ GROUND = {
     "geometry",
     "rules",
     "clock",
-    "crowd",
-    "pixels",
-    "quaternions",
+    "observation_arrays",
     "english",
 }
 
@@ -62,8 +60,7 @@ OPEN = {"viewer", "cli"}  # and the front door, api.py
 SHARED = {
     "facts": set(),
     "texture_canvas": set(),
-    "kept_textures": set(),
-    "facades": {"facts", "texture_canvas", "kept_textures"},
+    "facades": {"facts", "texture_canvas"},
 }
 
 
@@ -125,7 +122,9 @@ def test_imports_inside_sim_point_down_its_floors() -> None:
 
 def parts_of_worldgen() -> list[str]:
     """Folders and modules that stages share, and the stages' folders."""
-    return sorted(SHARED.keys() | {path.parent.name for path in (SOURCE / "worldgen").glob("*/__init__.py")})
+    return sorted(
+        SHARED.keys() | {"previews"} | {path.parent.name for path in (SOURCE / "worldgen").glob("*/__init__.py")}
+    )
 
 
 @pytest.mark.parametrize("part", parts_of_worldgen())

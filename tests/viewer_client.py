@@ -13,7 +13,7 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 
 from vico.viewer.server.serve import Address
-from vico.viewer.sources.frames import Frame, decoded
+from vico.viewer.sources.frames import Frame, decode_frame
 
 
 def address_of(url: str) -> Address:
@@ -63,7 +63,7 @@ class Stream:
         """Take in one message."""
         content = self.socket.recv(timeout=seconds)
         if isinstance(content, bytes):
-            self.frames.append(decoded(content))
+            self.frames.append(decode_frame(content))
         else:
             self.messages.append(json.loads(content))
 

@@ -26,9 +26,8 @@ from vico.world.check import check_world as _check_world
 from vico.world.folder import read_world as _read_world
 from vico.world.world import World
 from vico.worldgen import pipeline
-from vico.worldgen.packaged import map_for, packaged_extract
-from vico.worldgen.previews.viewpoints import viewpoints
-from vico.worldgen.sources import Sources
+from vico.worldgen.previews import viewpoints
+from vico.worldgen.request import Sources, map_for, packaged_extract
 
 #: Height of a standing person's eyes above the ground, metres.
 EYE_HEIGHT = 1.65

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+__all__ = ["participle", "split_name", "uncapitalize", "with_article"]
 # Vowels that are spoken as consonants, and the other way round, at the beginning of a word.
 _LIKE_YOU = re.compile(r"(?:eu|ewe|one(?!i)|once|u(?:ni(?!n|m)|se|su|ti|ro|k|fo)|ukr)")
 _SILENT_H = re.compile(r"(?:hour|honest|honou?r|heir)")
@@ -39,7 +40,7 @@ def with_article(noun: str) -> str:
     return f"{'an' if an else 'a'} {noun}"
 
 
-def uncapitalized(text: str) -> str:
+def uncapitalize(text: str) -> str:
     """Start in lower case, but leave abbreviations and "I"."""
     return text if re.match(r"[A-Z]{2}|I\b|[A-Z]\d", text) else text[:1].lower() + text[1:]
 
@@ -67,6 +68,3 @@ def participle(verb: str) -> str:
     else:
         turned = f"{verb}ing"
     return f"{head}{hyphen}{turned}"
-
-
-__all__ = ["participle", "split_name", "uncapitalized", "with_article"]

@@ -74,7 +74,7 @@ def test_processes_see_what_one_process_sees(helsinki_path: Path) -> None:
 
 @needs_ray
 def test_a_city_whose_process_is_killed_comes_back_as_it_was(helsinki_path: Path) -> None:
-    from vico.jobs.actors import RayActors
+    from vico.jobs.cluster import RayActors
 
     makers = shard_makers([helsinki_path, helsinki_path], num_envs=AGENTS, seed=4)
     here = rollout(Here(makers))

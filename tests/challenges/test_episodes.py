@@ -25,7 +25,7 @@ from vico.errors import InputError, SchemaError
 from vico.runner.foreign import Terms
 from vico.runner.gather import Fault
 from vico.sim.recording import read_run
-from vico.viewer.repeat import RepeatedRun
+from vico.viewer.run_film import RepeatedRun
 from vico.world.world import World
 
 

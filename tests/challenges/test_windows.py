@@ -10,7 +10,7 @@ import pytest
 
 from vico.challenges.windows import PACKAGED_MAP, overlap, overlaps, window_list, window_lists
 from vico.errors import InputError, SchemaError
-from vico.worldgen.packaged import covers, packaged_extract
+from vico.worldgen.request import covers, packaged_extract
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "worlds.py"
 

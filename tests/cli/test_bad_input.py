@@ -15,7 +15,7 @@ import pytest
 from command_line import vico
 from vico.cli.run import _MEANINGS
 from vico.community import read_community, read_names
-from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.request import packaged_extract
 
 EMPTY_MAP = """<?xml version="1.0"?>
 <osm version="0.6"><bounds minlat="60.16" minlon="24.94" maxlat="60.17" maxlon="24.95"/>

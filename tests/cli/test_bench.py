@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vico.cli import bench
-from vico.cli.machine_speed import REFERENCE_COMPILED, REFERENCE_PYTHON, compiled_speed, python_speed, speed_table
+from vico.cli import demo
+from vico.cli.demo import REFERENCE_COMPILED, REFERENCE_PYTHON, compiled_speed, python_speed, speed_table
 
 SCRIPT = """import sys
 from pathlib import Path
@@ -23,7 +23,7 @@ def test_speeds_are_those_of_a_processor_of_our_days() -> None:
 
 
 def test_the_table_has_both_machines_and_their_ratio() -> None:
-    (table,) = bench.tables_of(speed_table())
+    (table,) = demo.tables_of(speed_table())
     rows = table["rows"]
     assert [row["there"] for row in rows] == [f"{REFERENCE_PYTHON:.0f}", f"{REFERENCE_COMPILED:.0f}"]
     for row in rows:
@@ -35,9 +35,9 @@ def test_a_benchmark_is_printed_with_the_speed_of_the_machine(
     as_json: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "world.py").write_text(SCRIPT)
-    monkeypatch.setattr(bench, "SCRIPTS", tmp_path)
+    monkeypatch.setattr(demo, "SCRIPTS", tmp_path)
     report = tmp_path / "report.md"
-    assert bench.bench("world", json=as_json, table=report) == 0
+    assert demo.bench("world", json=as_json, table=report) == 0
     printed = capsys.readouterr().out
     assert "here / there" not in report.read_text()
     if not as_json:

@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 
 from command_line import interrupted, vico
-from vico.cli import film, interrupts
+from vico.cli import console, film
 from vico.cli import run as run_verb
-from vico.cli.interrupts import Stopped, ended_by_signals, exit_code, stopped_between_steps
-from vico.cli.output import progress_bars
+from vico.cli.console import CommandInterrupted, ended_by_signals, exit_code, progress_bars, stopped_between_steps
 from vico.errors import InputError
 from vico.io.files import read_json
 from vico.render.film import FilmWriter, partial_film, read_film, write_film
@@ -133,17 +132,17 @@ def test_ctrl_c_that_comes_twice_at_once_is_one(capfd: pytest.CaptureFixture[str
 
 def test_ctrl_c_once_more_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter((10.0, 12.0))
-    monkeypatch.setattr(interrupts.time, "monotonic", lambda: next(now))
+    monkeypatch.setattr(console.time, "monotonic", lambda: next(now))
     with stopped_between_steps() as asked:
         os.kill(os.getpid(), signal.SIGINT)
         assert asked
-        with pytest.raises(Stopped):
+        with pytest.raises(CommandInterrupted):
             os.kill(os.getpid(), signal.SIGINT)
 
 
 def test_a_second_sigterm_ends_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter((10.0, 12.0))
-    monkeypatch.setattr(interrupts.time, "monotonic", lambda: next(now))
+    monkeypatch.setattr(console.time, "monotonic", lambda: next(now))
     with stopped_between_steps() as asked:
         os.kill(os.getpid(), signal.SIGTERM)
         os.kill(os.getpid(), signal.SIGTERM)
@@ -227,7 +226,7 @@ def test_lines_of_a_long_stage_tell_the_time_that_is_left(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now = 0.0
-    monkeypatch.setattr("vico.cli.output.time.perf_counter", lambda: now)
+    monkeypatch.setattr("vico.cli.console.time.perf_counter", lambda: now)
     with progress_bars() as report:
         for done in range(1, 12):
             report("film", done, 601)

@@ -17,7 +17,7 @@ from vico.challenges import records
 from vico.cli.options import with_ray_address
 from vico.io.stores import store_at
 from vico.world.folder import read_world
-from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.request import packaged_extract
 
 
 @pytest.fixture

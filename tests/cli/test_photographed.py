@@ -18,8 +18,8 @@ from vico.geo.street_images import camera_rotation, pinhole
 from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.world import World
-from vico.worldgen.photos.streetview.renders import photographer_of
-from vico.worldgen.previews.viewpoints import viewpoints
+from vico.worldgen.photos.streetview.reprojection import photographer_of
+from vico.worldgen.previews import viewpoints
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 60.0

@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from command_line import vico
-from vico.cli import bench
+from vico.cli import demo
 from vico.sim.recording import read_run
 from vico.world.folder import read_world
 from vico.worldgen.report import report_page
@@ -135,7 +135,7 @@ def test_output_that_nobody_reads_on_is_no_error(helsinki_path: Path) -> None:
 def test_bench_says_where_benchmarks_are_to_be_had(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(bench, "SCRIPTS", tmp_path)
+    monkeypatch.setattr(demo, "SCRIPTS", tmp_path)
     assert vico("bench", "world") == 2
     assert "come with the repository" in capsys.readouterr().err
 
@@ -143,7 +143,7 @@ def test_bench_says_where_benchmarks_are_to_be_had(
 @pytest.mark.slow
 def test_bench_world_measures_every_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "results" / "world.md"
-    assert bench.bench("world", table=table, json=True, options=("--radius", "60", "-n", "1")) == 0
+    assert demo.bench("world", table=table, json=True, options=("--radius", "60", "-n", "1")) == 0
     seconds, memory, objects, elements = printed(capsys)["tables"]
     stages = {row["stage"]: float(row["median s"]) for row in seconds["rows"]}
     assert stages.keys() >= {"map", "buildings", "roads", "previews", "total"}
@@ -164,7 +164,7 @@ def test_bench_world_measures_every_stage(tmp_path: Path, capsys: pytest.Capture
 
 def test_every_benchmark_is_a_script_that_explains_itself() -> None:
     for name in ("render", "sim", "world", "memory"):
-        script = bench.SCRIPTS / f"{name}.py"
+        script = demo.SCRIPTS / f"{name}.py"
         done = subprocess.run([sys.executable, str(script), "--help"], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert f"benchmarks/{name}.py" in done.stdout

@@ -25,7 +25,7 @@ from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
 from vico.sim.recording.interventions import InterventionLine, intervention_of, read_interventions, write_interventions
 from vico.sim.recording.recorder import Recorder
-from vico.viewer.repeat import RepeatedRun
+from vico.viewer.run_film import RepeatedRun
 from vico.world.public import PublicMap
 
 #: What is done to a run in these tests.

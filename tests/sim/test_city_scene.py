@@ -28,7 +28,7 @@ from vico.world.folder import read_world
 from vico.world.model import ENTITY_BACKDROP
 from vico.world.silhouettes import CitySilhouettes
 from vico.worldgen.city_build import build_city, city_request
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import Sources
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 LAT, LON = 60.1690, 24.9435

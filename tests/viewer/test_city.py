@@ -13,11 +13,8 @@ import pytest
 from vico.assets.robots import robot_model, robot_names
 from vico.io.files import read_json
 from vico.viewer.city import write_city
-from vico.viewer.city.export import MANIFEST
-from vico.viewer.city.pack import Blob, packed
-from vico.viewer.city.robots import write_robots
-from vico.viewer.city.textures import PLAIN, SHAPES, TextureLayers
-from vico.viewer.city.tiles import PICTURE, Grid, far_tiles, ground_picture
+from vico.viewer.city.export import MANIFEST, PICTURE, Grid, far_tiles, ground_picture
+from vico.viewer.city.models import PLAIN, SHAPES, Blob, TextureLayers, pack_surfaces, write_robots
 from vico.world.mesh import Material, Surface
 from vico.world.world import World
 
@@ -90,7 +87,7 @@ def test_surfaces_of_one_array_become_one_mesh_and_leaves_are_seen_from_behind()
     faces = np.array([(0, 1, 2)])
     leaf = Material("leaf", np.full((64, 64, 4), 200, np.uint8), cutout=True)
     surfaces = [Surface.from_triangles(triangle, faces, material=m) for m in (Material("a"), Material("b"), leaf)]
-    meshes = packed(surfaces, TextureLayers())
+    meshes = pack_surfaces(surfaces, TextureLayers())
     assert [(mesh.array, mesh.both_sides, len(mesh.triangles)) for mesh in meshes] == [(0, False, 2), (0, True, 1)]
 
 

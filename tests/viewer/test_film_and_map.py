@@ -12,11 +12,8 @@ from numpy.typing import NDArray
 
 from vico.render.film import read_film
 from vico.sim.recording import read_run
-from vico.viewer import demo_film
-from vico.viewer.demo_film import HEIGHT, RATE, SECONDS, WIDTH, write_demo_film
-from vico.viewer.from_run import recording_of
-from vico.viewer.map_picture import MapPicture
-from vico.viewer.recording import Recording
+from vico.viewer import replay
+from vico.viewer.replay import HEIGHT, RATE, SECONDS, WIDTH, MapPicture, Recording, recording_of, write_demo_film
 from vico.world.world import World
 
 
@@ -33,7 +30,7 @@ def test_a_film_lasts_twenty_seconds_at_least() -> None:
 def test_the_film_has_its_frames_and_its_size(
     recording: Recording, helsinki: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(demo_film, "SECONDS", 1.0)
+    monkeypatch.setattr(replay, "SECONDS", 1.0)
     assert write_demo_film(tmp_path / "f.mp4", recording, helsinki) == RATE
     frames = list(read_film(tmp_path / "f.mp4"))
     assert len(frames) == RATE

@@ -10,8 +10,7 @@ from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import read_run
 from vico.sim.recording.recorder import Recorder
-from vico.viewer.from_run import recording_of
-from vico.viewer.recording import Recording
+from vico.viewer.replay import Recording, recording_of
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from vico.community.folder import digest_of
 from vico.errors import InputError
 from vico.runner.control import Control
 from vico.sim.recording import read_run
-from vico.viewer.play import PlayedAgent, held_of
-from vico.viewer.theatre import BrowserTheatre
+from vico.viewer.human_evaluation import BrowserTheatre
+from vico.viewer.play import PlayedAgent, parse_keys
 from viewer_client import get_json, stream
 
 
@@ -102,7 +102,7 @@ def test_refusals_come_back_in_words(person: Person) -> None:
 )
 def test_keys_that_are_none_are_refused(message: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="has to"):
-        held_of(message)
+        parse_keys(message)
 
 
 # Tasks.

@@ -16,8 +16,7 @@ from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run, read_run
 from vico.sim.recording.recorder import Recorder
-from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, still
+from vico.viewer.run_film import FilmSettings, RepeatedRun, still
 from vico.world.public import PublicMap
 
 KIND = sorted(movable_kinds())[0]

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from vico.sim.recording import read_run
-from vico.viewer.from_run import recording_of
-from vico.viewer.recording import RecordedEvent, Recording
-from vico.viewer.replay import UNIT, page_data, write_replay
+from vico.viewer.replay import UNIT, RecordedEvent, Recording, page_data, recording_of, write_replay
 from vico.world.world import World
 
 HIDDEN = -32768

@@ -14,7 +14,7 @@ import toy_city
 from command_line import vico
 from vico.agents.schedule import followers_of
 from vico.assets.shapes import box, pose_matrix
-from vico.cli.film import followed
+from vico.cli.film import followed_name
 from vico.errors import InputError, SchemaError
 from vico.io.files import write_json
 from vico.render import Scene
@@ -27,11 +27,8 @@ from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run, read_run
 from vico.sim.recording.manifest import CastMember
 from vico.sim.recording.recorder import Recorder
-from vico.viewer.follow import FollowCamera
-from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, Span, still, write_film_of_shots, write_run_film
-from vico.viewer.shots import read_shots
-from vico.viewer.targets import Target, target_between, target_of
+from vico.viewer.follow_camera import FollowCamera, Target, target_between, target_of
+from vico.viewer.run_film import FilmSettings, RepeatedRun, Span, read_shots, still, write_film_of_shots, write_run_film
 from vico.world.mesh import merge_surfaces
 from vico.world.public import PublicMap
 
@@ -145,7 +142,7 @@ def test_who_is_not_there_cannot_be_followed(run: Run, tmp_path: Path) -> None:
 def test_people_are_filmed_by_name(run: Run, tmp_path: Path) -> None:
     agent, name = next((agent, name) for agent, name in run.names.items() if agent.startswith("resident"))
     assert name != agent
-    assert followed(run, name.upper(), 0, run.last, option="film: --follow") == agent
+    assert followed_name(run, name.upper(), 0, run.last, option="film: --follow") == agent
     by_name = FilmSettings(follow=name, width=64, height=64, samples=1, quality=PLAIN_QUALITY)
     picture = still(repeated(run), by_name, 5)
     assert np.array_equal(picture, still(repeated(run), replace(by_name, follow=agent), 5))
@@ -174,10 +171,10 @@ def test_what_is_there_for_a_part_of_the_run_alone_is_told_with_its_times(
 ) -> None:
     car = CastMember(1, "car", "car 7", (4.0, 1.8, 1.5), None, None, ((2, 6), (9, None)))
     monkeypatch.setattr(run, "cast", {1: car})
-    assert followed(run, "car 7", 2, 5, option="film: --follow") == "car 7"
-    assert followed(run, "car 7", 9, run.last, option="film: --follow") == "car 7"
+    assert followed_name(run, "car 7", 2, 5, option="film: --follow") == "car 7"
+    assert followed_name(run, "car 7", 9, run.last, option="film: --follow") == "car 7"
     with pytest.raises(InputError, match=r"car 7 is there from 07:59:42 to 07:59:45, 07:59:49 to 07:59:52 alone"):
-        followed(run, "car 7", 4, 10, option="film: --follow")
+        followed_name(run, "car 7", 4, 10, option="film: --follow")
 
 
 def test_half_way_is_half_turned_and_as_large() -> None:

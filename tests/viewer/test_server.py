@@ -26,9 +26,8 @@ from websockets.sync.client import connect
 from vico.errors import InputError
 from vico.runner.control import Control
 from vico.runner.loop import Runner
-from vico.viewer.server.gate import Gate
 from vico.viewer.server.serve import ViewerServer
-from vico.viewer.server.state import ViewerState
+from vico.viewer.server.state import Gate, ViewerState
 from vico.viewer.sources.frames import NEWEST, OF_RANGE
 from vico.viewer.sources.source import Source
 from vico.viewer.sources.views import RecordedViews

@@ -20,9 +20,8 @@ from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording.recorder import Recorder
 from vico.sim.traffic import JunctionRule
-from vico.viewer.sources.frames import FRAME_COLUMNS, NEWEST, decoded
-from vico.viewer.sources.signals import heads_on, signals_of
-from vico.viewer.sources.source import Source
+from vico.viewer.sources.frames import FRAME_COLUMNS, NEWEST, decode_frame
+from vico.viewer.sources.source import Source, heads_on, signals_of
 from vico.viewer.sources.tables import LiveTables
 from vico.viewer.sources.views import RecordedViews
 from vico.world.heights import HeightField
@@ -78,7 +77,7 @@ def recorded(watched: tuple[Path, Watcher]) -> Source:
 
 def test_a_frame_survives_its_bytes(recorded: Source) -> None:
     frame = next(recorded.frames(30, 30))
-    again, flags, range_id = decoded(frame.encoded(flags=NEWEST, range_id=7))
+    again, flags, range_id = decode_frame(frame.encoded(flags=NEWEST, range_id=7))
     assert (again.step, again.time, flags, range_id) == (30, 28_820.0, NEWEST, 7)
     np.testing.assert_array_equal(again.sky, frame.sky)
     for table, form in FRAME_COLUMNS.items():
@@ -92,7 +91,7 @@ def test_bytes_that_are_no_frame_are_refused(recorded: Source) -> None:
     content = next(recorded.frames(3, 3)).encoded()
     for broken in (b"", content[:50], content[:-8], b"X" + content[1:]):
         with pytest.raises(SchemaError):
-            decoded(broken)
+            decode_frame(broken)
 
 
 def test_a_run_that_goes_on_gives_the_frames_of_its_recording(watched: tuple[Path, Watcher], recorded: Source) -> None:

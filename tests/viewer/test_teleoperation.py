@@ -12,9 +12,8 @@ from vico.agents.human import HeldInput, HumanAgent, Mailbox
 from vico.assets.robots import robot_model
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
-from vico.viewer.hand_led import HAND_SPEED, HandLed
-from vico.viewer.hints import hints_of
-from vico.viewer.teleoperation import steering_of
+from vico.viewer.play import hints_of
+from vico.viewer.teleoperation import HAND_SPEED, HandTeleoperation, steering_of
 
 
 class Driven:
@@ -52,7 +51,7 @@ class Driven:
     @property
     def hand(self) -> Any:
         """Where an arm's hand is, in the base's frame."""
-        assert isinstance(self.steer, HandLed)
+        assert isinstance(self.steer, HandTeleoperation)
         assert self.sim.state.robots is not None
         return self.steer.pose_of(np.asarray(self.sim.state.robots.joint_positions()[0][:7], np.float64))[:, 3]
 
@@ -108,5 +107,5 @@ def test_an_arm_on_wheels_drives_and_opens_its_grip() -> None:
 def test_every_model_has_a_way_to_be_steered() -> None:
     for name in ("husky", "go2", "h1", "drone", "manipulator"):
         assert callable(steering_of(name))
-    assert isinstance(steering_of("manipulator"), HandLed)
+    assert isinstance(steering_of("manipulator"), HandTeleoperation)
     assert robot_model("manipulator").name == "manipulator"

@@ -24,8 +24,8 @@ from vico.world.city_routing import CityRouter, CityWalkLengths
 from vico.world.grid_search import cells_along
 from vico.world.routing import Router
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap, write_walkable
-from vico.worldgen.seams.grid import TileGrid, tile_name
-from vico.worldgen.seams.walking import MOST_ROOM, square_of, write_gates, write_walking
+from vico.worldgen.seams.joins import TileGrid, tile_name
+from vico.worldgen.seams.mosaic import MOST_ROOM, cells_of_tile, write_gates, write_walking
 
 SIDE = 300  # cells of a tile
 GRID = TileGrid(SIDE * 0.5, (-1, -1), (1, 1))
@@ -54,13 +54,13 @@ def _opened(folder: Path, town: WalkableMap) -> CityRouter:
     """Write a map tile by tile, as a city's build does, and open it."""
     tiles = {}
     for tile in GRID:
-        part = town.cls[square_of(tile, GRID, SIDE)]
+        part = town.cls[cells_of_tile(tile, GRID, SIDE)]
         tiles[tile] = folder / f"{tile_name(tile)}.npz"
         write_walkable(tiles[tile], WalkableMap(np.ascontiguousarray(part), SIDE * 0.25))
     write_walking(folder, GRID, tiles)
     cost = mapped_array(folder / COST)
     room = mapped_array(folder / ROOM)
-    write_gates(folder, [tile_gates(cost, room, square_of(tile, GRID, SIDE), cell=0.5) for tile in GRID])
+    write_gates(folder, [tile_gates(cost, room, cells_of_tile(tile, GRID, SIDE), cell=0.5) for tile in GRID])
     gates = Gates.read(folder / GATES, mapped_array(folder / STEPS))
     return CityRouter(whole_walkable(folder, town.half), cost, gates, SIDE)
 
@@ -183,7 +183,7 @@ def test_walks_from_gate_to_gate_are_kept_cell_by_cell(router: CityRouter) -> No
 
 def test_steps_of_other_walks_are_refused(router: CityRouter, tmp_path: Path) -> None:
     cost, room = router._cost, router.walkable.clearance
-    write_gates(tmp_path, [tile_gates(cost, room, square_of((0, 0), GRID, SIDE), cell=0.5)])
+    write_gates(tmp_path, [tile_gates(cost, room, cells_of_tile((0, 0), GRID, SIDE), cell=0.5)])
     with pytest.raises(SchemaError, match="steps beside it"):
         Gates.read(tmp_path / GATES, mapped_array(tmp_path / STEPS)[1:])
 
@@ -191,7 +191,7 @@ def test_steps_of_other_walks_are_refused(router: CityRouter, tmp_path: Path) ->
 @pytest.mark.parametrize("direction", [0, 2, 5, 200])
 def test_damaged_steps_are_told_and_lead_nowhere(town: WalkableMap, router: CityRouter, direction: int) -> None:
     cost, room = router._cost, router.walkable.clearance
-    gates = Gates.joined([tile_gates(cost, room, square_of(tile, GRID, SIDE), cell=0.5) for tile in GRID])
+    gates = Gates.joined([tile_gates(cost, room, cells_of_tile(tile, GRID, SIDE), cell=0.5) for tile in GRID])
     torn = replace(gates, steps=np.full_like(gates.steps, direction))
     with pytest.raises(SchemaError, match=r"steps\.npy: the walk from cell \d+ to \d+ is damaged; build the city anew"):
         CityRouter(router.walkable, cost, torn, SIDE).path((-215.0, -215.0), (210.0, 212.0))

@@ -12,7 +12,7 @@ from vico.jobs import Helper
 from vico.threads import WORKERS
 from vico.world.folder import read_world
 from vico.world.world import World, stage_seconds
-from vico.worldgen import ahead, laying
+from vico.worldgen import background_stages, construction
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
 
@@ -26,15 +26,15 @@ def made_here(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the stages that this process makes though another may; there is a processor for that."""
     made: list[str] = []
     for function, name in AHEAD.items():
-        real = getattr(laying, function)
+        real = getattr(construction, function)
 
         def counted(*inputs: object, name: str = name, real: object = real, **options: object) -> object:
             made.append(name)
             return real(*inputs, **options)  # type: ignore[operator]
 
-        monkeypatch.setattr(laying, function, counted)
+        monkeypatch.setattr(construction, function, counted)
     monkeypatch.setenv(WORKERS, "2")
-    monkeypatch.setattr(ahead, "_FEWEST", 1)
+    monkeypatch.setattr(background_stages, "_FEWEST", 1)
     return made
 
 
@@ -58,7 +58,7 @@ def test_what_has_not_been_begun_is_made_here(
     assert built == corner.manifest
 
 
-@pytest.mark.parametrize("maker", ["vico.worldgen.aside:nothing", "toy_service:doubler"])
+@pytest.mark.parametrize("maker", ["vico.worldgen.background_stages:nothing", "toy_service:doubler"])
 def test_a_process_that_fails_is_told_and_costs_only_time(
     corner: World,
     tmp_path: Path,
@@ -67,7 +67,7 @@ def test_a_process_that_fails_is_told_and_costs_only_time(
     caplog: pytest.LogCaptureFixture,
     maker: str,
 ) -> None:
-    monkeypatch.setattr(ahead, "_MAKER", maker)
+    monkeypatch.setattr(background_stages, "_MAKER", maker)
     monkeypatch.setattr(Helper, "withdraw", lambda self, number: False)
     with caplog.at_level(logging.WARNING, logger="vico"):
         built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
@@ -96,5 +96,5 @@ def test_a_build_that_goes_on_with_what_is_kept_starts_no_process(
     def start(*_: object, **__: object) -> None:
         raise AssertionError("a process was started")
 
-    monkeypatch.setattr(ahead, "Helper", start)
+    monkeypatch.setattr(background_stages, "Helper", start)
     build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", force=True, options=BuildOptions(previews=False))

@@ -8,12 +8,12 @@ import pytest
 from toytown import PLACES, make_world
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode
-from vico.worldgen.as_typed import hours_as_typed, quantities_as_typed
+from vico.worldgen.evidence import opening_hours_notes, quantity_notes
 
 
 def told(tags: dict[str, str], x: float = 0.0) -> tuple[dict[str, int], list[str]]:
     osm = OsmData(LocalFrame(52.0, 11.0), 50.0, 60.0, [OsmNode(1, np.array([x, 0.0]), tags)], [], [], [])
-    counts, found = quantities_as_typed(osm)
+    counts, found = quantity_notes(osm)
     return counts, [one.reason for one in found]
 
 
@@ -51,7 +51,7 @@ def test_hours_of_places_are_told() -> None:
         place.model_copy(update={"opening_hours": text}) for place, text in zip(world.places, hours, strict=False)
     ]
     assert len(PLACES) >= 4
-    counts, found = hours_as_typed(places)
+    counts, found = opening_hours_notes(places)
     assert counts == {"by_rule": 1, "not_read": 1}
     assert [one.reason for one in found] == [
         "opening_hours='Mo-Fr 8-20' was read as 'Mo-Fr 8:00-20:00'",

@@ -9,7 +9,7 @@ from vico.errors import InputError
 from vico.world.glb import read_glb, write_glb
 from vico.world.mesh import Material, Surface
 from vico.world.world import World
-from vico.worldgen.photos.atlas import Atlas, Chart, coverage, repacked, texel_centres, textured, unwrap
+from vico.worldgen.photos.atlas import Atlas, Chart, coverage, repack, texel_centres, unwrap, with_atlas_pages
 
 FACES = np.array([(0, 1, 2), (0, 2, 3)])
 
@@ -107,7 +107,7 @@ def test_charts_without_photos_go_and_the_others_keep_their_texels() -> None:
     atlas.pages[painted.page][painted.box] = (10, 200, 30)
     atlas.known[painted.page][painted.box] = atlas.inside[painted.page][painted.box]
     assert coverage(atlas).tolist() == [0, 1, 0, 0, 0]
-    new_walls, new_roofs, small = repacked(walls, roofs, atlas, least=0.5)
+    new_walls, new_roofs, small = repack(walls, roofs, atlas, least=0.5)
     assert [chart.patch for chart in small.charts] == [painted.patch]
     chart = small.charts[0]
     assert (small.pages[chart.page][chart.box] == (10, 200, 30)).all()
@@ -119,7 +119,7 @@ def test_pages_are_kept_as_jpeg_and_come_back_as_photos(tmp_path: Path) -> None:
     walls, roofs, atlas = unwrap(*box(6, 4, 3, 7), texel=0.1, page=256)
     for page in atlas.pages:
         page[:] = np.linspace(40, 220, page.shape[1]).astype(np.uint8)[None, :, None]
-    layers = {"buildings": textured(walls, atlas), "roofs": textured(roofs, atlas)}
+    layers = {"buildings": with_atlas_pages(walls, atlas), "roofs": with_atlas_pages(roofs, atlas)}
     write_glb(tmp_path / "a.glb", layers)
     assert b"image/jpeg" in (tmp_path / "a.glb").read_bytes()
     back = read_glb(tmp_path / "a.glb")

@@ -6,7 +6,7 @@ import pytest
 from vico.errors import EmptyInputError, InputError
 from vico.geo.tiles3d import TileMesh
 from vico.world.mesh import Surface
-from vico.worldgen.photos.baking import Baked, bake
+from vico.worldgen.photos.baking import BakeResult, bake
 
 pytest.importorskip("embreex", reason="baking casts rays with embreex")
 
@@ -50,7 +50,7 @@ def with_box(mesh: TileMesh, low: tuple[float, ...], high: tuple[float, ...], rg
     )
 
 
-def painted(baked: Baked) -> tuple[np.ndarray, np.ndarray]:
+def painted(baked: BakeResult) -> tuple[np.ndarray, np.ndarray]:
     """The one chart's colours and known texels, foot of the wall first."""
     (chart,) = baked.atlas.charts
     return baked.atlas.pages[chart.page][chart.box], baked.atlas.known[chart.page][chart.box]

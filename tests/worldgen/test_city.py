@@ -28,18 +28,25 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import Origin
 from vico.world.world import World
-from vico.worldgen import city_map
-from vico.worldgen.city_build import build_city, city_request, divide_map, divide_sources
-from vico.worldgen.city_request import CityRequest
-from vico.worldgen.city_tiles import plan
+from vico.worldgen import city_region
+from vico.worldgen.city_build import build_city, city_request, divide_map, divide_sources, plan_tile
+from vico.worldgen.city_region import CityRequest
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.seams.border_fit import conformed
-from vico.worldgen.seams.grid import HALO, TileGrid, grid_of, grid_over, tile_name
-from vico.worldgen.seams.heights import blended, cropped
-from vico.worldgen.seams.join import BORES, seamless
-from vico.worldgen.sources import Sources
-from vico.worldgen.stages import kept_product
+from vico.worldgen.request import Sources
+from vico.worldgen.seams.joins import (
+    BORES,
+    HALO,
+    TileGrid,
+    blend_heights,
+    crop_heights,
+    fit_border,
+    grid_of,
+    grid_over,
+    join_neighbours,
+    tile_name,
+)
+from vico.worldgen.stages import load_product
 from vico.worldgen.streets.roads import streets_from_osm
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
@@ -129,7 +136,7 @@ def test_neighbours_compute_the_same_heights_and_keep_their_own_further_in(seed:
     rng = np.random.default_rng(seed)
     half = 80.0 + HALO + 60.0
     fields = {tile: _field(rng, half) for tile in grid}
-    made = {tile: cropped(blended(fields, tile, grid), half=80.0 + 60.0) for tile in grid}
+    made = {tile: crop_heights(blend_heights(fields, tile, grid), half=80.0 + 60.0) for tile in grid}
     spots = rng.uniform(-60.0, 220.0, (500, 2)).round(3)
     seen = []
     for tile, field in made.items():
@@ -150,7 +157,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> CityRequest:
     request = CityRequest(Sources(EXTRACT), *CENTRE, PAIR, 0, out)
     divide_sources(request)
     for tile in PAIR:
-        plan(request, tile)
+        plan_tile(request, tile)
     return request
 
 
@@ -161,7 +168,7 @@ def _no_reading(*_: object, **__: object) -> OsmData:
 def test_a_map_is_read_again_where_it_or_a_part_of_it_is_not_what_it_was(
     planned: CityRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(city_map, "read_osm", _no_reading)
+    monkeypatch.setattr(city_region, "read_osm", _no_reading)
     key = divide_map(planned).key
     changed = tmp_path / "changed.osm.pbf"
     changed.write_bytes(EXTRACT.read_bytes() + b"\0")
@@ -170,7 +177,7 @@ def test_a_map_is_read_again_where_it_or_a_part_of_it_is_not_what_it_was(
     assert not (planned.plans / "map.json").exists()  # until it is divided
     monkeypatch.undo()
     assert divide_map(planned).key == key
-    monkeypatch.setattr(city_map, "read_osm", _no_reading)
+    monkeypatch.setattr(city_region, "read_osm", _no_reading)
     part = planned.plans / tile_name(next(iter(PAIR))) / "map.stage"
     assert part.exists()
     lost = part.rename(tmp_path / "map.stage")
@@ -183,7 +190,7 @@ def test_a_map_is_read_again_where_it_or_a_part_of_it_is_not_what_it_was(
 
 def test_a_map_is_divided_anew_for_tiles_of_another_size(tmp_path: Path) -> None:
     keys = {
-        city_map.RegionMap(CityRequest(Sources(EXTRACT), *CENTRE, grid, 0, tmp_path)).key
+        city_region.RegionMap(CityRequest(Sources(EXTRACT), *CENTRE, grid, 0, tmp_path)).key
         for grid in (TileGrid(480.0, (0, 0), (0, 0)), TileGrid(160.0, (-1, -1), (1, 1)))
     }
     assert len(keys) == 2  # of the same square
@@ -200,9 +207,9 @@ def test_streets_of_a_city_end_where_its_tiles_do(planned: CityRequest) -> None:
 def test_streets_and_kerbs_of_two_tiles_are_the_same_at_their_border(planned: CityRequest) -> None:
     around = list(PAIR)
     streets, heights = (
-        [kept_product(planned.plans / tile_name(tile), name)[0] for tile in around] for name in ("streets", "grading")
+        [load_product(planned.plans / tile_name(tile), name)[0] for tile in around] for name in ("streets", "grading")
     )
-    west, east = (seamless(PAIR, tile, streets, heights, apron=60.0) for tile in around)
+    west, east = (join_neighbours(PAIR, tile, streets, heights, apron=60.0) for tile in around)
     border = shapely.box(78.0, -80.0, 82.0, 80.0)
 
     def near(polygons: StreetPolygons, kind: str, shift: float) -> shapely.Geometry:
@@ -235,8 +242,8 @@ def test_heights_that_cover_one_tile_alone_go_on_in_the_next(tmp_path: Path) -> 
     tifffile.imwrite(dem, np.full((rows, columns), 7.0, np.float32), extratags=tags)
     request = CityRequest(Sources(EXTRACT, dem=(dem,)), *CENTRE, PAIR, 0, tmp_path / "city")
     divide_sources(request)
-    assert [plan(request, tile) for tile in PAIR] == [{}, {}]
-    west, east = (kept_product(request.plans / tile_name(tile), "grading")[0] for tile in PAIR)
+    assert [plan_tile(request, tile) for tile in PAIR] == [{}, {}]
+    west, east = (load_product(request.plans / tile_name(tile), "grading")[0] for tile in PAIR)
     assert west.smooth([[0.0, 0.0]])[0] == pytest.approx(7.0, abs=0.3)
     assert np.isfinite(east.smooth([[0.0, 0.0]])[0])
     assert west.smooth([[80.0, 0.0]])[0] == pytest.approx(east.smooth([[-80.0, 0.0]])[0], abs=0.3)
@@ -255,7 +262,7 @@ def _strip(ys: list[float], zs: list[float], *, east: bool, stuff: str = "ground
 def test_ground_meets_what_the_tile_before_it_drew() -> None:
     first = profile_of([_strip([-80.0, -10.0, 4.0, 80.0], [0.0, 0.3, 0.1, 0.0], east=True)], Side(0, 80.0))
     own = _strip([-80.0, -30.0, 4.05, 80.0], [0.0, 0.25, 0.2, 0.0], east=False)
-    fitted = conformed([own], Side(0, -80.0), first)[0]
+    fitted = fit_border([own], Side(0, -80.0), first)[0]
     met = profile_of([fitted], Side(0, -80.0))
     for one, other in ((first, met), (met, first)):
         t, z = np.r_[one.start, (one.start + one.end) / 2], np.r_[one.low, (one.low + one.high) / 2]
@@ -282,7 +289,7 @@ def test_a_kerb_stays_a_kerb() -> None:
     )
     low = _strip([-80.0, 0.0, 80.0], [0.0, 0.01, 0.0], east=False, stuff="street")
     high = _strip([-80.0, 0.0, 80.0], [0.12, 0.13, 0.12], east=False, stuff="pavement")
-    fitted = conformed([low, high], Side(0, -80.0), first)
+    fitted = fit_border([low, high], Side(0, -80.0), first)
     assert [round(float(one.positions[1, 2]), 4) for one in fitted] == [0.0, 0.12]
 
 
@@ -291,8 +298,8 @@ def test_a_drive_and_the_stone_beside_it_end_at_their_own_heights() -> None:
     first = profile_of(
         [_strip([-80.0, 4.0], [-0.06, -0.03], east=True), _strip([4.0, 80.0], [-0.08, 0.0], east=True)], Side(0, 80.0)
     )
-    drive = conformed([_strip([-80.0, 4.05], [-0.06, -0.03], east=False)], Side(0, -80.0), first)[0]
-    stone = conformed([_strip([4.05, 80.0], [-0.08, 0.0], east=False)], Side(0, -80.0), first)[0]
+    drive = fit_border([_strip([-80.0, 4.05], [-0.06, -0.03], east=False)], Side(0, -80.0), first)[0]
+    stone = fit_border([_strip([4.05, 80.0], [-0.08, 0.0], east=False)], Side(0, -80.0), first)[0]
     assert drive.positions[1, 1:].tolist() == pytest.approx([4.0, -0.03])
     assert stone.positions[0, 1:].tolist() == pytest.approx([4.0, -0.08])
 
@@ -401,7 +408,7 @@ def test_a_river_and_a_tunnel_go_on_in_the_next_tile(tmp_path: Path) -> None:
     with painted_once():
         city = build_city(request)
     assert border_findings(city, (0, 0), (1, 0), 0) == []
-    west, east = (kept_product(request.plans / tile_name(tile), BORES)[0] for tile in PAIR)
+    west, east = (load_product(request.plans / tile_name(tile), BORES)[0] for tile in PAIR)
     along = np.stack([np.linspace(70.0, 90.0, 21), np.zeros(21)], axis=1)
     floors = [np.interp(along[:, 0] - shift, one.line[:, 0], one.z) for (one,), shift in ((west, 0.0), (east, 160.0))]
     assert np.allclose(*floors, atol=1e-9)
@@ -425,7 +432,7 @@ def test_a_city_is_the_same_bytes_whatever_was_built_before(tmp_path: Path, monk
     built = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}
     shutil.rmtree(request.out / "tiles" / "0_0")
     with monkeypatch.context() as patch:
-        patch.setattr(city_map, "read_osm", _no_reading)
+        patch.setattr(city_region, "read_osm", _no_reading)
         again = build_city(request)
     assert {tile.name: tile.digest for tile in again.manifest.tiles} == digests
     kept = {name: (request.out / "tiles" / name / "build.json").stat().st_mtime_ns for name in digests}

@@ -13,9 +13,8 @@ from vico.world.heights import Decks, HeightField, Steps
 from vico.world.lanes import LaneGraph, read_lanes
 from vico.world.world import World
 from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.seams.grid import Tile, TileGrid
-from vico.worldgen.seams.mosaic import TileShape, solids_of, streets_of, write_ground
-from vico.worldgen.seams.network_cut import NetworkCutter
+from vico.worldgen.seams.joins import Tile, TileGrid
+from vico.worldgen.seams.mosaic import NetworkCutter, TileShape, solids_of, streets_of, write_ground
 
 
 def _lines(lanes: LaneGraph) -> dict[str, shapely.LineString]:

@@ -6,7 +6,7 @@ import pytest
 from vico.world.mesh import Surface
 from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, unwrap
-from vico.worldgen.photos.daylight import sun_in, without_sun
+from vico.worldgen.photos.enhancement import find_sun, remove_sunlight
 from vico.worldgen.photos.streetview.projection import texel_centres
 
 SUN = np.array([np.sin(np.radians(140)), np.cos(np.radians(140)), 1.0]) / np.sqrt(2)
@@ -52,11 +52,11 @@ def sunny(atlas: Atlas, sight: RayCaster) -> Atlas:
 def test_the_sun_is_where_it_was_and_its_shadows_go(city: tuple[Atlas, RayCaster]) -> None:
     atlas, sight = city
     photos = sunny(atlas, sight)
-    sun = sun_in(photos, sight)
+    sun = find_sun(photos, sight)
     assert sun is not None
     assert float(sun.direction @ SUN) > np.cos(np.radians(8))
     assert sun.strength == pytest.approx(1.0, abs=0.15)
-    mended = without_sun(photos, sun, sight)
+    mended = remove_sunlight(photos, sun, sight)
     full = 0.55 * (1 + np.hypot(*SUN[:2]))
 
     def error(pages: Atlas) -> float:
@@ -72,4 +72,4 @@ def test_under_clouds_there_is_no_sun(city: tuple[Atlas, RayCaster]) -> None:
     atlas, sight = city
     random = np.random.default_rng(1)
     pages = tuple(np.clip(p * 0.7 + random.normal(0, 6, p.shape), 0, 255).astype(np.uint8) for p in atlas.pages)
-    assert sun_in(Atlas(pages, atlas.inside, atlas.known, atlas.charts, atlas.texel, atlas.pieces), sight) is None
+    assert find_sun(Atlas(pages, atlas.inside, atlas.known, atlas.charts, atlas.texel, atlas.pieces), sight) is None

@@ -19,10 +19,8 @@ from vico.world.folder import read_world
 from vico.world.heights import HeightField
 from vico.world.world import World, detected_objects
 from vico.worldgen.objects.detections import DetectedThings, detected_classes, things_from_detections
-from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources, packaged_extract
 
 FRAME = LocalFrame(60.169, 24.9435)
 GROUND = HeightField.flat(60.0)

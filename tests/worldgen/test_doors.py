@@ -14,18 +14,18 @@ from vico.world.check.outdoors import entrance_findings
 from vico.world.heights import HeightField
 from vico.world.model import Building
 from vico.world.walkable import BLOCKED, OPEN, WalkableMap
-from vico.worldgen.places.doors import Finder
+from vico.worldgen.places.doors import DoorFinder
 
 HALF = 40.0
 EMPTY = OsmData(LocalFrame(48.0, 11.0), HALF, 60.0, [], [], [], [])
 
 
-def finder_of(ring: Sequence[tuple[float, float]], walkable: WalkableMap) -> tuple[Finder, Building]:
+def finder_of(ring: Sequence[tuple[float, float]], walkable: WalkableMap) -> tuple[DoorFinder, Building]:
     house = Building(
         id="w1", entity=1000, name=None, use="residential", footprint=[list(ring)], base=0.0, height=9.0, levels=3,
         roof_shape="flat", colour="#808080", accessible=False, tags={},
     )  # fmt: skip
-    return Finder(EMPTY, [house], walkable, HeightField.flat(HALF)), house
+    return DoorFinder(EMPTY, [house], walkable, HeightField.flat(HALF)), house
 
 
 def free_map() -> WalkableMap:

@@ -8,9 +8,8 @@ from scipy.ndimage import gaussian_filter
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.worldgen.photos.atlas import Atlas, Chart
-from vico.worldgen.photos.enhance.back_projection import BackProjection
-from vico.worldgen.photos.enhance.exemplar import exemplar_fill, pull_push
-from vico.worldgen.photos.enhance.steps import evened, inpainted, padded, upscaled
+from vico.worldgen.photos.enhancement import BackProjection, even_out_light, inpaint_atlas, pad_gutters, upscale_atlas
+from vico.worldgen.photos.exemplar_fill import exemplar_fill, pull_push
 
 
 def facade(height: int = 96, width: int = 160) -> np.ndarray:
@@ -75,13 +74,13 @@ def test_an_atlas_is_filled_and_photos_stay_told_from_guesses() -> None:
     missing = np.zeros(picture.shape[:2], bool)
     missing[30:60, 60:100] = True
     atlas = one_page(picture, missing)
-    done = inpainted(atlas)
+    done = inpaint_atlas(atlas)
     (placed,) = done.charts
     assert (done.pages[0][placed.box][::-1][~missing] == picture[~missing]).all()
     assert psnr(done.pages[0][placed.box][::-1][missing], picture[missing]) > 20
     assert done.known[0] is atlas.known[0]
     assert (atlas.pages[0][~atlas.known[0]] == (255, 0, 255)).all(), "the atlas given is as it was"
-    smooth = padded(done)
+    smooth = pad_gutters(done)
     gutter = smooth.pages[0][4:8, 8 : 8 + placed.width].astype(int)
     assert np.abs(gutter - smooth.pages[0][8, 8 : 8 + placed.width]).mean() < 20, "the edge goes on in the gutter"
     assert not (smooth.pages[0] == (255, 0, 255)).all(axis=2).any()
@@ -95,7 +94,7 @@ def test_a_chart_without_photos_takes_its_neighbours_colour() -> None:
         inside[placed.box] = True
         if k != 1:
             known[placed.box], page[placed.box] = True, (200, 100, 40 * k)
-    done = inpainted(Atlas((page,), (inside,), (known,), charts, 0.1, 3))
+    done = inpaint_atlas(Atlas((page,), (inside,), (known,), charts, 0.1, 3))
     assert (done.pages[0][charts[1].box] == (200, 100, 0)).all()
 
 
@@ -107,7 +106,7 @@ def test_super_resolution_beats_bicubic_and_keeps_the_charts_in_place() -> None:
     made = BackProjection()(coarse)
     assert psnr(made, sharp) > psnr(bicubic, sharp) + 0.5
     atlas = one_page(coarse, np.zeros(coarse.shape[:2], bool))
-    fine = upscaled(atlas)
+    fine = upscale_atlas(atlas)
     (old,), (new,) = atlas.charts, fine.charts
     assert (new.x, new.y, new.width, new.height) == (16, 16, 160, 96)
     np.testing.assert_allclose(new.right * new.width, old.right * old.width)
@@ -127,13 +126,13 @@ def test_plug_ins_that_answer_wrongly_and_pages_too_large_are_refused() -> None:
             return image[1:]
 
     with pytest.raises(InputError, match="Shrinks"):
-        inpainted(atlas, inpainter=Shrinks())
+        inpaint_atlas(atlas, inpainter=Shrinks())
     with pytest.raises(InputError, match="Shrinks"):
-        upscaled(atlas, upscaler=Shrinks())
+        upscale_atlas(atlas, upscaler=Shrinks())
     with pytest.raises(InputError, match="powers of two"):
-        upscaled(atlas, upscaler=BackProjection(factor=3))
+        upscale_atlas(atlas, upscaler=BackProjection(factor=3))
     with pytest.raises(InputError, match="pages of 128 at most"):
-        upscaled(atlas, upscaler=BackProjection(factor=64))
+        upscale_atlas(atlas, upscaler=BackProjection(factor=64))
 
 
 def test_walls_in_the_shade_of_the_day_become_as_bright_as_those_in_the_sun() -> None:
@@ -145,7 +144,7 @@ def test_walls_in_the_shade_of_the_day_become_as_bright_as_those_in_the_sun() ->
         placed = chart(0, 4 + 30 * k, 4, 20, 20, entity=k + 1)
         charts.append(Chart(**{**vars(placed), "normal": normal}))
         page[placed.box], inside[placed.box] = round(110 * np.exp(0.4 * normal[1])), True
-    done = evened(Atlas((page,), (inside,), (inside.copy(),), tuple(charts), 0.1, 16))
+    done = even_out_light(Atlas((page,), (inside,), (inside.copy(),), tuple(charts), 0.1, 16))
     before = [int(page[c.box].mean()) for c in charts]
     after = [int(done.pages[0][c.box].mean()) for c in charts]
     assert max(before) / min(before) > 2.1

@@ -11,7 +11,7 @@ import pytest
 
 from vico.errors import InputError, MissingExtraError, SchemaError
 from vico.seeds import rng
-from vico.worldgen.photos.enhance.plugins import DiffusionInpainter, DiffusionUpscaler, PatchMatchFill, RealEsrgan
+from vico.worldgen.photos.enhancement_plugins import DiffusionInpainter, DiffusionUpscaler, PatchMatchFill, RealEsrgan
 
 
 def holed() -> tuple[np.ndarray, np.ndarray]:

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from vico.world.glb import packed_png
-from vico.worldgen import kept_textures
+from vico.worldgen import texture_canvas
 from vico.worldgen.facades.textures import materials
 from vico.worldgen.facades.textures.materials import material
-from vico.worldgen.kept_textures import Painters
+from vico.worldgen.texture_canvas import TextureCache
 
 NAMES = ["wall_brick", "doors", "roof_tiles", "dormer"]
 
@@ -24,8 +24,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "textures"
 
 
-def painters() -> Painters:
-    return Painters(materials.__file__, materials.__name__)
+def painters() -> TextureCache:
+    return TextureCache(materials.__file__, materials.__name__)
 
 
 def picture() -> np.ndarray:
@@ -73,6 +73,6 @@ def test_without_a_cache_pictures_are_painted_as_ever(tmp_path: Path, monkeypatc
 
 
 def test_few_folders_are_kept(cache: Path) -> None:
-    for k in range(kept_textures._KEPT + 3):
+    for k in range(texture_canvas._KEPT_FOLDERS + 3):
         painters().picture("wall", picture, data=str(k))
-    assert len(list(cache.iterdir())) == kept_textures._KEPT
+    assert len(list(cache.iterdir())) == texture_canvas._KEPT_FOLDERS

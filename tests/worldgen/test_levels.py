@@ -23,7 +23,7 @@ from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import is_traffic_street, streets_from_osm
-from vico.worldgen.transit.drive import Kerbs
+from vico.worldgen.transit.bus_lines import Kerbs
 
 HALF = 180.0
 

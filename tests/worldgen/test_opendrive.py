@@ -14,7 +14,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.world.heights import HeightField
 from vico.world.opendrive import Curve, elevation, lane_borders, offset_point, opendrive_findings, reference_line
-from vico.worldgen.streets.opendrive import SHORTEST, sound_opendrive
+from vico.worldgen.streets.opendrive import SHORTEST, repair_opendrive
 
 _HOUSE = shapely.box(-5, 30, 5, 40)
 
@@ -119,7 +119,7 @@ def test_a_junction_that_is_not_there_is_no_longer_named(roads: bytes) -> None:
     broken = roads.replace(f'<successor elementType="junction" elementId="{kept}"'.encode(), b'<successor elementType='
                            b'"junction" elementId="77777"', 1)  # fmt: skip
     assert "opendrive link" in _rules(broken)
-    assert _rules(sound_opendrive(broken)) == set()
+    assert _rules(repair_opendrive(broken)) == set()
 
 
 def test_a_street_of_no_length_is_lengthened(roads: bytes) -> None:
@@ -127,7 +127,7 @@ def test_a_street_of_no_length_is_lengthened(roads: bytes) -> None:
     street = next(road for road in _driving(root, inside=False) if road.find("link/successor") is not None)
     old = street.find("planView/geometry").get("length")  # type: ignore[union-attr]
     broken = roads.replace(f'length="{old}"'.encode(), b'length="0.01000000"')
-    mended = sound_opendrive(broken)
+    mended = repair_opendrive(broken)
     assert _rules(mended) == set()
     found = {road.get("id"): road for road in fromstring(mended).findall("road")}[street.get("id")]
     assert float(found.get("length", "0")) == pytest.approx(SHORTEST, abs=0.3)
@@ -136,7 +136,7 @@ def test_a_street_of_no_length_is_lengthened(roads: bytes) -> None:
 def test_streets_lie_on_the_ground() -> None:
     axis = np.linspace(-60, 60, 61)
     slope = HeightField(np.tile(0.05 * axis, (61, 1)).astype(np.float32), 60.0)
-    content = sound_opendrive(network_of(_junction()).xodr or b"", slope)
+    content = repair_opendrive(network_of(_junction()).xodr or b"", slope)
     assert _rules(content) == set()
     for road in _driving(fromstring(content), inside=False):
         along = 0.0

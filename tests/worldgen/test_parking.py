@@ -16,10 +16,10 @@ from vico.world.transit import Transit
 from vico.worldgen.facts.site import SiteFacts, site_facts
 from vico.worldgen.facts.streets import Street, StreetPolygons, kerb_bays, lot_bays
 from vico.worldgen.objects.parking import Parking, parking_from_osm
+from vico.worldgen.streets.lane_shapes import CarriagewayEdges
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import streets_from_osm
-from vico.worldgen.streets.walk_lines import CarriagewayEdges
 
 NO_TRANSIT = Transit(stops=[], lines=[], bike_stations=[], origin={})
 PARKING = {"highway": "residential", "parking:lane:both": "parallel"}

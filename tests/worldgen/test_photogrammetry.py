@@ -30,8 +30,7 @@ from vico.worldgen.facts.building_plans import BuildingPlan, BuildingPlans
 from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.ground.terrain import on_ground, terrain_from_tiles
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 80.0

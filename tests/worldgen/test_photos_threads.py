@@ -9,14 +9,8 @@ from vico.threads import WORKERS
 from vico.world.glb import glb_bytes
 from vico.world.mesh import Surface
 from vico.worldgen.photos import baking
-from vico.worldgen.photos.texturing import (
-    Texturing,
-    enhanced,
-    kept_where_photographed,
-    mesh_of,
-    painted_from_tiles,
-)
-from vico.worldgen.product import digest_of
+from vico.worldgen.photos.texturing import Texturing, enhance, keep_photographed_faces, mesh_of, paint_from_tiles
+from vico.worldgen.stages import digest_of
 
 pytest.importorskip("embreex", reason="baking casts rays with embreex")
 
@@ -60,8 +54,8 @@ def test_photos_are_the_same_bytes_however_many_threads_paint_them(
     for many, batch in (("1", 1 << 17), ("2", 1 << 11), ("5", 1 << 9)):
         monkeypatch.setenv(WORKERS, many)
         monkeypatch.setattr(baking, "_BATCH", batch)
-        painted = painted_from_tiles(walls, [], mesh, texel=0.3)
-        done = enhanced(painted, Texturing(texel=0.3, upscale=upscale))
+        painted = paint_from_tiles(walls, [], mesh, texel=0.3)
+        done = enhance(painted, Texturing(texel=0.3, upscale=upscale))
         assert painted.counts["texels_known"] > 0.7 * painted.counts["texels"]
         assert done.counts["texels_filled"] > 0.05 * painted.counts["texels"]
         assert not np.shares_memory(done.atlas.pages[0], painted.atlas.pages[0])
@@ -72,8 +66,8 @@ def test_photos_are_the_same_bytes_however_many_threads_paint_them(
 def test_faces_that_photos_hardly_cover_go_at_once_or_afterwards() -> None:
     walls = houses()
     mesh = photographed(walls)
-    later = kept_where_photographed(walls, [], painted_from_tiles(walls, [], mesh, texel=0.3), least=0.7)
-    at_once = painted_from_tiles(walls, [], mesh, texel=0.3, least=0.7)
+    later = keep_photographed_faces(walls, [], paint_from_tiles(walls, [], mesh, texel=0.3), least=0.7)
+    at_once = paint_from_tiles(walls, [], mesh, texel=0.3, least=0.7)
     assert 0 < len(at_once.atlas.charts) < at_once.counts["charts"]
     assert digest_of(at_once) == digest_of(later)
-    assert kept_where_photographed(walls, [], at_once, least=0.7) is at_once
+    assert keep_photographed_faces(walls, [], at_once, least=0.7) is at_once

@@ -10,8 +10,7 @@ from vico.world.folder import read_world
 from vico.world.world import World
 from vico.worldgen import recipe
 from vico.worldgen.pipeline import build_world, extract_centre
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 CENTRE = {"lat": 60.1690, "lon": 24.9435}

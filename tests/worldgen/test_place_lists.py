@@ -8,7 +8,7 @@ import pytest
 
 from command_line import vico
 from vico.errors import InputError
-from vico.worldgen.place_lists import place_lists, rows_of
+from vico.worldgen.batch import place_lists, rows_of
 
 
 def test_there_are_35_places_in_at_least_17_countries_each_in_its_own_country() -> None:

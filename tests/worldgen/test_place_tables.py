@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vico.errors import SchemaError
-from vico.worldgen.place_tables import PlaceTable, read_place_table
+from vico.worldgen.batch import PlaceTable, read_place_table
 
 
 def read(tmp_path: Path, content: str | bytes) -> PlaceTable:

@@ -11,7 +11,7 @@ from vico.errors import SchemaError
 from vico.world.model import Category
 from vico.worldgen.facts import named_places
 from vico.worldgen.facts.named_places import category_of
-from vico.worldgen.places.kinds import meaning_of
+from vico.worldgen.places.stage import meaning_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "adding_a_place.md"
 

@@ -18,9 +18,7 @@ from vico.world.model import Category, Dropped, Entrance, Place
 from vico.world.world import World
 from vico.worldgen.facts.named_places import NamedPlace, named_places
 from vico.worldgen.facts.site import site_facts
-from vico.worldgen.places.found import compared, likeness
-from vico.worldgen.places.kinds import meaning_of
-from vico.worldgen.places.stage import places_from_osm
+from vico.worldgen.places.stage import compare_places, likeness, meaning_of, places_from_osm
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +116,7 @@ def test_shops_of_a_street_have_doors_of_their_own(osm: OsmData, helsinki: World
 
 def test_a_vague_kind_is_refined() -> None:
     shop = NamedPlace("n1", "Kauppa Virta", Category.STORE, "shop", np.zeros(2), {}, None)
-    told = compared([shop], [_found("Kauppa Virta", (1.0, 1.0), "shoe_store")])
+    told = compare_places([shop], [_found("Kauppa Virta", (1.0, 1.0), "shoe_store")])
     assert told.refined["n1"].kind == "shoes"
 
 

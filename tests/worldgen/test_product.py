@@ -20,7 +20,7 @@ from vico.errors import SchemaError
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import Category, Dropped
-from vico.worldgen.product import digest_of, read_head, read_product, write_product
+from vico.worldgen.stages import digest_of, read_head, read_product, write_product
 
 LEAVES = st.none() | st.booleans() | st.integers(-(2**50), 2**50) | st.floats(allow_nan=False) | st.text(max_size=8)
 TREES = st.recursive(
@@ -89,7 +89,7 @@ def test_arrays_of_any_layout_come_back_and_can_be_written_to(tmp_path: Path, ar
 
 
 def test_a_digest_is_the_same_in_another_process() -> None:
-    code = "from vico.worldgen.product import digest_of; print(digest_of({'a': [1, 2.5], 'b': {'x', 'y', 'z'}}))"
+    code = "from vico.worldgen.stages import digest_of; print(digest_of({'a': [1, 2.5], 'b': {'x', 'y', 'z'}}))"
     other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
     assert other == digest_of({"a": [1, 2.5], "b": {"x", "y", "z"}})
 

@@ -14,7 +14,7 @@ from vico.geo.gtfs_feed import Feed, GtfsRoute, GtfsStop, Pattern
 from vico.world.heights import HeightField
 from vico.world.transit import TRAM_LENGTH, Track
 from vico.worldgen.facts.site import site_facts
-from vico.worldgen.transit.rails import trams_from_osm
+from vico.worldgen.transit.routes import trams_from_osm
 
 FLAT = HeightField.flat(HALF)
 

@@ -24,13 +24,13 @@ from vico.world.check.world import check_dropped
 from vico.world.folder import read_world
 from vico.world.model import FAILED, TRIED, Dropped, StageReport
 from vico.world.world import World
-from vico.worldgen import laying, recipe
+from vico.worldgen import construction, recipe
 from vico.worldgen.facades import fronts
 from vico.worldgen.indoor import stage as indoor
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
 from vico.worldgen.stages import Stages
-from vico.worldgen.transit import bikes
+from vico.worldgen.transit import stage
 
 HALF = 100.0
 FRAME = LocalFrame(48.0, 11.0)
@@ -129,10 +129,10 @@ def whole(place: Place, tmp_path_factory: pytest.TempPathFactory) -> World:
 def lost(world: World) -> dict[str, set[str]]:
     """Ids of what could not be made, by stage."""
     found: dict[str, set[str]] = {}
-    for stage in world.manifest.stages:
-        for dropped in stage.dropped:
+    for step in world.manifest.stages:
+        for dropped in step.dropped:
             if dropped.reason.startswith(FAILED):
-                found.setdefault(stage.name, set()).add(dropped.id)
+                found.setdefault(step.name, set()).add(dropped.id)
     return found
 
 
@@ -263,7 +263,7 @@ def test_what_fails_without_the_geometry_engine_costs_those_objects_alone(
         return failing
 
     with (
-        mock.patch.object(bikes, "_off_the_lanes", fails_for(bikes._off_the_lanes, "bicycles")),
+        mock.patch.object(stage, "_off_the_lanes", fails_for(stage._off_the_lanes, "bicycles")),
         mock.patch.object(indoor, "_plan", fails_for(indoor._plan, "shop")),
     ):
         world = built(place, tmp_path / "world")
@@ -308,7 +308,7 @@ def test_a_stage_that_fails_as_a_whole_says_which_one_and_where(
         raise GEOSException("TopologyException: side location conflict\nat 1 2")
 
     out = tmp_path / "world"
-    with mock.patch.object(laying, "ground_from_osm", refuse):
+    with mock.patch.object(construction, "ground_from_osm", refuse):
         code = vico("world", "build", "--osm", place.path, "--center", "48,11", "--radius", 60, "--out", out)
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert code == 2

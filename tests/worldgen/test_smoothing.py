@@ -4,7 +4,7 @@ import numpy as np
 
 from road_city import road_city
 from vico.world.lanes import LaneGraph
-from vico.worldgen.streets.smoothing import rounded, without_kinks
+from vico.worldgen.streets.lane_shapes import round_corners, smooth_lanes
 
 
 def _turns(line: np.ndarray) -> np.ndarray:
@@ -26,11 +26,11 @@ def _jumps(lanes: LaneGraph, least: float) -> int:
 
 def test_a_rounded_corner_keeps_its_ends_and_stays_near_its_corner() -> None:
     corner = np.array([(0.0, 0.0), (30.0, 0.0), (30.0, 25.0)])
-    line = rounded(corner)
+    line = round_corners(corner)
     assert np.array_equal(line[[0, -1]], corner[[0, -1]])
     assert np.degrees(_turns(line)).max() < 15.0
     assert np.hypot(*(line - corner[1]).T).min() < 0.85
-    assert np.array_equal(rounded(corner[:2]), corner[:2])
+    assert np.array_equal(round_corners(corner[:2]), corner[:2])
 
 
 def test_paths_of_central_helsinki_have_hardly_a_kink() -> None:
@@ -40,9 +40,9 @@ def test_paths_of_central_helsinki_have_hardly_a_kink() -> None:
 
 def test_smooth_lanes_stay_as_they_are_and_the_rest_of_the_file_too() -> None:
     net = road_city().network.net_xml
-    again = without_kinks(net)
+    again = smooth_lanes(net)
     assert again.count(b"<lane ") == net.count(b"<lane ")
     assert again.count(b"<connection ") == net.count(b"<connection ")
-    assert without_kinks(b'<net><edge id="a"><lane id="a_0" length="5.0" shape="0,0 5,0"/></edge></net>') == (
+    assert smooth_lanes(b'<net><edge id="a"><lane id="a_0" length="5.0" shape="0,0 5,0"/></edge></net>') == (
         b'<net><edge id="a"><lane id="a_0" length="5.0" shape="0,0 5,0"/></edge></net>'
     )

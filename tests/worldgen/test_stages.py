@@ -14,10 +14,10 @@ from command_line import vico
 from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
 from vico.world.world import World
-from vico.worldgen import laying, recipe, shaping
+from vico.worldgen import construction, recipe
+from vico.worldgen.batch import read_place_table
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.pipeline import build_world, rebuild_world
-from vico.worldgen.place_tables import read_place_table
 from vico.worldgen.request import BuildOptions
 from vico.worldgen.stages import Stages
 
@@ -80,13 +80,13 @@ def test_a_stopped_build_goes_on_and_gives_the_same_world(
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    real = shaping.buildings_from_plans
+    real = construction.buildings_from_plans
 
     def counted(*inputs: object, **options: object) -> object:
         ran.append("buildings")
         return real(*inputs, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(shaping, "buildings_from_plans", counted)
+    monkeypatch.setattr(construction, "buildings_from_plans", counted)
     with monkeypatch.context() as patch:
         patch.setattr(recipe, "furnish", stop)
         with pytest.raises(KeyboardInterrupt):
@@ -103,7 +103,7 @@ def test_one_stage_runs_alone_and_changes_nothing_else(
     shutil.copytree(corner_path, tmp_path / "w", symlinks=True)
     ran: list[str] = []
     for name in ("buildings_from_plans", "objects_from_osm", "ground_from_osm", "furnish"):
-        room = next(room for room in (shaping, laying, recipe) if hasattr(room, name))
+        room = next(room for room in (construction, construction, recipe) if hasattr(room, name))
         real = getattr(room, name)
 
         def counted(*inputs: object, name: str = name, real: object = real, **options: object) -> object:

@@ -24,7 +24,7 @@ from vico.worldgen.ground.pavings import LOOKS, look_of
 from vico.worldgen.ground.stage import street_bearing, tactile_fields, tree_pits
 from vico.worldgen.ground.wires import CONTACT, contact_wires
 from vico.worldgen.objects.mapped_objects import thing_of
-from vico.worldgen.streets.crossings import crossings_of
+from vico.worldgen.streets.polygons import crossings_of
 
 WINDOW = shapely.box(-100.0, -100.0, 100.0, 100.0)
 YELLOW = (226, 184, 70)

@@ -13,16 +13,22 @@ from vico.render import Cameras, Scene, render
 from vico.seeds import rng
 from vico.world.mesh import Surface
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.photos.atlas import Atlas, textured, unwrap
-from vico.worldgen.photos.streetview.blending import Blending, Layer, paint_chart
-from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, PhotoView, StandingDifferences
+from vico.worldgen.photos.atlas import Atlas, unwrap, with_atlas_pages
+from vico.worldgen.photos.streetview.masking import (
+    FastMarchingFill,
+    LanguageGroundedMovers,
+    PatchFill,
+    PhotoView,
+    StandingDifferences,
+    colour_curve,
+    lab_of,
+    rgb_of,
+)
 from vico.worldgen.photos.streetview.matching import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
-from vico.worldgen.photos.streetview.painting import FastMarching, Patches, colour_curve, lab_of, rgb_of
-from vico.worldgen.photos.streetview.photo import Photographer, StreetviewConfig, above_ground
-from vico.worldgen.photos.streetview.pose import Pose, correction
-from vico.worldgen.photos.streetview.projection import Shot
-from vico.worldgen.photos.streetview.reprojection import reproject
-from vico.worldgen.product import digest_of
+from vico.worldgen.photos.streetview.projection import BlendingConfig, CameraLayer, Shot, paint_chart
+from vico.worldgen.photos.streetview.registration import Pose, correction
+from vico.worldgen.photos.streetview.reprojection import Photographer, StreetviewConfig, above_ground, reproject
+from vico.worldgen.stages import digest_of
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 pytest.importorskip("embreex", reason="embreex is the extra photos")
@@ -82,7 +88,7 @@ def street() -> Street:
 
 
 def photographer(atlas: Atlas, extra: tuple[Surface, ...] = ()) -> Photographer:
-    scene = Scene([GROUND, *textured(street().walls, atlas), *extra])
+    scene = Scene([GROUND, *with_atlas_pages(street().walls, atlas), *extra])
 
     def take(position, rotation, intrinsics, width, height):  # type: ignore[no-untyped-def]
         fov = 2 * np.arctan(height / 2 / intrinsics[1, 1])
@@ -222,8 +228,8 @@ def test_a_camera_that_sees_a_speck_of_a_wall_leaves_it_as_it_is() -> None:
     shot = Shot("a", photo().picture, masked, TRUE, LENS, depth)
     flat = colour_curve(lab_of(photo().picture[:20, :20].reshape(-1, 3)), np.tile(np.float32([50, 0, 0]), (9, 1)))
     for k, chart in enumerate(s.model.charts):
-        how = Blending(farthest=60.0, steepest=1.3, feather=0.5, unshade=1.0)
-        colour, _, given, _ = paint_chart(s.model, k, [Layer(shot, flat, np.zeros(3))], s.sight, how)
+        how = BlendingConfig(farthest=60.0, steepest=1.3, feather=0.5, unshade=1.0)
+        colour, _, given, _ = paint_chart(s.model, k, [CameraLayer(shot, flat, np.zeros(3))], s.sight, how)
         assert given == [0]
         assert (colour == s.model.pages[chart.page][chart.box]).all()
 
@@ -282,10 +288,10 @@ def test_painting_over_leaves_the_rest() -> None:
     mask = np.zeros((40, 60), np.bool_)
     mask[10:20, 20:30] = True
     holed = np.where(mask[..., None], 255, picture).astype(np.uint8)
-    filled = FastMarching()(holed, mask)
+    filled = FastMarchingFill()(holed, mask)
     assert (filled[~mask] == picture[~mask]).all()
     assert np.abs(filled[mask].astype(int) - picture[mask]).mean() < 25
-    assert FastMarching()(picture, np.zeros_like(mask)) is picture
+    assert FastMarchingFill()(picture, np.zeros_like(mask)) is picture
 
 
 def test_patches_fill_a_pattern() -> None:
@@ -293,7 +299,7 @@ def test_patches_fill_a_pattern() -> None:
     picture = np.kron(np.indices((16, 16)).sum(axis=0) % 2, np.ones((8, 8)))[..., None].repeat(3, axis=2) * 200
     mask = np.zeros(picture.shape[:2], np.bool_)
     mask[40:64, 40:64] = True
-    filled = Patches()(np.where(mask[..., None], 90, picture).astype(np.uint8), mask)
+    filled = PatchFill()(np.where(mask[..., None], 90, picture).astype(np.uint8), mask)
     assert np.abs(filled.astype(float) - picture)[mask].mean() < 60
 
 
@@ -331,7 +337,7 @@ def test_plug_ins_say_what_to_install(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_a_configuration_and_a_report_can_be_kept_as_a_stage_s_product() -> None:
     s = street()
     outcome = reproject(s.model, [], photographer(s.model), s.sight)[1]
-    assert digest_of(StreetviewConfig()) != digest_of(StreetviewConfig(painter=Patches()))
+    assert digest_of(StreetviewConfig()) != digest_of(StreetviewConfig(painter=PatchFill()))
     assert digest_of(outcome) == digest_of(outcome)
 
 

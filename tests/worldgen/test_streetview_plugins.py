@@ -7,7 +7,7 @@ import pytest
 
 from vico.errors import MissingFileError, SchemaError
 from vico.seeds import rng
-from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, PhotoView
+from vico.worldgen.photos.streetview.masking import LanguageGroundedMovers, PhotoView
 from vico.worldgen.photos.streetview.matching import LoftrMatcher, XfeatMatcher
 
 pytest.importorskip("cv2", reason="OpenCV is the extra photos")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from vico.geo.street_images import camera_rotation, pinhole, rotation_from_axis_angle
 from vico.seeds import rng
 from vico.worldgen.photos.streetview.matching import Matches
-from vico.worldgen.photos.streetview.pose import Pose, correction, fit_pose, lifted, projected, se3_norm
+from vico.worldgen.photos.streetview.registration import Pose, correction, fit_pose, project, se3_norm, unproject
 
 pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 
@@ -31,8 +31,8 @@ def matches_of(true: Pose, *, count: int = 150, wrong: float = 0.3, noise: float
     """Points of the prior's view as the true camera sees them; some are matched with just anything."""
     random = rng(0, "matches")
     xy = random.uniform((4, 4), (WIDTH - 4, HEIGHT - 4), (count, 2))
-    world, _ = lifted(xy, depth_of_corner(PRIOR), PRIOR, LENS)
-    photo = projected(world, true, LENS) + random.normal(0, noise, xy.shape)
+    world, _ = unproject(xy, depth_of_corner(PRIOR), PRIOR, LENS)
+    photo = project(world, true, LENS) + random.normal(0, noise, xy.shape)
     bad = random.random(count) < wrong
     photo[bad] += random.uniform(-30, 30, (bad.sum(), 2))
     return Matches(xy, photo, np.ones(count))
@@ -77,7 +77,7 @@ def test_matches_by_chance_find_few_that_agree() -> None:
 def test_points_beside_an_edge_have_no_clear_depth() -> None:
     depth = np.full((20, 20), 10.0, np.float32)
     depth[:, 10:] = 30.0
-    _, clear = lifted(np.array([[5.5, 5.5], [9.5, 5.5], [10.5, 5.5], [15.5, 5.5]]), depth, PRIOR, LENS)
+    _, clear = unproject(np.array([[5.5, 5.5], [9.5, 5.5], [10.5, 5.5], [15.5, 5.5]]), depth, PRIOR, LENS)
     assert clear.tolist() == [True, False, False, True]
 
 

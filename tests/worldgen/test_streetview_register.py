@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from vico.geo.street_images import camera_rotation
 from vico.seeds import rng
 from vico.worldgen.photos.atlas import Chart
-from vico.worldgen.photos.streetview.pose import Pose
-from vico.worldgen.photos.streetview.registration import agreement, nudge_of
+from vico.worldgen.photos.streetview.registration import Pose, agreement, nudge_of
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 

@@ -10,18 +10,25 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, MissingExtraError, MissingFileError
 from vico.world.mesh import Surface
-from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers
+from vico.worldgen.photos.streetview.masking import LanguageGroundedMovers
 from vico.worldgen.photos.streetview.matching import LoftrMatcher, SiftMatcher, XfeatMatcher
-from vico.worldgen.photos.texturing import Painted, Texturing, enhanced, mesh_of, painted_from_tiles, streetview_config
+from vico.worldgen.photos.texturing import (
+    PhotoSurfaces,
+    Texturing,
+    enhance,
+    mesh_of,
+    paint_from_tiles,
+    streetview_config,
+)
 
 
 @pytest.fixture(scope="module")
-def painted() -> Painted:
+def painted() -> PhotoSurfaces:
     """A wall of 12 m x 6 m, photographed; a square of it is not."""
     pytest.importorskip("embreex", reason="casts rays")
     points = np.array([[0, 0, 0], [12, 0, 0], [12, 0, 6], [0, 0, 6]], float)
     wall = Surface.from_triangles(points, np.array([[0, 1, 2], [0, 2, 3]]), entity=7, colour=(200, 120, 90))
-    found = painted_from_tiles([wall], [], mesh_of([wall]), texel=0.1)
+    found = paint_from_tiles([wall], [], mesh_of([wall]), texel=0.1)
     known = tuple(mask.copy() for mask in found.atlas.known)
     pages = tuple(page.copy() for page in found.atlas.pages)
     chart = found.atlas.charts[0]
@@ -31,14 +38,14 @@ def painted() -> Painted:
     return replace(found, atlas=replace(found.atlas, known=known, pages=pages))
 
 
-def hole_of(painted: Painted) -> NDArray[np.uint8]:
+def hole_of(painted: PhotoSurfaces) -> NDArray[np.uint8]:
     chart = painted.atlas.charts[0]
     return painted.atlas.pages[chart.page][chart.y + 22 : chart.y + 28, chart.x + 42 : chart.x + 58]
 
 
-def test_holes_are_filled_or_stay_grey_as_asked(painted: Painted) -> None:
-    grey = enhanced(painted, Texturing(inpaint="none"))
-    filled = enhanced(painted, Texturing())
+def test_holes_are_filled_or_stay_grey_as_asked(painted: PhotoSurfaces) -> None:
+    grey = enhance(painted, Texturing(inpaint="none"))
+    filled = enhance(painted, Texturing())
     assert (hole_of(grey) == 128).all()
     assert np.abs(hole_of(filled).astype(int) - (200, 120, 90)).max() <= 2
     assert filled.counts["texels_filled"] == 200

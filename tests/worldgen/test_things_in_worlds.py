@@ -15,7 +15,7 @@ from vico.io.files import sha256_of, write_json
 from vico.world.glb import write_glb
 from vico.world.objects import Objects
 from vico.worldgen.objects.stage import models_of
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import Sources
 
 
 def _row(prototype: str, k: int) -> dict[str, object]:

@@ -15,7 +15,7 @@ from vico.world.lanes import LaneGraph
 from vico.world.transit import Line, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import empty_network
-from vico.worldgen.transit.plan import as_many, times_as_wide
+from vico.worldgen.transit.bus_lines import scaled_by_area, width_in_districts
 from vico.worldgen.transit.stage import BUS_LENGTH, transit_from_osm
 
 
@@ -116,11 +116,11 @@ def test_planned_racks_stand_in_a_rectangle_as_many_as_its_area_takes() -> None:
 def test_places_have_lines_by_their_area_as_long_as_their_longer_side_asks_for(wide: float, high: float) -> None:
     half = max(wide, high)
     osm = replace(road_city().osm, half=half, edges=(-half, 10.0 - high, wide - half, 10.0))
-    assert times_as_wide(osm) == pytest.approx(max(1.0, max(wide, high) / 1200.0))
-    assert as_many(3, osm) == pytest.approx(max(3.0, 3.0 * wide * high / 1200.0**2), abs=0.51)
+    assert width_in_districts(osm) == pytest.approx(max(1.0, max(wide, high) / 1200.0))
+    assert scaled_by_area(3, osm) == pytest.approx(max(3.0, 3.0 * wide * high / 1200.0**2), abs=0.51)
     square = replace(osm, edges=None)
-    assert times_as_wide(square) == max(1.0, half / 600.0)
-    assert as_many(3, square) == round(3 * times_as_wide(square) ** 2)
+    assert width_in_districts(square) == max(1.0, half / 600.0)
+    assert scaled_by_area(3, square) == round(3 * width_in_districts(square) ** 2)
 
 
 def test_a_window_with_one_street_has_a_line_up_and_down() -> None:

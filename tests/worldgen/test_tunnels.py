@@ -19,7 +19,7 @@ from vico.world.lanes import LaneGraph
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.ground.grade_separation import Bridges, bridges_of
 from vico.worldgen.ground.grading import grade_ground
-from vico.worldgen.ground.stage import APRON, ground_from_osm
+from vico.worldgen.ground.stage import GROUND_APRON, ground_from_osm
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.ground.tunnels import HEADROOM
@@ -27,7 +27,7 @@ from vico.worldgen.ground.yards import Yards
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import UNDERGROUND, is_traffic_street, roads_from_osm, streets_from_osm
-from vico.worldgen.transit.drive import Kerbs
+from vico.worldgen.transit.bus_lines import Kerbs
 
 HALF = 180.0
 
@@ -115,7 +115,7 @@ def test_the_ground_is_open_over_the_ways_in_and_nowhere_else() -> None:
     site = site_facts(_town())
     bare, streets = replace(height, decks=None), road_polygons(site)
     surfaces = ground_from_osm(
-        site, bare, streets, bridges, flights_of(site, bare, streets.steps), Yards(site.osm.half + APRON)
+        site, bare, streets, bridges, flights_of(site, bare, streets.steps), Yards(site.osm.half + GROUND_APRON)
     )
     x = np.arange(-66.0, 66.0, 1.5)
     corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).astype(np.float64)

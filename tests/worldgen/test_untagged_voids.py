@@ -3,7 +3,7 @@
 import numpy as np
 
 from vico.geo.elevation import HeightSamples
-from vico.worldgen.evidence import _untagged
+from vico.worldgen.evidence import _void_notes
 
 
 def samples(**patches: tuple[tuple[str, float, float, float, int, float], ...]) -> HeightSamples:
@@ -11,7 +11,7 @@ def samples(**patches: tuple[tuple[str, float, float, float, int, float], ...]) 
 
 
 def test_a_void_is_told_with_its_place_size_step_and_how_to_tag_it() -> None:
-    told = _untagged(samples(voids=(("a.tif", 46.5, 8.0, 0.0, 1240, 610.4),)))
+    told = _void_notes(samples(voids=(("a.tif", 46.5, 8.0, 0.0, 1240, 610.4),)))
     assert told == [
         (
             "a.tif",
@@ -22,11 +22,11 @@ def test_a_void_is_told_with_its_place_size_step_and_how_to_tag_it() -> None:
 
 
 def test_a_patch_that_may_be_a_sea_is_said_to_be_kept() -> None:
-    [(_, said)] = _untagged(samples(doubtful=(("a.tif", 46.5, 8.0, 0.0, 1240, 80.0),)))
+    [(_, said)] = _void_notes(samples(doubtful=(("a.tif", 46.5, 8.0, 0.0, 1240, 80.0),)))
     assert "lie 80 m below the ground on nearly all sides; so does a sea below cliffs" in said
     assert "kept" in said
 
 
 def test_many_patches_are_told_in_one_line_more() -> None:
-    told = _untagged(samples(voids=tuple(("a.tif", 46.5, 8.0, 0.0, 10, 600.0) for _ in range(40))))
+    told = _void_notes(samples(voids=tuple(("a.tif", 46.5, 8.0, 0.0, 10, 600.0) for _ in range(40))))
     assert told[-1][1].endswith("more such patches, " + f"{10 * (40 - len(told) + 1)} pixels")

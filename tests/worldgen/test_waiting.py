@@ -17,8 +17,8 @@ from vico.world.lanes import LaneGraph
 from vico.world.transit import Stop, Transit
 from vico.world.world import World
 from vico.worldgen.facts.streets import StreetPolygons
-from vico.worldgen.transit.drive import Kerbs
-from vico.worldgen.transit.waiting import _Parted, front_door, waiting_places
+from vico.worldgen.transit.bus_lines import Kerbs
+from vico.worldgen.transit.waiting import _SplitArea, front_door, waiting_places
 
 
 @pytest.fixture(scope="module")
@@ -147,10 +147,10 @@ def test_a_stop_that_cannot_be_boarded_at_is_a_finding(helsinki_city: World) -> 
 def test_what_of_a_large_pavement_lies_somewhere_is_found_without_the_rest() -> None:
     lines = [shapely.LineString([(x, 0.0), (x + 90.0, 700.0)]) for x in range(0, 900, 60)]
     pavement = shapely.union_all([line.buffer(4.0) for line in lines]).difference(shapely.box(300, 300, 340, 350))
-    parted = _Parted(pavement)
+    parted = _SplitArea(pavement)
     for x, y in ((0.0, 0.0), (100.0, 100.0), (310.0, 320.0), (455.0, 350.0), (990.0, 700.0), (2000.0, 0.0)):
         room = shapely.Point(x, y).buffer(9.0)
         found, plain = parted.within(room), pavement.intersection(room)
         assert found.symmetric_difference(plain).area < 1e-9
         assert found.is_empty == plain.is_empty
-    assert _Parted(shapely.Polygon()).within(shapely.Point(0, 0).buffer(1.0)).is_empty
+    assert _SplitArea(shapely.Polygon()).within(shapely.Point(0, 0).buffer(1.0)).is_empty

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from defusedxml.ElementTree import fromstring
 
-from vico.worldgen.streets.walk_lines import CarriagewayEdges, sidewalks_beside
+from vico.worldgen.streets.lane_shapes import CarriagewayEdges, move_sidewalks
 
 NO_WALKERS = 'disallow="pedestrian" speed="10" length="80" width="3.2"'
 WALKERS = 'allow="pedestrian" speed="10" length="80" width="2.0"'
@@ -38,7 +38,7 @@ def lanes_of(net: bytes) -> dict[str, tuple[str, shapely.LineString]]:
 
 def placed(**how: float) -> dict[str, tuple[str, shapely.LineString]]:
     kerbs = CarriagewayEdges(shapely.box(0, -3.2, 80, 3.2), [])
-    return lanes_of(sidewalks_beside(network(**how), kerbs, left_driving=False))
+    return lanes_of(move_sidewalks(network(**how), kerbs, left_driving=False))
 
 
 def test_the_left_sidewalk_of_a_one_way_street_lies_beside_its_lanes() -> None:

@@ -19,7 +19,7 @@ from vico.agents.base import AgentState
 from vico.agents.navigation.voxels import MOVING
 from vico.exact import apply_matrix
 from vico.io.compiled import compiled
-from vico.pixels import shown_in
+from vico.observation_arrays import entity_pixels
 
 #: Fewer pixels than this are not taken for a sighting.
 SIGHT = 4
@@ -99,7 +99,7 @@ def sightings(observation: Mapping[str, Any], entities: Mapping[int, Mapping[str
     entities
         What the numbers of the segmentation stand for.
     """
-    shown = shown_in(observation)
+    shown = entity_pixels(observation)
     found = []
     eye = np.asarray(observation["pose"], np.float64)[:3]
     away = np.linalg.norm(shown.position - eye, axis=1)

@@ -13,7 +13,7 @@ from vico.agents.talk.conversation import GREETING_DISTANCE, GREETING_PAUSE
 from vico.agents.talk.memory import CrowdMemory
 from vico.agents.wayfinding import Stride, stride_lengths
 from vico.clock import DAY
-from vico.crowd import Crowd
+from vico.observation_arrays import CrowdObservations
 from vico.world.walkable import WalkableMap
 
 __all__ = ["BatchResident", "Residents"]
@@ -103,7 +103,7 @@ class Residents:
         self, names: Sequence[str], observations: Mapping[str, Observation], infos: Mapping[str, Info]
     ) -> dict[str, Action | Exception]:
         """Return the members' actions for the coming second; see `vico.agents.base.GroupAgent`."""
-        crowd: Crowd | None = getattr(observations, "crowd", None)
+        crowd: CrowdObservations | None = getattr(observations, "crowd", None)
         # Members act on what is in view by sight lines: nobody waits for pictures.
         observations = getattr(observations, "without_pictures", observations)
         infos = getattr(infos, "without_pictures", infos)
@@ -125,7 +125,7 @@ class Residents:
                 self._note(k, crowd, crowd.index[name])
         return found
 
-    def _note(self, k: int, crowd: Crowd, row: int) -> None:
+    def _note(self, k: int, crowd: CrowdObservations, row: int) -> None:
         """Remember until when and where a member rests or walks on."""
         member = self._members[k]
         stride = member.stride
@@ -138,7 +138,7 @@ class Residents:
             if stride is not None:
                 self._strides[k] = stride
 
-    def _going_on(self, crowd: Crowd, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _going_on(self, crowd: CrowdObservations, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return how far ahead some members walk that have nothing to decide, metres: 0 for who rests; NaN else."""
         rows = self._rows_in(crowd)[numbers]
         where = np.column_stack([crowd.place[rows], crowd.room[rows], crowd.posture[rows]])
@@ -152,7 +152,7 @@ class Residents:
         found[walks] = stride_lengths(strides, pose, crowd.time % DAY, self._walkable)
         return found
 
-    def _meeting(self, crowd: Crowd) -> NDArray[np.bool_]:
+    def _meeting(self, crowd: CrowdObservations) -> NDArray[np.bool_]:
         """Return which members see somebody near whom they would greet."""
         self._learn_greetings()
         n = len(self._members)
@@ -179,14 +179,14 @@ class Residents:
                 self._greeted[pair] = greeted.get(self._acquaintances[pair], _NEVER)
         self._changed.clear()
 
-    def _members_by_row(self, crowd: Crowd) -> NDArray[np.int64]:
+    def _members_by_row(self, crowd: CrowdObservations) -> NDArray[np.int64]:
         """Return the member's number by row of the crowd; -1 for others."""
         number = np.full(len(crowd.pose), -1, np.int64)
         rows = self._rows_in(crowd)
         number[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
         return number
 
-    def _rows_in(self, crowd: Crowd) -> NDArray[np.int64]:
+    def _rows_in(self, crowd: CrowdObservations) -> NDArray[np.int64]:
         """Return the members' rows; -1 for those who take no part in a run."""
         if self._rows is None or self._rows[0] != crowd.index:
             rows = np.array([crowd.index.get(name, -1) for name in self._number], np.int64)

@@ -17,7 +17,7 @@ from vico.challenges.records import Job, Progress, Setting, check_methods, load_
 from vico.errors import InputError
 from vico.io.stores import FolderStore, Store, store_at
 from vico.jobs import Answer, Service, Task, open_executor
-from vico.jobs.shared import check_code, check_seen, seen_by_all
+from vico.jobs.contract import check_same_code, check_shared_store, shared_store_marker
 from vico.runner.foreign import Terms
 from vico.world.folder import fetch_world
 
@@ -51,9 +51,9 @@ def player(
         If this machine does not see what the others see, or has other code: what it played would be filed wrongly.
     """
     store = store_at(options["store"])
-    check_seen(store, options["seen"])
+    check_shared_store(store, options["seen"])
     if options["seen"]:
-        check_code(options["code"], code_digest())
+        check_same_code(options["code"], code_digest())
     episodes = Player(load_challenge(options["challenge"]), store, code=options["code"], record=options["record"])
 
     def progress(label: str, step: int, limit: int) -> None:
@@ -208,7 +208,7 @@ def evaluate(
         _clear(store.folder)
     if ray is None:
         workers = min(workers, max(1, len(jobs)))
-    with open_executor(workers=workers, ray=ray) as executor, seen_by_all(store, executor) as seen:
+    with open_executor(workers=workers, ray=ray) as executor, shared_store_marker(store, executor) as seen:
         service = episodes_service(challenge, str(store), code=code_digest(), record=record, seen=seen)
         executor.run(service, tasks, done=done, told=told)
     return [outcomes[index] for index in range(len(jobs))]

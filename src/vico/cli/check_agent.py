@@ -42,7 +42,7 @@ def check_agent(
     """
     from dataclasses import asdict
 
-    from vico.cli.output import print_json
+    from vico.cli.console import print_json
     from vico.runner.check import check_agent as findings_of
     from vico.world.folder import read_world
 
@@ -82,9 +82,8 @@ def small_world() -> Path:
     from vico.io.cache import cache_folder
     from vico.world.folder import read_world
     from vico.world.model import VERSION
-    from vico.worldgen.packaged import packaged_extract
     from vico.worldgen.pipeline import build_world
-    from vico.worldgen.request import BuildOptions
+    from vico.worldgen.request import BuildOptions, packaged_extract
 
     extract = packaged_extract()
     folder = cache_folder() / "worlds" / f"{extract.name}-{2 * _HALF:.0f}m-{__version__}-{VERSION}"

@@ -73,11 +73,11 @@ def city_build(options: Annotated[CityBuildOptions, _FLAT]) -> int:
 
     Example: vico city build --osm region.osm.pbf --center 60.1690,24.9435 --size 2000 --out city --workers 2
     """
-    from vico.cli.output import progress_bars
+    from vico.cli.console import progress_bars
     from vico.world.model import FLAT_GROUND
     from vico.worldgen.city_build import build_city, city_request
     from vico.worldgen.pipeline import extract_centre
-    from vico.worldgen.sources import Sources
+    from vico.worldgen.request import Sources
 
     box = _box(options.bbox) if options.bbox else None
     if options.center:
@@ -113,7 +113,7 @@ def city_info(path: Positional[Path], json: bool = False) -> int:
         path: City folder.
         json: Print JSON.
     """
-    from vico.cli.output import print_json, print_table
+    from vico.cli.console import print_json, print_table
     from vico.world.city import read_city
 
     manifest = read_city(path).manifest
@@ -148,7 +148,7 @@ def city_check(path: Positional[Path], borders: bool = False, json: bool = False
         borders: Borders alone.
         json: Print JSON.
     """
-    from vico.cli.output import print_json, progress_bars
+    from vico.cli.console import print_json, progress_bars
     from vico.world.check import check_whole, check_world
     from vico.world.city import border_findings, read_city
     from vico.world.city_world import CityWorld
@@ -193,7 +193,7 @@ def city_export(
         force: Replace what this verb made there before; refused if the folder holds anything else.
         json: Print JSON.
     """
-    from vico.cli.output import check_output, print_export
+    from vico.cli.console import check_output, print_export
     from vico.world.city import read_city
     from vico.world.exports import EXPORT_FOLDER, export_city
 

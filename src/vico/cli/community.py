@@ -7,8 +7,8 @@ from datetime import date as Date
 from pathlib import Path
 from typing import Any
 
+from vico.cli.console import Report, check_output, print_json, print_table, progress_bars
 from vico.cli.options import CommunityBuildOptions
-from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.community import (
     Author,
     Community,
@@ -32,7 +32,7 @@ _LONGEST_ANSWER = 4096
 # What went wrong is told for so many items; the rest is in authorship.json.
 _MOST_TROUBLES = 8
 # So many residents are shown in a table.
-_TOLD = 40
+_SHOWN_RESIDENTS = 40
 # What is told of a community, in words.
 _MEANINGS = {
     "digest": "the same for the same community",
@@ -56,7 +56,7 @@ def build(options: CommunityBuildOptions) -> int:
     began = time.perf_counter()
     with progress_bars() as report:
         author = llm_author(options, report) if asks_model else None
-        community = _written(world, options, first, author, report)
+        community = _build_community(world, options, first, author, report)
     write_community(community, options.out, force=options.force or options.out.is_dir(), world=options.path)
     facts = {
         "path": str(options.out),
@@ -71,17 +71,17 @@ def build(options: CommunityBuildOptions) -> int:
         "seconds": round(time.perf_counter() - began, 2),
     }
     people = _people(community, world)
-    told = _told(author) if author is not None else None
+    told = _authorship_report(author) if author is not None else None
     if options.json:
         print_json({**facts, "people": people, **({} if told is None else {"llm": told})})
         return 0
     print_table("Community", facts, _MEANINGS)
     rows = {
         str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
-        for p in people[:_TOLD]
+        for p in people[:_SHOWN_RESIDENTS]
     }
-    if len(people) > _TOLD:
-        rows["..."] = f"{len(people) - _TOLD:,} more; --json tells all"
+    if len(people) > _SHOWN_RESIDENTS:
+        rows["..."] = f"{len(people) - _SHOWN_RESIDENTS:,} more; --json tells all"
     print_table("Residents", rows)
     if told is not None:
         _print_authorship(told)
@@ -110,7 +110,7 @@ def llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAu
     return LlmCommunityAuthor(model, workers=options.llm_concurrency, only=options.llm_only, progress=report)
 
 
-def _written(
+def _build_community(
     world: World, options: CommunityBuildOptions, first: Date | None, author: Author | None, report: Report
 ) -> Community:
     if author is not None:
@@ -134,7 +134,7 @@ def _people(community: Community, world: World) -> list[dict[str, Any]]:
     ]
 
 
-def _told(author: LlmCommunityAuthor) -> dict[str, Any]:
+def _authorship_report(author: LlmCommunityAuthor) -> dict[str, Any]:
     """Return who wrote what, what it took, and what went wrong."""
     assert author.report is not None
     authorship, spent = author.report.authorship, author.model.budget.spent

@@ -123,7 +123,7 @@ def dataset_build(options: Annotated[DatasetOptions, _FLAT]) -> int:
 
     Example: vico dataset build --runs try/runs/* --to webdataset --outputs rgb --out demos
     """
-    from vico.cli.output import check_output, print_json, print_table, progress_bars
+    from vico.cli.console import check_output, print_json, print_table, progress_bars
     from vico.datasets.build import build_dataset
     from vico.datasets.folder import DATASET_FOLDER
 
@@ -152,7 +152,7 @@ def dataset_info(path: Positional[Path], json: bool = False) -> int:
         path: Folder of a dataset.
         json: Print JSON.
     """
-    from vico.cli.output import print_json, print_table
+    from vico.cli.console import print_json, print_table
     from vico.datasets.folder import Dataset
 
     about = Dataset(path).about.model_dump(mode="json")
@@ -173,7 +173,7 @@ def dataset_check(path: Positional[Path], json: bool = False) -> int:
         path: Folder of a dataset.
         json: Print JSON.
     """
-    from vico.cli.output import print_json, progress_bars
+    from vico.cli.console import print_json, progress_bars
     from vico.datasets.folder import Dataset
     from vico.datasets.inspection import findings_of
 
@@ -205,7 +205,7 @@ def dataset_show(
         force: Replace a picture that is there.
         json: Print the frames' values as JSON.
     """
-    from vico.cli.output import print_json
+    from vico.cli.console import print_json
     from vico.datasets.folder import Dataset
     from vico.datasets.inspection import write_contact_sheet
 
@@ -234,7 +234,7 @@ def dataset_export(
         world: The world it ran in, if it is no longer where it was.
         force: Replace a file that is there.
     """
-    from vico.cli.output import progress_bars
+    from vico.cli.console import progress_bars
     from vico.datasets.inspection import write_rerun  # an extra's
 
     if out.exists() and not force:

@@ -1,31 +1,58 @@
-"""`vico demo`: the main job, once, from the packaged map to a page one can look at."""
+"""Verbs that work on the packaged place: `vico demo`, `vico warm-up` and `vico bench`.
+
+`vico demo` does the main job once, from the packaged map to a page one can look at. `vico warm-up` compiles the hot
+loops, which are kept in the cache folder for every later start. `vico bench` runs one of the checkout's benchmarks
+and prints its tables, with how fast one thread of this machine is beside that of the machine the README's figures
+were measured on.
+"""
 
 from __future__ import annotations
 
+import io
 import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
-from vico.cli import community as community_verb
-from vico.cli import replay as replay_verb
-from vico.cli import run as run_verb
-from vico.cli import world as world_verb
+from vico.assets.people import PASSERS_BY, body_of, passer_by
+from vico.cli import (
+    community,
+    film,
+    run,
+    world,
+)
+from vico.cli import (
+    community as community_verb,
+)
+from vico.cli import (
+    film as replay_verb,
+)
+from vico.cli import (
+    run as run_verb,
+)
+from vico.cli import (
+    world as world_verb,
+)
+from vico.cli.console import check_output, print_json
 from vico.cli.options import CommunityBuildOptions, RunOptions
-from vico.cli.output import check_output
 from vico.community.folder import COMMUNITY_FOLDER
-from vico.errors import OutputExistsError, StageError
+from vico.errors import MissingFileError, OutputExistsError, StageError, VicoError
+from vico.io.compiled import compiled
 from vico.io.files import check_replaceable
 from vico.sim.recording.schema import RUN_FOLDER
+from vico.sim.robots.path_following import NEIGHBOUR, room_to_turn
+from vico.world.walkable import fill_polygon
 from vico.world.world import WORLD_FOLDER
-from vico.worldgen.packaged import packaged_extract
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import Sources, packaged_extract
 
 #: A run with the film of it.
 EVENING = replace(RUN_FOLDER, patterns=lambda folder: (*RUN_FOLDER.patterns(folder), _FILM))
@@ -109,3 +136,171 @@ def _evening(world: Path, people: Path, out: Path, seed: int) -> str:
         if done.returncode != 0:
             raise StageError(f"demo: the evening ended with exit status {done.returncode}: {done.stderr[-2000:]}")
     return told
+
+
+_WARM_UP_RADIUS = 150.0
+
+
+def warm_up() -> int:
+    """Build a small world, live in it for a few seconds, look at it: whatever a real run compiles is compiled.
+
+    The bodies of passers-by are made, too.
+    """
+    began = time.perf_counter()
+    place = packaged_extract()
+    with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
+        here = Path(folder)
+        world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=_WARM_UP_RADIUS)
+        community.build(CommunityBuildOptions(here / "world", here / "people", residents=6))
+        run.run(RunOptions(here / "world", here / "people", out=here / "run", steps=60, cars=5, pedestrians=5))
+        film.replay(here / "run", film=True)
+    # What so small a place and so short a time may not need: ramps of bridges, a robot that turns on the spot.
+    ring = np.array([0.5, 2.5, 1.5])
+    fill_polygon(np.zeros((4, 4), np.float32), ring, ring[::-1].copy(), np.array([0, 3]), 2.0, 1.0, 0.5)
+    room_to_turn(0.0, 0.0, 1.0, np.zeros(0, NEIGHBOUR))
+    for look in range(PASSERS_BY):
+        body_of(passer_by(look))  # kept in the cache
+    print(f"compiled and tried in {time.perf_counter() - began:.0f} s", file=sys.stderr)
+    return 0
+
+
+# The machine of benchmarks/results, in million turns a second.
+REFERENCE_PYTHON, REFERENCE_COMPILED = 107.0, 701.0
+_TURNS, _COMPILED_TURNS, _SPEED_TRIES = 1_000_000, 20_000_000, 5
+
+
+def python_speed() -> float:
+    """Return how many million turns of an empty loop Python takes a second: the fastest of a few tries."""
+    best = float("inf")
+    for _ in range(_SPEED_TRIES):
+        began = time.perf_counter()
+        for _ in range(_TURNS):
+            pass
+        best = min(best, time.perf_counter() - began)
+    return _TURNS / best / 1e6
+
+
+def compiled_speed() -> float:
+    """Return how many million turns a second compiled code takes, where each waits for the last one's product."""
+    best = float("inf")
+    _turn(1)
+    for _ in range(_SPEED_TRIES):
+        began = time.perf_counter()
+        _turn(_COMPILED_TURNS)
+        best = min(best, time.perf_counter() - began)
+    return _COMPILED_TURNS / best / 1e6
+
+
+def speed_table() -> str:
+    """Return a table in markdown of this machine's speeds beside the reference's, with what to expect of figures."""
+    lines = [
+        "## This machine beside that of the README's figures",
+        "",
+        "One thread, million turns of a loop a second. The README's figures are to be scaled by about the last column;",
+        "other programs that run meanwhile take their share, too (`benchmarks/under_load.py`).",
+        "",
+        "| loop | here | there | here / there |",
+        "|---|---|---|---|",
+    ]
+    for name, here, there in (
+        ("Python, empty", python_speed(), REFERENCE_PYTHON),
+        ("compiled, products", compiled_speed(), REFERENCE_COMPILED),
+    ):
+        lines.append(f"| {name} | {here:.0f} | {there:.0f} | {here / there:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+@compiled
+def _turn(turns: int) -> float:
+    value = 0.5
+    for _ in range(turns):
+        value = 3.7 * value * (1.0 - value)
+    return value
+
+
+SCRIPTS = Path(__file__).parents[3] / "benchmarks"
+RESIDENTS = 15
+# What each script is given of the place made for it: its world, and the people in it.
+_BENCHMARK_INPUTS = {"render": ("world",), "sim": ("world", "people"), "world": (), "memory": ("world", "people")}
+
+
+class BenchmarkError(VicoError, RuntimeError):
+    """A benchmark did not come to its end."""
+
+
+def bench(what: str, *, table: Path | None = None, json: bool = False, options: tuple[str, ...] = ()) -> int:
+    """Measure one thing in a process of its own; print the markdown it reports, or its tables as JSON.
+
+    Beside it stands how fast this machine is, and that of the README's figures.
+
+    Parameters
+    ----------
+    what
+        ``render``, ``sim``, ``world`` or ``memory``.
+    table
+        File for the report.
+    options
+        More arguments for the script.
+
+    Raises
+    ------
+    MissingFileError
+        If vico was installed without its repository.
+    BenchmarkError
+        If the script failed.
+    """
+    script = SCRIPTS / f"{what}.py"
+    if not script.exists():
+        raise MissingFileError(
+            f"bench {what}: benchmarks come with the repository, not with the package; run it in a checkout"
+        )
+    with tempfile.TemporaryDirectory(prefix="vico-") as folder:
+        here = Path(folder)
+        _prepare(here, _BENCHMARK_INPUTS[what])
+        report = here / "report.md"
+        given = [str(here / name) for name in _BENCHMARK_INPUTS[what]]
+        command = [sys.executable, str(script), *given, "--table", str(report), *options]
+        # Stdout is ours: the report is printed once, from the file.
+        done = subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
+        if done.returncode or not report.exists():
+            raise BenchmarkError(f"bench {what}: stopped with exit status {done.returncode}; what it said is above")
+        text = report.read_text(encoding="utf-8")
+    speeds = speed_table()
+    if table is not None:
+        table.parent.mkdir(parents=True, exist_ok=True)
+        table.write_text(text, encoding="utf-8")
+    if json:
+        (measured,) = tables_of(speeds)
+        print_json({"benchmark": what, "tables": tables_of(text), "machine": measured["rows"]})
+    else:
+        print(f"{text}\nSeconds and megabytes: less is better. Times real time: more is better.\n\n{speeds}")
+    return 0
+
+
+def _prepare(here: Path, parts: tuple[str, ...]) -> None:
+    place = packaged_extract()
+    with redirect_stdout(io.StringIO()):
+        if "world" in parts:
+            world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=place.half)
+        if "people" in parts:
+            community.build(CommunityBuildOptions(here / "world", here / "people", residents=RESIDENTS))
+
+
+def tables_of(text: str) -> list[dict[str, object]]:
+    """Read the tables of a markdown report: the heading above each, and its rows by column."""
+    found: list[dict[str, object]] = []
+    heading, columns = "", None
+    rows: list[dict[str, str]] = []
+    for line in text.splitlines():
+        if line.startswith("#"):
+            heading = line.lstrip("# ")
+        if not line.startswith("|"):
+            columns = None
+            continue
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if columns is None:
+            columns, rows = cells, []
+            found.append({"title": heading, "rows": rows})
+        elif not all(set(cell) <= set("-: ") for cell in cells):
+            rows.append(dict(zip(columns, cells, strict=True)))
+    return found

@@ -21,7 +21,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from vico.cli.output import print_json
+from vico.cli.console import print_json
 
 # Package -> what of it is imported, where that is called otherwise. MuJoCo is imported as we do it.
 _MODULES = {

@@ -1,28 +1,39 @@
-"""`vico film` and `vico still`: what happened in a recorded run, looked at from beside somebody."""
+"""`vico film`, `vico still`, `vico replay` and `vico score-pictures`: pictures of recorded runs.
+
+Films and stills show what happened in a recorded run, from beside somebody. A replay is the page and the film of a
+whole run. Scores are FID and KID of a folder of pictures against one of photos.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
-from vico.cli.interrupts import Stopped, signal_of
+from vico.cli.console import CommandInterrupted, Report, print_json, print_table, progress_bars, signal_of
 from vico.cli.live import city_of
-from vico.cli.output import Report, progress_bars
-from vico.cli.viewer_options import FilmOptions, StillOptions
+from vico.cli.viewer import FilmOptions, StillOptions
 from vico.clock import seconds_of_day
-from vico.errors import InputError, MissingFileError, OutputExistsError, some_of
+from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError, some_of
+from vico.render import render_top_down
 from vico.render.film import partial_film
 from vico.render.frames import RenderQuality
+from vico.render.world_scene import scene_of
 from vico.sim.config import find_by_name
 from vico.sim.recording import Run, read_run
-from vico.viewer.repeat import RepeatedRun
-from vico.viewer.run_film import FilmSettings, Span, write_film_of_shots, write_still
+from vico.sim.recording.schema import DEMO_FILM, REPLAY
+from vico.viewer.picture_scores import FeatureNetwork, pictures_in, scores
+from vico.viewer.replay import recording_of, write_demo_film, write_replay
+from vico.viewer.run_film import FilmSettings, RepeatedRun, Span, read_shots, write_film_of_shots, write_still
 from vico.viewer.server import require_server
-from vico.viewer.shots import read_shots
+from vico.world.folder import is_world, read_world
+from vico.world.world import World
+from vico.worldgen.previews import Overhead
 
 
 def film(options: FilmOptions) -> int:
@@ -51,7 +62,7 @@ def film(options: FilmOptions) -> int:
         report("reading the run", 0, 1)
         repeated = RepeatedRun.of_folders(recorded, world=options.world, community=options.community)
         report("reading the run", 1, 1)
-        with _told_where_interrupted(out, report, settings.rate) as film:
+        with _report_if_interrupted(out, report, settings.rate) as film:
             frames = write_film_of_shots(out, repeated, spans, report=film)
     print(f"{out}: {frames} frames, {frames / settings.rate:.1f} s")
     return 0
@@ -61,15 +72,15 @@ def _spans(options: FilmOptions, settings: FilmSettings, run: Run) -> list[Span]
     """Return the shots that are asked for, and their steps; whoever is followed is looked up."""
     if options.shots is None:
         first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
-        follow = followed(run, options.follow, first, last, option="film: --follow")
+        follow = followed_name(run, options.follow, first, last, option="film: --follow")
         return [Span(replace(settings, follow=follow), first, last)]
     spans = []
     for number, shot in enumerate(read_shots(options.shots), 1):
         option = f"{options.shots}: shot {number}"
         first, last = step_of(run, shot.start, default=0), step_of(run, shot.stop, default=run.last)
-        follow, angle = followed(run, shot.follow, first, last, option=f"{option}: follow"), shot.angle
+        follow, angle = followed_name(run, shot.follow, first, last, option=f"{option}: follow"), shot.angle
         if angle is not None and angle.ahead_of:
-            ahead_of = followed(run, angle.ahead_of, first, last, option=f"{option}: ahead_of")
+            ahead_of = followed_name(run, angle.ahead_of, first, last, option=f"{option}: ahead_of")
             angle = angle.model_copy(update={"ahead_of": ahead_of})
         of_shot = replace(settings, follow=follow, view=shot.view, angle=angle, speed=shot.speed)
         spans.append(Span(of_shot, first, last))
@@ -82,7 +93,7 @@ def still(options: StillOptions) -> int:
     width, height = size_of(options.size)
     recorded = read_run(options.run)
     step = step_of(recorded, options.at, default=recorded.last)
-    follow = followed(recorded, options.follow, step, step, option="still: --follow")
+    follow = followed_name(recorded, options.follow, step, step, option="still: --follow")
     if options.headless:
         return _still_of_page(options, follow, step)
     settings = FilmSettings(
@@ -102,16 +113,16 @@ def still(options: StillOptions) -> int:
 
 def _film_of_page(options: FilmOptions, run: Run) -> int:
     """Film what the page draws of a run."""
-    from vico.viewer.headless import shot_of, write_film
+    from vico.viewer.headless import page_shot_of, write_film
 
     width, height = size_of(options.size)
     first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
-    follow = followed(run, options.follow, first, last, option="film: --follow")
-    shot = shot_of(follow, options.view, width=width, height=height)
+    follow = followed_name(run, options.follow, first, last, option="film: --follow")
+    shot = page_shot_of(follow, options.view, width=width, height=height)
     with (
         _page_of(options.run, options.world) as address,
         progress_bars() as report,
-        _told_where_interrupted(options.out, report, options.fps) as film_report,
+        _report_if_interrupted(options.out, report, options.fps) as film_report,
     ):
         frames = write_film(address, options.out, shot, first=first, last=last, rate=options.fps, report=film_report)
     print(f"{options.out}: {frames} frames, {frames / options.fps:.1f} s")
@@ -120,10 +131,10 @@ def _film_of_page(options: FilmOptions, run: Run) -> int:
 
 def _still_of_page(options: StillOptions, follow: str, step: int) -> int:
     """Take a picture of what the page draws of a run."""
-    from vico.viewer.headless import shot_of, write_still
+    from vico.viewer.headless import page_shot_of, write_still
 
     width, height = size_of(options.size)
-    shot = shot_of(follow, options.view, width=width, height=height)
+    shot = page_shot_of(follow, options.view, width=width, height=height)
     with _page_of(options.run, options.world) as address:
         write_still(address, options.out, shot, step)
     print(options.out)
@@ -131,7 +142,7 @@ def _still_of_page(options: StillOptions, follow: str, step: int) -> int:
 
 
 @contextmanager
-def _told_where_interrupted(out: Path, report: Report, rate: int) -> Iterator[Callable[[int, int], None]]:
+def _report_if_interrupted(out: Path, report: Report, rate: int) -> Iterator[Callable[[int, int], None]]:
     """Give what is told of a film's frames; where the block is interrupted, say how much of the film is there."""
     made, wanted = 0, 0
 
@@ -148,13 +159,13 @@ def _told_where_interrupted(out: Path, report: Report, rate: int) -> Iterator[Ca
         sentence = (
             f"{partial_film(out)}: stopped after {made} of {wanted} frames, {made / rate:.1f} s that can be played"
         )
-        raise Stopped(signal_of(stop), sentence) from None
+        raise CommandInterrupted(signal_of(stop), sentence) from None
 
 
 @contextmanager
 def _page_of(path: Path, world: Path | None) -> Iterator[str]:
     """Serve a run's page while the block lasts; give its address."""
-    from vico.viewer.browser import browser_program
+    from vico.viewer.headless import browser_program
     from vico.viewer.three import three_module
 
     require_server()
@@ -212,7 +223,7 @@ def step_of(run: Run, text: str, *, default: int) -> int:
     return int(np.searchsorted(times, second - 1e-6))
 
 
-def followed(run: Run, text: str, first: int, last: int, *, option: str) -> str:
+def followed_name(run: Run, text: str, first: int, last: int, *, option: str) -> str:
     """Return the simulation's name of somebody or something that is there from a step to another.
 
     Parameters
@@ -241,3 +252,56 @@ def _clock(second: float) -> str:
 def _check(out: Path, *, force: bool) -> None:
     if out.exists() and not force:
         raise OutputExistsError(f"{out}: exists; give another name, or --force")
+
+
+def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
+    """Write ``replay.html`` (and ``demo.mp4``) into the run's folder.
+
+    Parameters
+    ----------
+    world
+        The world it ran in, if it is no longer where it was.
+    """
+    run = read_run(path)
+    folder = world or run.source("world")
+    if not is_world(folder):
+        raise MissingFileError(f"{path}: its world is no longer at {folder}; say where it is with --world")
+    place = read_world(folder)
+    recording = recording_of(run)
+    with progress_bars() as report:
+        report("ground picture", 0, 1)
+        picture = _from_above(place, folder)
+        report("ground picture", 1, 1)
+        report("replay page", 0, 1)
+        write_replay(path / REPLAY, recording, place, picture=picture)
+        report("replay page", 1, 1)
+        if film and recording.views:
+            report("film", 0, 1)
+            write_demo_film(path / DEMO_FILM, recording, place)
+            report("film", 1, 1)
+    print(path / "replay.html")
+    return 0
+
+
+def _from_above(world: World, folder: Path) -> NDArray[np.uint8]:
+    """Return the picture the world was built with; taken now where it was built without pictures."""
+    kept = folder / "previews" / "above.png"
+    if kept.is_file():
+        try:
+            with Image.open(kept, formats=("PNG",)) as image:
+                return np.asarray(image.convert("RGB"))
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+            raise SchemaError(f"{kept}: not a readable picture ({error}); build the world anew") from None
+    return render_top_down(scene_of(world, rooms=False), world.half, Overhead().side)
+
+
+def score_pictures(pictures: Path, *, photos: Path, weights: Path, scale: str, json: bool) -> int:
+    """Print the scores."""
+    network = FeatureNetwork(weights, scale=scale)
+    found = asdict(scores(network.features(pictures_in(pictures)), network.features(pictures_in(photos))))
+    found |= {"weights": weights.name, "scale": scale}
+    if json:
+        print_json(found)
+    else:
+        print_table(f"{pictures} beside {photos}", found)
+    return 0

@@ -49,7 +49,7 @@ def leaderboard_show(file: Positional[Path], json: bool = False) -> int:
     from rich.markdown import Markdown
 
     from vico.challenges.tables.leaderboard import boards, read_leaderboard
-    from vico.cli.output import print_json
+    from vico.cli.console import print_json
 
     board = read_leaderboard(file)
     if json:
@@ -74,7 +74,7 @@ def add_to_leaderboard(
         write_leaderboard,
     )
     from vico.challenges.tables.results import read_results
-    from vico.cli.output import print_json
+    from vico.cli.console import print_json
 
     path = results / "results.json" if results.is_dir() else results
     content, _ = read_results(path)

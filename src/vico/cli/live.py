@@ -18,7 +18,6 @@ from vico.world.world import World
 if TYPE_CHECKING:
     from vico.viewer.live import LiveViewer
     from vico.viewer.play import PlayedAgent
-
 #: Options of a run that decide how it is shown, and nothing in it.
 LIVE = ("live", "speed", "paused", "port", "allow_host", "idle")
 
@@ -56,8 +55,8 @@ def live_viewer(
         hosts=options.allow_host,
         idle=options.idle,
     ) as viewer:
-        viewer.announce = told
-        viewer.announce_idle = _told_idle
+        viewer.announce = print_address
+        viewer.announce_idle = _print_idle
         yield viewer
 
 
@@ -68,12 +67,12 @@ def city_of(world: World) -> Path:
     return city_folder(world, making=lambda: print("making the city's files for the page ...", file=sys.stderr))
 
 
-def told(url: str) -> None:
+def print_address(url: str) -> None:
     """Say where the page is; on stdout, for programs that start this one."""
     print(f"open in a browser on this machine:  {url}", flush=True)
 
 
-def _told_idle(second: float) -> None:
+def _print_idle(second: float) -> None:
     """Say that the run waits because no page is there."""
     hours, minutes = int(second // 3600) % 24, int(second // 60) % 60
     print(

@@ -1,35 +1,38 @@
-"""The `vico` command: one verb a capability.
+"""The `vico` command: one verb a capability, how its words become values, and what is said of those that cannot.
 
-Exit codes: 0 done, 1 found wanting (a check failed), 2 bad input or a fault of the program (one sentence on stderr; the
-traceback of a fault shows with `vico --verbose VERB`).
-Results go to stdout, progress and warnings to stderr; `vico --verbose VERB` tells more there, `vico --quiet VERB` less.
-Each verb imports what it needs when it runs, so `vico --help` is quick.
+Exit codes: 0 done, 1 found wanting (a check failed), 2 bad input or a fault of the program (one sentence on stderr;
+the traceback of a fault shows with `vico --verbose VERB`). Results go to stdout, progress and warnings to stderr;
+`vico --verbose VERB` tells more there, `vico --quiet VERB` less. Each verb imports what it needs when it runs, so
+`vico --help` is quick.
 """
 
 from __future__ import annotations
 
+import difflib
 import errno
 import gc
 import io
 import logging
 import os
 import sys
+import types
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn, Union, get_args
 
 import tyro
 from tyro.conf import Positional
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 from tyro.extras import SubcommandApp
 
-from vico.cli import viewer_verbs
-from vico.cli.asset_verbs import assets
+from vico.cli import viewer
+from vico.cli.assets import assets, motion
 from vico.cli.check_agent import check_agent
 from vico.cli.city import city
+from vico.cli.console import ended_by_signals, exit_code
 from vico.cli.dataset import dataset
-from vico.cli.evaluation_verbs import evaluation
-from vico.cli.interrupts import ended_by_signals, exit_code
+from vico.cli.evaluation import evaluation
 from vico.cli.leaderboard import leaderboard
-from vico.cli.motion import motion
 from vico.cli.options import (
     CommaSeparated,
     CommunityBuildOptions,
@@ -38,11 +41,85 @@ from vico.cli.options import (
     WorldBuildOptions,
     with_ray_address,
 )
-from vico.cli.parsing import REGISTRY, check_verb
-from vico.cli.viewer_options import FilmOptions, StillOptions
-from vico.errors import VicoError, line_of, sentence_of
+from vico.cli.viewer import FilmOptions, StillOptions
+from vico.errors import InputError, VicoError, line_of, sentence_of
 from vico.io.files import reason_of
 from vico.version import __version__
+
+#: Reads numbers with our own words for what is none, and options that may be left out without "None" in their help.
+REGISTRY = ConstructorRegistry()
+_LEFT_OUT = "unset"
+
+
+@REGISTRY.primitive_rule
+def _numbers(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    if info.type not in (int, float):
+        return None
+    kind, words, example = (int, "whole number", "300") if info.type is int else (float, "number", "0.5")
+
+    def read(given: list[str]) -> int | float:
+        try:
+            return kind(given[0])
+        except ValueError:
+            raise ValueError(f"{given[0]!r} is no {words}; give one such as {example}") from None
+
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=kind.__name__.upper(),
+        instance_from_str=read,
+        is_instance=lambda value: isinstance(value, kind) or (kind is float and isinstance(value, int)),
+        str_from_instance=lambda value: [str(value)],
+    )
+
+
+@REGISTRY.primitive_rule
+def _optional(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    kinds = get_args(info.type)
+    if info.type_origin not in (Union, types.UnionType) or len(kinds) != 2 or type(None) not in kinds:
+        return None
+    inner = next(kind for kind in kinds if kind is not type(None))
+    spec = ConstructorRegistry.get_primitive_spec(PrimitiveTypeInfo.make(inner, info.markers))
+    if not isinstance(spec, PrimitiveConstructorSpec):
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=spec.nargs,
+        metavar=spec.metavar,
+        instance_from_str=spec.instance_from_str,
+        is_instance=lambda value: True if value is None else spec.is_instance(value),
+        str_from_instance=lambda value: [_LEFT_OUT] if value is None else spec.str_from_instance(value),
+        choices=spec.choices,
+    )
+
+
+def check_verb(given: Sequence[str], verbs: Mapping[str, Sequence[str]]) -> None:
+    """Make sure that the words before the options are a verb.
+
+    Parameters
+    ----------
+    verbs
+        By the first word, what may come after it; empty where that is up to the verb.
+
+    Raises
+    ------
+    InputError
+        If they are not; the verb that is nearest is named.
+    """
+    if not given or given[0].startswith("-"):
+        return
+    first, *rest = given
+    if first not in verbs:
+        _refuse(first, "", verbs)
+    second = rest[0] if rest else ""
+    if verbs[first] and second and not second.startswith("-") and second not in verbs[first]:
+        _refuse(second, f"{first} ", verbs[first])
+
+
+def _refuse(word: str, before: str, known: Sequence[str] | Mapping[str, Any]) -> None:
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.55)
+    # "build" is a verb of several things, and none by itself.
+    meant = f"did you mean vico {before}{near[0]}?" if near else f"there are {', '.join(known)}"
+    raise InputError(f"no verb {before + word!r}; {meant}")
+
 
 # The fields of a record are options of the verb itself, not of a part of it.
 FLAT = tyro.conf.arg(name="")
@@ -254,7 +331,7 @@ def replay(path: Positional[Path], no_film: bool = False, world: Path | None = N
         no_film: Leave demo.mp4 out.
         world: The world it ran in, if it is no longer where it was.
     """
-    from vico.cli import replay as verb
+    from vico.cli import film as verb
 
     return verb.replay(path, film=not no_film, world=world)
 
@@ -302,9 +379,9 @@ def score_pictures(
         scale: What it wants bytes to be turned into.
         json: Print JSON.
     """
-    from vico.cli import scores as verb
+    from vico.cli import film as verb
 
-    return verb.score(pictures, photos=photos, weights=weights, scale=scale, json=json)
+    return verb.score_pictures(pictures, photos=photos, weights=weights, scale=scale, json=json)
 
 
 @app.command(name="demo")
@@ -335,9 +412,9 @@ def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, 
         threads: Processor threads; beside other work, one is the fastest.
         port: Of 127.0.0.1; 0 takes a free one.
     """
-    from vico.cli import llm as verb
+    from vico.cli import assets as verb
 
-    return verb.serve(model, context=context, threads=threads, port=port)
+    return verb.serve_language_model(model, context=context, threads=threads, port=port)
 
 
 @app.command(name="doctor")
@@ -368,7 +445,7 @@ def bench(
         table: Write the table to this file, too.
         json: Print the tables as JSON.
     """
-    from vico.cli import bench as verb
+    from vico.cli import demo as verb
 
     return verb.bench(what, table=table, json=json)
 
@@ -376,7 +453,7 @@ def bench(
 @app.command(name="warm-up")
 def warm_up() -> int:
     """Compile the hot loops once, so that the first run starts quickly."""
-    from vico.cli import warm_up as verb
+    from vico.cli import demo as verb
 
     return verb.warm_up()
 
@@ -405,9 +482,9 @@ app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 app.command(dataset, name="dataset", help="Datasets of demonstrations, for trainers.")
 app.command(leaderboard, name="leaderboard", help="A public file of what methods came to.")
 app.command(name="check-agent")(check_agent)
-app.command(name="view")(viewer_verbs.view)
-app.command(name="live")(viewer_verbs.live)
-app.command(name="play")(viewer_verbs.play)
+app.command(name="view")(viewer.view)
+app.command(name="live")(viewer.live)
+app.command(name="play")(viewer.play)
 
 
 _log = logging.getLogger("vico")

@@ -17,10 +17,18 @@ from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
 from vico.assets.robots import robot_kind
-from vico.cli.interrupts import Stopped, StopRequest, stopped_between_steps
+from vico.cli.console import (
+    CommandInterrupted,
+    Report,
+    StopRequest,
+    check_output,
+    print_json,
+    print_table,
+    progress_bars,
+    stopped_between_steps,
+)
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
 from vico.cli.options import RunOptions
-from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.clock import seconds_of_day
 from vico.community import Community, read_community, read_names
 from vico.errors import InputError, OutputExistsError, SchemaError
@@ -48,7 +56,6 @@ from vico.world.world import World
 if TYPE_CHECKING:
     from vico.viewer.live import LiveViewer
     from vico.viewer.play import PlayedAgent
-
 #: Steps between checkpoints unless a run says otherwise.
 STATES_EVERY = 300
 
@@ -90,7 +97,7 @@ def run(options: RunOptions) -> int:
         If the output folder holds something and ``options.force`` is not given.
     """
     if options.resume is not None:
-        options = _resumed(options, options.resume)
+        options = _resumed_options(options, options.resume)
     if options.world is None or options.community is None or options.out is None:
         raise InputError(
             "run: give WORLD, COMMUNITY and --out OUT, or --resume OUT for a run that was cut short; "
@@ -110,8 +117,8 @@ def run(options: RunOptions) -> int:
         shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
         print_table(str(options.out), shown, _MEANINGS)
     if talk is not None:
-        print(_talk_told(talk), file=sys.stderr)
-    return _judged(metrics)
+        print(_talk_summary(talk), file=sys.stderr)
+    return _exit_code(metrics)
 
 
 def named_or_read(text: str) -> str | dict[str, Any]:
@@ -135,7 +142,7 @@ def _talk_of(options: RunOptions) -> LlmTalk | None:
         raise InputError(f"run: --talk llm: {error}; or leave --talk out") from None
 
 
-def _talk_told(talk: LlmTalk) -> str:
+def _talk_summary(talk: LlmTalk) -> str:
     """Say how many answers were the model's."""
     why = f" ({talk.reason})" if talk.reason else ""
     return (
@@ -144,7 +151,7 @@ def _talk_told(talk: LlmTalk) -> str:
     )
 
 
-def _judged(metrics: dict[str, Any]) -> int:
+def _exit_code(metrics: dict[str, Any]) -> int:
     """Return the exit code: 1 with overlaps, which are told in a sentence."""
     overlaps = metrics.get("overlaps", {"count": 0})
     if not overlaps["count"]:
@@ -204,8 +211,8 @@ class Job:
         names = names_of(community, _names(options.robots), options.assistants)
         asked = () if options.observe == "all" else _names(options.observe)
         observe = tuple(find_by_name(name, names, option="run: --observe") for name in asked)
-        worn = _worn(options.wear, names)
-        found = None if options.force else _cut_short(out)
+        worn = _worn_files(options.wear, names)
+        found = None if options.force else _unfinished_manifest(out)
         kind = RUN_FOLDER if options.force else None
         check_output(out, world, community, force=options.force or found is not None, kind=kind)
         place = read_world(world)
@@ -276,7 +283,7 @@ class Job:
             if metrics["steps"] < options.steps:
                 kept = self._told_of_rest(leg, metrics["steps"])
                 if asked:
-                    raise Stopped(asked.number, kept)
+                    raise CommandInterrupted(asked.number, kept)
                 print(kept, file=sys.stderr)
             if viewer is not None and control is not None:
                 control.end()
@@ -370,11 +377,11 @@ class Job:
         kept = checkpoint_steps(out)
         told = f"{out}: stopped after step {steps} of {options.steps}"
         if not kept:
-            return f"{told}; it has no checkpoint to go on from, and can be looked at: vico view {_quoted(out)}"
+            return f"{told}; it has no checkpoint to go on from, and can be looked at: vico view {_quote(out)}"
         since = "" if kept[-1] == steps else f" from its last checkpoint, step {kept[-1]},"
         if self.played is not None:
-            return f"{told}; go on{since} with: the same command, with --as {self.played.agent} --out {_quoted(out)}"
-        command = f"vico run --resume {_quoted(out)}"
+            return f"{told}; go on{since} with: the same command, with --as {self.played.agent} --out {_quote(out)}"
+        command = f"vico run --resume {_quote(out)}"
         command += f" --agent {shlex.quote(options.agent)}" if options.agent else ""
         command += " --live" if options.live else ""
         return f"{told}; go on{since} with: {command}"
@@ -474,7 +481,7 @@ class _Progress(Hook):
         self._report("simulating", step.number, self._steps)
 
 
-def _quoted(path: Path) -> str:
+def _quote(path: Path) -> str:
     return shlex.quote(str(path))
 
 
@@ -498,7 +505,7 @@ def _states_every(options: RunOptions, agents: Gatherer) -> int:
     return STATES_EVERY if asked is None else asked
 
 
-def _resumed(options: RunOptions, out: Path) -> RunOptions:
+def _resumed_options(options: RunOptions, out: Path) -> RunOptions:
     """Return the options a run was begun with.
 
     Raises
@@ -534,7 +541,7 @@ def _resumed(options: RunOptions, out: Path) -> RunOptions:
     return replace(begun, out=out, workers=options.workers, json=options.json, **live)
 
 
-def _cut_short(out: Path) -> dict[str, Any] | None:
+def _unfinished_manifest(out: Path) -> dict[str, Any] | None:
     """Return the manifest of an unfinished run in `out`; empty if it had none yet, None if there is no such run."""
     if not out.is_dir():
         return None
@@ -561,7 +568,7 @@ def names_of(community: Path, robots: Sequence[str], assistants: int) -> dict[st
     )
 
 
-def _worn(text: str, names: Mapping[str, str]) -> dict[str, str]:
+def _worn_files(text: str, names: Mapping[str, str]) -> dict[str, str]:
     """Return files by agent's name, of ``NAME=FILE,...``."""
     found = {}
     for entry in _names(text):
@@ -576,9 +583,9 @@ def _places(kind: str, given: Path | None, world: World, played: PlayedAgent | N
     """Return where robots or assistants start: as a file says, and who is played where there is something to see."""
     if given is not None or played is None or not played.agent.startswith(f"{kind}_"):
         return read_json(given) if given is not None else {}
-    from vico.viewer.lively import lively_spot
+    from vico.viewer.play import busy_sidewalk_spot
 
-    return {played.agent: lively_spot(world, clearance=_PLAYED_ROOM[kind])}
+    return {played.agent: busy_sidewalk_spot(world, clearance=_PLAYED_ROOM[kind])}
 
 
 def _names(text: str) -> tuple[str, ...]:

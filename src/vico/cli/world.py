@@ -11,19 +11,18 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from vico.cli.console import check_output, print_export, print_json, print_table, progress_bars
 from vico.cli.options import WorldBuildOptions
-from vico.cli.output import check_output, print_export, print_json, print_table, progress_bars
 from vico.errors import InputError, MissingFileError
 from vico.geo.gtfs_feed import NO_TIMETABLE
 from vico.world.folder import read_world
 from vico.world.model import FLAT_GROUND
 from vico.world.world import WORLD_FOLDER, World, stage_seconds
+from vico.worldgen.batch import PlaceTable, read_place_table
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
-from vico.worldgen.place_tables import PlaceTable, read_place_table
-from vico.worldgen.request import BuildOptions
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import BuildOptions, Sources
 
 _DEFAULTS = BuildOptions()
 _DROPPED = "features of the map left out, mended or noted; world.json says which and why"
@@ -148,7 +147,7 @@ def locate(
 ) -> Path:
     """Find a map that covers a window: the packaged extract, else one from an Overpass server (``off``: none)."""
     from vico.geo.overpass import Overpass
-    from vico.worldgen.packaged import map_for
+    from vico.worldgen.request import map_for
 
     endpoint = overpass or os.environ.get("VICO_OVERPASS")
     source = None if endpoint == "off" else Overpass(endpoint, refresh=refresh)
@@ -164,7 +163,7 @@ def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None
 
 def rows_of_table(table: Path, *, extracts: Path | None, only: str) -> PlaceTable:
     """Return the places of a table, which is a file, or of a list that is known by name."""
-    from vico.worldgen.place_lists import place_lists, rows_of
+    from vico.worldgen.batch import place_lists, rows_of
 
     names = {name.strip() for name in only.split(",") if name.strip()}
     lists = place_lists()
@@ -193,7 +192,7 @@ def build_table(
 ) -> int:
     """Build places; 1 if any failed, or a row of the table could not be read."""
     from vico.io.stores import store_at
-    from vico.worldgen.many import Outcome, build_many
+    from vico.worldgen.batch import Outcome, build_many
 
     rows = table.rows
     for note in table.notes:

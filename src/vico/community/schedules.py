@@ -21,7 +21,7 @@ from vico.community.people import Household, ResidentDraft, adults_only
 from vico.community.place_index import PlaceIndex, kind_of
 from vico.community.schooling import SCHOOL_DAYS, Care, SchoolDays, care_on, lessons_on
 from vico.community.work import shift_on
-from vico.english import uncapitalized
+from vico.english import uncapitalize
 from vico.errors import InputError
 from vico.world.model import Category
 from vico.world.opening_hours import Span
@@ -108,7 +108,7 @@ class DayWriter:
         lunch_group = None
         for group in groups:
             kind = ItemType.MEAL if group.circle.meal else ItemType.MAIN
-            text = f"{group.circle.name}: {uncapitalized(group.circle.activity)}"
+            text = f"{group.circle.name}: {uncapitalize(group.circle.activity)}"
             self._outings.put(day, Block(group.start, group.end, kind, text, group.place.id, "group", group.circle.tag))
             if draft.shift and draft.shift[0] < group.start and group.end < draft.shift[1]:
                 lunch_group = day.blocks[-1]
@@ -240,12 +240,12 @@ class DayWriter:
             assert draft.job is not None
             first = second = draft.job.task
             if draft.job.shift in ("office", "bank"):
-                first = f"Answer the morning's mail, then {uncapitalized(first)}"
+                first = f"Answer the morning's mail, then {uncapitalize(first)}"
             elif (
                 index.place_by_id[place].category != Category.OFFICE
                 and start < min(index.hours(index.place_by_id[place]))[0]
             ):
-                first = f"Open up, then {uncapitalized(first)}"
+                first = f"Open up, then {uncapitalize(first)}"
         return first, second, tag
 
     def _over_midday(self, day: Day, shift: Span, closed: Span, work: tuple[str, ActivityTag]) -> None:

@@ -36,7 +36,7 @@ from vico.io.files import (
 )
 from vico.io.stores import FolderStore
 from vico.jobs import Answer, Service, Task, open_executor
-from vico.jobs.shared import seen_by_all
+from vico.jobs.contract import shared_store_marker
 from vico.runner.foreign import Terms
 from vico.runner.loading import source_digest
 from vico.sim.recording import read_run
@@ -429,7 +429,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
 
         with (
             open_executor(workers=max(1, min(request.workers, len(tasks))), ray=request.ray) as executor,
-            seen_by_all(shared, executor) as seen,
+            shared_store_marker(shared, executor) as seen,
         ):
             service = Service(MAKER, {**options, "seen": seen, "code": code_digest()})
             executor.run(service, [Task(task, near=task["near"]) for task in tasks], done=done)

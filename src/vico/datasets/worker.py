@@ -29,7 +29,7 @@ from vico.datasets.pictures import KeptPictures, PictureFiles, PictureKeeper, Pi
 from vico.datasets.vectors import IncrementForm
 from vico.errors import EmptyInputError, InputError
 from vico.io.stores import FolderStore
-from vico.jobs.shared import check_code, check_seen
+from vico.jobs.contract import check_same_code, check_shared_store
 from vico.rules import ActionStatus
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
@@ -171,9 +171,9 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
         be made, and says why.
     """
     parts, contents = Path(options["parts"]), Contents.of(options["contents"])
-    check_seen(FolderStore(parts), options["seen"])
+    check_shared_store(FolderStore(parts), options["seen"])
     if options["seen"]:
-        check_code(options["code"], code_digest())
+        check_same_code(options["code"], code_digest())
 
     def make(task: Mapping[str, Any]) -> Mapping[str, Any]:
         folder = parts / str(task["folder"])

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vico.envs.spaces import picture_space
 from vico.exact import each
 from vico.io.compiled import compiled
-from vico.pixels import shown_in
+from vico.observation_arrays import entity_pixels
 from vico.rules import ActionStatus
 from vico.sim.cameras import Lens
 from vico.sim.robots import Reading
@@ -125,7 +125,7 @@ def _visible_entities(observation: Mapping[str, Any], info: Mapping[str, Any]) -
 def _entities_in_pictures(
     observation: Mapping[str, Any], entities: Mapping[int, Mapping[str, str]]
 ) -> list[NearbyEntity]:
-    shown = shown_in(observation)
+    shown = entity_pixels(observation)
     found = []
     for k, entity in enumerate(shown.entity.tolist()):
         about = entities.get(entity, {})

@@ -4,7 +4,7 @@ Google's API, legacy and new, is opt-in, with the user's own key, and never writ
 one thing of an answer, the place id. Names, types, positions and opening times are Google's content: they may steer a
 decision while the process runs (which map place is confirmed, that a building has a restaurant) and are then
 forgotten. `FoundPlace.may_be_kept` is false for them, answers never enter the cache, and who puts them into a world
-has to see to it that only ids and own decisions are written (`vico.worldgen.places.found`). Places of Overture are
+has to see to it that only ids and own decisions are written (`vico.worldgen.places.stage`). Places of Overture are
 read by `vico.geo.overture`.
 """
 

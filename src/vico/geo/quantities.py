@@ -1,7 +1,7 @@
 """Quantities as people type them into tags: heights, storeys, widths, speeds, angles.
 
 All stages read tags' numbers here, so that `12 metres`, `40'6"` or `G+4` mean the same everywhere. A reading says by
-which rule it came about where the value does not say it plainly; a build lists these (`vico.worldgen.as_typed`).
+which rule it came about where the value does not say it plainly; a build lists these (`vico.worldgen.evidence`).
 """
 
 from __future__ import annotations

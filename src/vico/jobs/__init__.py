@@ -6,8 +6,16 @@ whoever writes one decides nothing about where it runs. A task must be idempoten
 or a machine dies.
 """
 
-from vico.jobs.contract import Answer, Done, Executor, Service, Task, Told
-from vico.jobs.executors import open_executor
-from vico.jobs.helper import Helper
+from vico.jobs.contract import Answer, AnswerHandler, Executor, MessageHandler, Service, Task
+from vico.jobs.executors import Helper, open_executor
 
-__all__ = ["Answer", "Done", "Executor", "Helper", "Service", "Task", "Told", "open_executor"]
+__all__ = [
+    "Answer",
+    "AnswerHandler",
+    "Executor",
+    "Helper",
+    "MessageHandler",
+    "Service",
+    "Task",
+    "open_executor",
+]

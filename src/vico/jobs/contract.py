@@ -1,13 +1,21 @@
-"""What is handed out, what comes back, and who does it."""
+"""What is handed out, what comes back, and who does it; and checks that machines share one store and one code.
+
+A `Service` names a function that makes the worker; a `Task` is plain JSON; an `Answer` is what came of it. An
+`Executor` does tasks side by side.
+"""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from vico.errors import InputError, OutputError, VicoError, line_of, sentence_of
+from vico.io.stores import Store
+from vico.version import __version__
 
 #: Plain data, as JSON has it.
 Json = Mapping[str, Any]
@@ -68,9 +76,9 @@ class Answer:
 
 
 #: Called with the index of a task and what came of it, as soon as it is over; in no fixed order.
-Done = Callable[[int, Answer], None]
+AnswerHandler = Callable[[int, Answer], None]
 #: Called with what a task tells on its way; only where that is cheap: a cluster tells nothing.
-Told = Callable[[Json], None]
+MessageHandler = Callable[[Json], None]
 
 
 class Executor(Protocol):
@@ -80,7 +88,9 @@ class Executor(Protocol):
     def one_machine(self) -> bool:
         """Whether all is done here, where files and code are those of whoever asks."""
 
-    def run(self, service: Service, tasks: Sequence[Task], *, done: Done, told: Told | None = None) -> None:
+    def run(
+        self, service: Service, tasks: Sequence[Task], *, done: AnswerHandler, told: MessageHandler | None = None
+    ) -> None:
         """Do all tasks.
 
         Raises
@@ -96,7 +106,7 @@ class Executor(Protocol):
     def __exit__(self, *_: object) -> None: ...
 
 
-def made(service: Service, tell: Tell) -> Work:
+def make_service(service: Service, tell: Tell) -> Work:
     """Make a service in this process.
 
     Raises
@@ -141,3 +151,47 @@ def answer_of(message: Json) -> Answer:
     if "output_error" in message:
         raise OutputError(message["output_error"])
     return Answer(message.get("answer"), message.get("reason", ""))
+
+
+@contextmanager
+def shared_store_marker(store: Store, executor: Executor) -> Iterator[str]:
+    """Give the name of a file of a store that every machine must see; empty where there is but one machine."""
+    if executor.one_machine:
+        yield ""
+        return
+    name = f".seen-{os.uname().nodename}-{os.getpid()}"
+    store.write(name, b"Written by the machine that shares out the work; the others look for it here.\n")
+    try:
+        yield name
+    finally:
+        store.remove(name)
+
+
+def check_shared_store(store: Store, name: str) -> None:
+    """Make sure that this machine sees the file that `shared_store_marker` gave the name of.
+
+    Raises
+    ------
+    InputError
+        If it does not: what it made would be nowhere.
+    """
+    if name and not store.has(name):
+        raise InputError(
+            f"{store}: not the same folder on every machine; give an --out that all of them share, or a URL like "
+            "s3://BUCKET/results"
+        )
+
+
+def check_same_code(asked: str, here: str) -> None:
+    """Make sure that the code of this machine, by its digest, is that of whoever asks.
+
+    Raises
+    ------
+    InputError
+        If it is not: what it made would be filed as something else.
+    """
+    if asked != here:
+        raise InputError(
+            f"vico {__version__} there is other code, or its $VICO_DATA holds other data, than where the work is asked "
+            "for; install the same on every machine"
+        )

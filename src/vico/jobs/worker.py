@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from vico.errors import InputError
-from vico.jobs.contract import Json, Service, Work, made, message_of
+from vico.jobs.contract import Json, Service, Work, make_service, message_of
 from vico.threads import WORKERS
 
 
@@ -36,7 +36,7 @@ def serve(connection: Connection, maker: str, options: str, environment: dict[st
         connection.send_bytes(json.dumps(message).encode())
 
     try:
-        work = made(Service(maker, json.loads(options)), lambda told: send({"told": told}))
+        work = make_service(Service(maker, json.loads(options)), lambda told: send({"told": told}))
     except InputError as error:
         send({"refused": str(error)})
         return
@@ -56,9 +56,9 @@ def attend(answers: int) -> None:
     tasks = _Tasks(answers)
     threading.Thread(target=tasks.take_in, daemon=True).start()
     try:
-        work = made(Service(asked["maker"], asked["options"]), lambda _: None)
+        work = make_service(Service(asked["maker"], asked["options"]), lambda _: None)
     except InputError as error:
-        work = _refusing(str(error))
+        work = _refusal(str(error))
     while True:
         number, content = tasks.next()
         tasks.say({"number": number, **message_of(work, content)})
@@ -98,7 +98,7 @@ class _Tasks:
             print(json.dumps(message), file=self._answers, flush=True)
 
 
-def _refusing(reason: str) -> Work:
+def _refusal(reason: str) -> Work:
     def work(_: Json) -> Json:
         raise InputError(reason)
 
@@ -122,16 +122,16 @@ def answer_in_cluster(maker: str, options: str, place: str, content: str) -> str
     # Ray gives a task as many threads as it was promised processors.
     os.environ.setdefault(WORKERS, os.environ.get("OMP_NUM_THREADS", "1"))
     try:
-        work = _kept(maker, options)
+        work = _cached_service(maker, options)
     except InputError as error:
         return json.dumps({"refused": f"{error} (on the machine {os.uname().nodename})"})
     return json.dumps(message_of(work, json.loads(content)))
 
 
 @lru_cache(maxsize=1)
-def _kept(maker: str, options: str) -> Work:
+def _cached_service(maker: str, options: str) -> Work:
     """Return a service of this process; the last one is kept, with the worlds it has read."""
-    return made(Service(maker, json.loads(options)), lambda _: None)
+    return make_service(Service(maker, json.loads(options)), lambda _: None)
 
 
 def _end_with_the_parent() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.exact import dot
+from vico.geometry import quaternion_from_matrix, rotation_matrix
 from vico.kinematics.arm import Chain, hand_pose, reach_pose, solve
-from vico.quaternions import matrix_of, quaternion_of
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def path_over(chain: Chain, now: Array, above: Array) -> Array | None:
 
 def straight_path(chain: Chain, angles: Array, start: Array, end: Array) -> Array | None:
     """Angles along a straight way of the hand, shape ``(m, 7)``; None if it can't be gone."""
-    first, last = quaternion_of(start[:, :3]), quaternion_of(end[:, :3])
+    first, last = quaternion_from_matrix(start[:, :3]), quaternion_from_matrix(end[:, :3])
     turn = float(dot(first, last))
     last = last if turn >= 0.0 else -last
     turned = 2.0 * math.acos(min(abs(turn), 1.0)) > 1e-3
@@ -94,7 +94,7 @@ def straight_path(chain: Chain, angles: Array, start: Array, end: Array) -> Arra
         goal = start + (end - start) * (k / count)
         if turned:
             between = first + (last - first) * (k / count)
-            goal[:, :3] = matrix_of(between / math.sqrt(float(dot(between, between))))
+            goal[:, :3] = rotation_matrix(between / math.sqrt(float(dot(between, between))))
         before = now.copy()
         if solve(chain, now, goal, 30) > 4e-3 or np.abs(now - before).max() > 0.35:
             return None

@@ -15,8 +15,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.crowd import Crowd
 from vico.io.compiled import compiled
+from vico.observation_arrays import CrowdObservations
 from vico.rules import ActionStatus, code_name
 from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.bodies.seats import Rests, find_rest
@@ -104,7 +104,7 @@ class Observations(ByAgent):
         names: Sequence[str],
         make_plain: Callable[[str], dict[str, Any]],
         make_seen: Callable[[str], dict[str, Any]],
-        crowd: Crowd,
+        crowd: CrowdObservations,
     ) -> None:
         super().__init__(names, make_plain, make_seen)
         self.crowd = crowd
@@ -257,7 +257,7 @@ class ObservationBuilder:
             self._seats_taken = self._state.seats_taken()
         return self._seats_taken
 
-    def crowd(self) -> Crowd:
+    def crowd(self) -> CrowdObservations:
         """Return all agents' observations as arrays."""
         p, n = self._state.people, len(self.poses)
         heard = np.zeros(n, bool)
@@ -270,7 +270,7 @@ class ObservationBuilder:
         view = self._in_view
         # The first bodies are the people's, in their order; who else is in view is no agent one would speak to.
         people = view.body < len(p)
-        return Crowd(
+        return CrowdObservations(
             index=self._index,
             time=self._state.second,
             pose=self.poses,

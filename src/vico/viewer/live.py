@@ -19,7 +19,7 @@ from vico.viewer.server.serve import ViewerServer
 from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.source import Source
 from vico.viewer.sources.tables import LiveTables
-from vico.viewer.sources.views import NoPictureError, RecordedViews, Seen, picture_of, seen_by
+from vico.viewer.sources.views import AgentView, NoPictureError, RecordedViews, picture_of, render_agent_view
 from vico.world.world import World
 
 # Seconds that pictures and plans are waited for: a first picture needs the scene to be made.
@@ -66,7 +66,7 @@ class LiveViewer(Hook):
         self._server: ViewerServer | None = None
         self._recorder: Recorder | None = None
         self._tables = LiveTables(control.out)
-        self._seen: tuple[str, int, Seen] | None = None
+        self._seen: tuple[str, int, AgentView] | None = None
         self._recorded: RecordedViews | None = None
         #: Told the address once the page is there.
         self.announce: Callable[[str], None] = lambda url: None
@@ -147,8 +147,8 @@ class LiveViewer(Hook):
             self._recorded = self._recorded or RecordedViews(run)
             return self._recorded.view(agent, step, output)
 
-        def render(runner: Runner) -> tuple[int, Seen]:
-            return runner.sim.metrics.steps, seen_by(runner.sim, agent)
+        def render(runner: Runner) -> tuple[int, AgentView]:
+            return runner.sim.metrics.steps, render_agent_view(runner.sim, agent)
 
         at, found = wait_for(self.control.ask(render), _PICTURE_WITHIN)
         self._seen = agent, at, found

@@ -1,8 +1,8 @@
 """The build of a city: all tiles are planned, then built, then fitted to each other; each step in any order.
 
 What a tile plans depends on the map around it alone, what is built in it on the plans of its neighbours, and how its
-ground ends on what its neighbours to the west and south drew. So tiles are the same bytes in whatever order, by however
-many processes, and whatever was there before. A build that was stopped goes on: a tile's stages are kept.
+ground ends on what its neighbours to the west and south drew. So tiles are the same bytes in whatever order, by
+however many processes, and whatever was there before. A build that was stopped goes on: a tile's stages are kept.
 """
 
 from __future__ import annotations
@@ -16,30 +16,263 @@ from typing import Any
 
 import numpy as np
 
-from vico.errors import InputError, StageError
+from vico.errors import InputError, StageError, VicoError, sentence_of
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm_parts import OsmParts
+from vico.io.arrays import mapped_array
 from vico.io.files import read_json, sha256_of, write_json
 from vico.io.memory import give_back_memory
 from vico.jobs import Answer, Service, Task, open_executor
 from vico.version import __version__
-from vico.world.city import CITY, COST, REACHED, ROOM, SURFACES, TILES, WHOLE, City, CityManifest, CityTile, read_city
+from vico.world.city import (
+    CITY,
+    COST,
+    REACHED,
+    ROOM,
+    SURFACES,
+    TILES,
+    WHOLE,
+    City,
+    CityManifest,
+    CityTile,
+    Side,
+    TileShift,
+    profile_of,
+    read_city,
+)
+from vico.world.city_gates import tile_gates
+from vico.world.glb import write_glb
 from vico.world.heights import HeightField
-from vico.world.model import Origin
-from vico.worldgen.city_map import RegionMap
-from vico.worldgen.city_report import write_city_report
-from vico.worldgen.city_request import CityRequest
-from vico.worldgen.city_streets import make_streets
-from vico.worldgen.city_tiles import GATES
-from vico.worldgen.city_tunnels import divide_tunnels, tiles_with_tunnels
-from vico.worldgen.city_waters import divide_waters
+from vico.world.mesh import Surface, merge_surfaces
+from vico.world.model import Building, Origin
+from vico.world.world import STAGES, World, read_stored, seal, stage_seconds
+from vico.worldgen.city_region import CityRequest, RegionMap, divide_tunnels, divide_waters, tiles_with_tunnels
+from vico.worldgen.city_streets import LEVELS, SHAPE, make_streets
+from vico.worldgen.construction import SEAMS, build_shape, map_of, plan_site, plan_with_neighbours
+from vico.worldgen.evidence import Evidence, read_evidence
 from vico.worldgen.ground.terrain import APRON, flat_terrain, terrain_from_dem
-from vico.worldgen.seams.grid import HALO, Tile, TileGrid, grid_of, grid_over, tile_name
-from vico.worldgen.seams.join import MAP
-from vico.worldgen.seams.walking import write_gates, write_walking
-from vico.worldgen.sources import Sources
-from vico.worldgen.stages import SUFFIX, Stages, code_digest, keep_product, kept_product
+from vico.worldgen.pipeline import OF_A_CITY, build_requested
+from vico.worldgen.previews import write_map
+from vico.worldgen.report import write_city_report
+from vico.worldgen.request import Sources
+from vico.worldgen.seams.joins import (
+    BORES,
+    CUT,
+    HALO,
+    JOINED,
+    MAP,
+    WATERS,
+    Tile,
+    TileGrid,
+    fit_border,
+    grid_of,
+    grid_over,
+    tile_name,
+)
+from vico.worldgen.seams.mosaic import TileShape, cells_of_tile, window_around, write_gates, write_walking
+from vico.worldgen.stages import SUFFIX, Stages, code_digest, digest_of, load_product, read_head, store_product
+
+#: Product with a tile's gates.
+GATES = "gates"
+
+
+def tile_builder(options: Mapping[str, Any], _: object) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """Return what does a step of a tile: a service of `vico.jobs`."""
+    request = CityRequest.from_json(dict(options))
+
+    def work(content: Mapping[str, Any]) -> dict[str, Any]:
+        column, row = content["tile"]
+        return STEPS[content["step"]](request, (column, row))
+
+    return work
+
+
+def plan_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Plan a tile's streets and ground; bare ground where that fails, for its neighbours need one."""
+    folder = request.plans / tile_name(tile)
+    terrain = request.plans / f"terrain{SUFFIX}"
+    made_of = [_head(folder, MAP), _head(folder, WATERS), read_head(terrain)[1] if terrain.exists() else ""]
+    return _cached_step(request, tile, "plan", made_of, lambda: _plan_stages(request, tile))
+
+
+def _plan_stages(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    stages, evidence = _evidence(request, tile)
+    try:
+        plan_site(evidence, request.tile(tile), stages)
+    except VicoError as error:
+        none = replace(evidence.data, nodes=[], ways=[], areas=[], relations=[])
+        plan_site(replace(evidence, data=stages.given(none, digest_of(none))), request.tile(tile), stages)
+        return {"failed": sentence_of(error)}
+    return {}
+
+
+def _evidence(request: CityRequest, tile: Tile) -> tuple[Stages, Evidence]:
+    """Return what keeps a tile's plan, and the sources there."""
+    asked, place = request.tile(tile), request.place(tile)
+    stages = Stages(place.own)
+    return stages, read_evidence(asked.sources, asked.frame, asked.reach, stages, part=map_of(place))
+
+
+def join_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Make a tile's streets and ground one with its neighbours', for the city's tunnels."""
+
+    def made() -> dict[str, Any]:
+        stages, evidence = _evidence(request, tile)
+        asked = request.tile(tile)
+        plan_with_neighbours(plan_site(evidence, asked, stages), asked, stages)
+        return {}
+
+    made_of = _plans(request, tile)
+    if not (request.plans / tile_name(tile) / f"{JOINED}{SUFFIX}").exists():
+        _forget_step(request, tile, "join")
+    return _cached_step(request, tile, "join", made_of, made)
+
+
+def shape_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Make what stands in a tile, for the city's streets."""
+    made_of = [*_plans(request, tile), _head(request.plans / tile_name(tile), BORES)]
+    return _cached_step(request, tile, "shape", made_of, lambda: _shape_stages(request, tile))
+
+
+def _shape_stages(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    stages, evidence = _evidence(request, tile)
+    asked = request.tile(tile)
+    made = build_shape(plan_site(evidence, asked, stages), asked, stages)
+    own = [*made.built.standing(made.plan.height), *made.bridges.feet]
+    found = TileShape(own, made.bridges.open_ways, made.plan.streets)
+    folder = request.plans / tile_name(tile)
+    store_product(folder, SHAPE, found)
+    store_product(folder, LEVELS, made.levels)
+    return {}
+
+
+def build_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Build a tile's world; its ground ends at its borders."""
+    folder, out = request.plans / tile_name(tile), request.out / TILES / tile_name(tile)
+    if not (out / "world.json").exists():
+        _forget_step(request, tile, "build")
+    made_of = [*_plans(request, tile), _head(folder, BORES), _head(folder, CUT)]
+
+    def made() -> dict[str, Any]:
+        build_requested(request.tile(tile), out)
+        return {}
+
+    return _cached_step(request, tile, "build", made_of, made)
+
+
+def _plans(request: CityRequest, tile: Tile) -> list[str]:
+    """Return digests of a tile's map, and of what it and its neighbours planned."""
+    around = [request.plans / tile_name(one) for one in request.grid.around(tile)]
+    own = request.plans / tile_name(tile)
+    return [_head(own, MAP), _head(own, WATERS), *(_head(folder, name) for folder in around for name in SEAMS)]
+
+
+def fit_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Make a tile's ground meet that of the tiles before it, draw its map, and return what the tile came to."""
+    out = request.out / TILES / tile_name(tile)
+    before = {axis: (tile[0] - (axis == 0), tile[1] - (axis == 1)) for axis in (0, 1)}
+    there = {axis: request.out / TILES / tile_name(one) for axis, one in before.items()}
+    there = {axis: folder for axis, folder in there.items() if (folder / STAGES / f"ground{SUFFIX}").exists()}
+    made_of = [_head(folder / STAGES, name) for folder in (out, *there.values()) for name in ("ground", "wires")]
+    folders = {one: request.out / TILES / tile_name(one) for one in request.grid.around(tile)}
+    around = [one for one, folder in folders.items() if (folder / "world.json").exists()]
+    made_of += [read_stored(folders[one]).manifest.files["buildings.json"] for one in around]
+    known = _stored_step(request, tile, "fit")
+    if known is not None and read_stored(out).digest != known["found"]["digest"]:
+        _forget_step(request, tile, "fit")  # it was built anew
+    return _cached_step(
+        request, tile, "fit", [*map(str, there), *made_of], lambda: _fit_ground(request, tile, there, around)
+    )
+
+
+def _fit_ground(request: CityRequest, tile: Tile, there: Mapping[int, Path], around: Sequence[Tile]) -> dict[str, Any]:
+    out, half = request.out / TILES / tile_name(tile), request.grid.size / 2
+    world = read_stored(out)
+    ground = _unfitted_ground(out)
+    for axis, folder in there.items():
+        ground = fit_border(ground, Side(axis, -half), profile_of(_unfitted_ground(folder), Side(axis, half)))
+    wires: list[Surface] = load_product(out / STAGES, "wires")[0]
+    write_glb(out / "meshes" / "ground.glb", {"ground": merge_surfaces([*ground, *wires])})
+    houses: list[Building] = []
+    for one in around:
+        east, north = ((a - b) * request.grid.size for a, b in zip(one, tile, strict=True))
+        shift = TileShift(east, north, 0, tile_name(one))
+        houses += map(shift.building, read_stored(request.out / TILES / tile_name(one)).buildings)
+    write_map(World(world.manifest, out, buildings=houses), out)
+    seal(out, world.manifest, seconds=stage_seconds(world), without=OF_A_CITY)
+    done = read_stored(out)
+    return {
+        "digest": done.digest,
+        "buildings": done.manifest.counts["buildings"],
+        "places": done.manifest.counts["places"],
+    }
+
+
+def _unfitted_ground(tile: Path) -> list[Surface]:
+    """Return the ground of a tile as it was made, not yet fitted to any neighbour."""
+    ground: list[Surface] = load_product(tile / STAGES, "ground")[0]
+    return ground
+
+
+def find_gates(request: CityRequest, tile: Tile) -> dict[str, Any]:
+    """Find where one walks from a tile into others, and what ways between these places cost."""
+    cost, room = (mapped_array(request.out / WHOLE / name) for name in (COST, ROOM))
+    square = cells_of_tile(tile, request.grid, len(cost) // (2 * request.grid.reach + 1))
+    wide = window_around(square, 1)[0]
+    made_of = [str(square), sha256(np.ascontiguousarray(cost[wide]).tobytes()).hexdigest()]
+    made_of.append(sha256(np.ascontiguousarray(room[square]).tobytes()).hexdigest())
+    cell = request.grid.size / (square[0].stop - square[0].start)
+
+    def made() -> dict[str, Any]:
+        store_product(request.plans / tile_name(tile), GATES, tile_gates(cost, room, square, cell=cell))
+        return {}
+
+    return _cached_step(request, tile, "gates", made_of, made)
+
+
+def _head(folder: Path, name: str) -> str:
+    """Return the digest of a product."""
+    return read_head(folder / f"{name}{SUFFIX}")[1]
+
+
+def _stored_step(request: CityRequest, tile: Tile, step: str) -> dict[str, Any] | None:
+    """Return what is kept of a step that was done: its key, and what it found."""
+    path = request.plans / tile_name(tile) / f"{step}.json"
+    content: dict[str, Any] | None = read_json(path) if path.exists() else None
+    return content
+
+
+def _forget_step(request: CityRequest, tile: Tile, step: str) -> None:
+    (request.plans / tile_name(tile) / f"{step}.json").unlink(missing_ok=True)
+
+
+def _cached_step(
+    request: CityRequest, tile: Tile, step: str, made_of: Sequence[str], made: Callable[[], dict[str, Any]]
+) -> dict[str, Any]:
+    """Do a step, or return what it found when it was done with the same code, request and inputs."""
+    content = request.to_json()
+    asked = [tile_name(tile), *(str(content[name]) for name in ("lat", "lon", "seed")), str(request.grid.size)]
+    key = sha256("\n".join([code_digest(), *asked, *made_of]).encode()).hexdigest()
+    known = _stored_step(request, tile, step)
+    if known is not None and known["key"] == key:
+        found: dict[str, Any] = known["found"]
+        return found
+    _forget_step(request, tile, step)
+    found = made()
+    write_json(request.plans / tile_name(tile) / f"{step}.json", {"key": key, "found": found})
+    return found
+
+
+STEPS: dict[str, Callable[[CityRequest, Tile], dict[str, Any]]] = {
+    "plan": plan_tile,
+    "join": join_tile,
+    "shape": shape_tile,
+    "build": build_tile,
+    "fit": fit_tile,
+    "gates": find_gates,
+}
+
 
 TILE = 400.0
 _CELL = 8.0
@@ -144,12 +377,12 @@ def build_city(
     found: dict[Tile, Any] = {}
     workers = min(workers, len(request.grid)) if ray is None else workers
     with open_executor(workers=workers, ray=ray) as executor:
-        service = Service("vico.worldgen.city_tiles:builder", request.to_json())
+        service = Service("vico.worldgen.city_build:tile_builder", request.to_json())
 
         def done(step: str, tiles: Sequence[Tile]) -> list[Tile]:
             """Do a step to tiles, and return those that it went well with."""
             nonlocal found
-            answers = _done(executor, service, tiles, step, progress)
+            answers = _run_step(executor, service, tiles, step, progress)
             refused = {one: answer.reason for one, answer in answers.items() if answer.content is None}
             found = {one: answer.content for one, answer in answers.items() if answer.content is not None}
             refused |= {one: content["failed"] for one, content in found.items() if "failed" in content}
@@ -162,16 +395,16 @@ def build_city(
         give_back_memory()
         left = done("shape", left)
         if left:
-            _tell(progress, "streets", 0)
+            _report_step(progress, "streets", 0)
             reports = make_streets(request, region)
-            _tell(progress, "streets", 1)
+            _report_step(progress, "streets", 1)
         del region
         give_back_memory()
         left = done("fit", done("build", left))
         if left:
             tiles = dict(found)
             maps = {one: request.out / TILES / tile_name(one) / "walkable.npz" for one in left}
-            _walking(request, maps)
+            _write_walkable(request, maps)
             give_back_memory()
             if lost := set(left).difference(done("gates", left)):
                 name = tile_name(min(lost))
@@ -179,7 +412,7 @@ def build_city(
     if not left:
         raise InputError(f"{request.out}: no tile could be built: {next(iter(failed.values()))}")
     whole = request.out / WHOLE
-    write_gates(whole, [kept_product(request.plans / tile_name(one), GATES)[0] for one in left])
+    write_gates(whole, [load_product(request.plans / tile_name(one), GATES)[0] for one in left])
     manifest = CityManifest(
         producer=f"vico {__version__}",
         origin=Origin(lat=request.lat, lon=request.lon),
@@ -198,7 +431,7 @@ def build_city(
     return city
 
 
-def _walking(request: CityRequest, maps: Mapping[Tile, Path]) -> None:
+def _write_walkable(request: CityRequest, maps: Mapping[Tile, Path]) -> None:
     """Write the walkable map of the city, if those of its tiles are not what they were."""
     known = request.plans / "walking.json"
     files = [request.out / WHOLE / name for name in (SURFACES, ROOM, REACHED, COST)]
@@ -214,7 +447,7 @@ def _walking(request: CityRequest, maps: Mapping[Tile, Path]) -> None:
         write_json(known, key)
 
 
-def _tell(progress: Progress | None, step: str, done: int) -> None:
+def _report_step(progress: Progress | None, step: str, done: int) -> None:
     if progress is not None:
         progress(step, done, 1)
 
@@ -237,7 +470,7 @@ def divide_map(request: CityRequest) -> RegionMap:
         for tile in request.grid:
             east, north = request.grid.centre(tile)
             part = parts.within(half=half, margin=region.whole.margin, east=east, north=north)
-            keep_product(request.plans / tile_name(tile), MAP, replace(part, sha256="", timestamp=None))
+            store_product(request.plans / tile_name(tile), MAP, replace(part, sha256="", timestamp=None))
         write_json(known, {"key": region.key})
     return region
 
@@ -254,7 +487,7 @@ def bare_ground(request: CityRequest) -> HeightField:
     return stages.run("terrain", terrain_from_dem, samples, half=half, apron=APRON)
 
 
-def _done(
+def _run_step(
     executor: Any, service: Service, tiles: Sequence[Tile], step: str, progress: Progress | None
 ) -> dict[Tile, Answer]:
     """Do a step to all tiles; return what came of each, in the order of the tiles."""

@@ -15,25 +15,35 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
 from vico.io.memory import give_back_memory
-from vico.world.city import EDGE, HIGH, LOW, NET, ROADS, SMOOTH, TRANSIT, WHOLE, XODR, release_pages, whole_ground
-from vico.world.city import LEVELS as LEVELS_OF_CITY
+from vico.world.city import (
+    EDGE,
+    HIGH,
+    LOW,
+    NET,
+    ROADS,
+    SMOOTH,
+    TRANSIT,
+    WHOLE,
+    XODR,
+    release_pages,
+    whole_ground,
+)
+from vico.world.city import (
+    LEVELS as LEVELS_OF_CITY,
+)
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph, read_lanes
 from vico.world.model import Point2, Point3, Roads, StageReport
 from vico.world.transit import Transit
 from vico.world.world import write_record
-from vico.worldgen.city_map import RegionMap
-from vico.worldgen.city_request import CityRequest
+from vico.worldgen.city_region import CityRequest, RegionMap
 from vico.worldgen.facts.site import site_facts
-from vico.worldgen.product import read_head
-from vico.worldgen.seams.grid import Tile, TileGrid, tile_name
-from vico.worldgen.seams.join import CUT
-from vico.worldgen.seams.mosaic import TileShape, solids_of, streets_of, write_ground
-from vico.worldgen.seams.network_cut import NetworkCutter
-from vico.worldgen.stages import SUFFIX, Stages, keep_product, kept_product
+from vico.worldgen.seams.joins import CUT, Tile, TileGrid, tile_name
+from vico.worldgen.seams.mosaic import NetworkCutter, TileShape, solids_of, streets_of, write_ground
+from vico.worldgen.stages import SUFFIX, Stages, load_product, read_head, store_product
+from vico.worldgen.streets.lane_shapes import CarriagewayEdges
 from vico.worldgen.streets.netconvert import RoadNetwork, road_network
 from vico.worldgen.streets.roads import closed_roads, roads_from_osm, streets_from_osm
-from vico.worldgen.streets.walk_lines import CarriagewayEdges
 from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_places
 
@@ -90,16 +100,16 @@ def make_streets(request: CityRequest, region: RegionMap) -> list[StageReport]:
     known = request.plans / STREETS / _DONE
     key = sha256(f"{region.key} {request.seed} {both}".encode()).hexdigest()
     content = read_json(known) if known.exists() else {}
-    if content.get("key") == key and content["made"] == _made(request):
+    if content.get("key") == key and content["made"] == _output_digests(request):
         return [StageReport.model_validate(one) for one in content["reports"]]
     known.unlink(missing_ok=True)
     reports = _make(request, region.of_city, both)
     told = [report.model_dump(mode="json") for report in reports]
-    write_json(known, {"key": key, "made": _made(request), "reports": told})
+    write_json(known, {"key": key, "made": _output_digests(request), "reports": told})
     return reports
 
 
-def _made(request: CityRequest) -> dict[str, str]:
+def _output_digests(request: CityRequest) -> dict[str, str]:
     """Return digests of all that streets are made into, as far as it is there."""
     whole = request.out / WHOLE
     digests = {name: sha256_of(whole / name) for name in _FILES if (whole / name).exists()}
@@ -155,11 +165,11 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
         net = cutter.within(half=request.grid.size / 2 + _AROUND, east=shift.by[0], north=shift.by[1])
         served = {name.decode() for name in _LANE.findall(net)}
         part = TileStreets(_roads_in(roads, boxes, shift), RoadNetwork(net, None), _transit_in(transit, shift, served))
-        keep_product(request.plans / tile_name(tile), CUT, part)
+        store_product(request.plans / tile_name(tile), CUT, part)
     return stages.reports
 
 
-def _shaped(request: CityRequest) -> list[Tile]:
+def _tiles_with_shape(request: CityRequest) -> list[Tile]:
     """Return the tiles that have a shape."""
     return [tile for tile in request.grid if (request.plans / tile_name(tile) / f"{SHAPE}{SUFFIX}").exists()]
 
@@ -167,7 +177,7 @@ def _shaped(request: CityRequest) -> list[Tile]:
 def _digest_of_shapes(request: CityRequest) -> str:
     """Return a digest of all that is read, or will be, of the shapes of tiles."""
     digests: list[str] = []
-    for tile in _shaped(request):
+    for tile in _tiles_with_shape(request):
         folder = request.plans / tile_name(tile)
         digests += [tile_name(tile), *(read_head(folder / f"{name}{SUFFIX}")[1] for name in (SHAPE, LEVELS))]
     return sha256("\n".join(digests).encode()).hexdigest()
@@ -178,14 +188,16 @@ class _Shapes(dict[Tile, TileShape]):
 
 
 def _shapes(request: CityRequest) -> _Shapes:
-    return _Shapes({tile: kept_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _shaped(request)})
+    return _Shapes(
+        {tile: load_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _tiles_with_shape(request)}
+    )
 
 
 def _levels(request: CityRequest, tile: Tile) -> HeightField:
     """Return the ground of a tile; as it was planned where nothing could be made on it."""
     folder = request.plans / tile_name(tile)
     made = (folder / f"{LEVELS}{SUFFIX}").exists()
-    levels: HeightField = kept_product(folder, LEVELS if made else "grading")[0]
+    levels: HeightField = load_product(folder, LEVELS if made else "grading")[0]
     return levels
 
 

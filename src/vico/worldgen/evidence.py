@@ -1,12 +1,21 @@
-"""What the sources of a world give, read once before its stages run."""
+"""What the sources of a world give, read once before its stages run; and which values of the map could not be read.
+
+A build's report lists each value that is not plain: what was read by a rule ("G+4" as five storeys), what can't be
+read ("two"), and what can't be true ("9999"). Nothing else is decided here; stages read the same values by
+`vico.geo.quantities` and `vico.world.opening_hours`.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from vico.errors import EmptyInputError, InputError
 from vico.geo.building_files import checked_files, read_buildings
@@ -17,9 +26,10 @@ from vico.geo.frame import LocalFrame
 from vico.geo.gtfs import read_gtfs
 from vico.geo.gtfs_feed import NO_TIMETABLE, Feed
 from vico.geo.mapillary import Mapillary
-from vico.geo.osm import OsmData, read_osm
+from vico.geo.osm import OsmData, Tags, read_osm
 from vico.geo.overture import OverturePlaces
 from vico.geo.places import FoundPlace, GooglePlaces, google_key
+from vico.geo.quantities import QUANTITIES, Kind, Range, read
 from vico.geo.street_image_folder import FolderImages
 from vico.geo.street_images import StreetImage, StreetImages
 from vico.geo.tiles3d import TileMesh, read_tileset
@@ -27,12 +37,83 @@ from vico.geo.tiles3d_files import tile_source
 from vico.io.cache import cache_folder
 from vico.io.files import sha256_of
 from vico.io.http import HttpClient
-from vico.world.model import Dropped, Source
-from vico.worldgen.as_typed import quantities_as_typed
+from vico.world.model import Dropped, Place, Source
+from vico.world.opening_hours import how_read, standard_spelling
 from vico.worldgen.facts.conflation import Precedence, read_precedence
-from vico.worldgen.product import digest_of
-from vico.worldgen.sources import SERVICES, Sources
-from vico.worldgen.stages import Stages
+from vico.worldgen.request import SERVICES, Sources
+from vico.worldgen.stages import Stages, digest_of
+
+_UNITS = {
+    Kind.LENGTH: " m",
+    Kind.STOREYS: " storeys",
+    Kind.SPEED: " m/s",
+    Kind.ANGLE: " degrees",
+    Kind.NUMBER: "",
+    Kind.LANES: "",
+}
+# Values of `maxspeed` that say no speed, and mean to.
+_PLAIN_WORDS = frozenset({"none", "signals", "variable", "no", "unknown"})
+
+
+def quantity_notes(osm: OsmData) -> tuple[dict[str, int], list[Dropped]]:
+    """List the heights, storeys, widths and speeds of a window that were read by a rule or not at all.
+
+    Returns
+    -------
+    tuple
+        Counts of values ``by_rule`` and ``not_read`` (empty where all are plain), and id and sentence of each.
+    """
+    told: list[Dropped] = []
+    counts = {"by_rule": 0, "not_read": 0}
+    for name, shape, tags in _tagged_objects(osm):
+        for key, text in tags.items():
+            of = QUANTITIES.get(key)
+            if of is None or (sentence := _note_on_value(text, of)) is None or not np.any(osm.holds(shape)):
+                continue
+            counts["by_rule" if " read as " in sentence else "not_read"] += 1
+            told.append(Dropped(id=name, reason=f"{key}={text!r} {sentence}"))
+    return (counts if told else {}), told
+
+
+def opening_hours_notes(places: Sequence[Place]) -> tuple[dict[str, int], list[Dropped]]:
+    """List the opening hours of places that were respelled or can't be read; the counts as of quantities."""
+    told: list[Dropped] = []
+    counts = {"by_rule": 0, "not_read": 0}
+    for place in places:
+        text = place.opening_hours
+        if text is None or (how := how_read(text)) == "as typed":
+            continue
+        counts["not_read" if how == "not read" else "by_rule"] += 1
+        read_as = (
+            f"was read as {standard_spelling(text)!r}" if how == "respelled" else "can't be read: usual hours hold"
+        )
+        told.append(Dropped(id=place.id, reason=f"opening_hours={text!r} {read_as}"))
+    return (counts if told else {}), told
+
+
+def _tagged_objects(osm: OsmData) -> Iterator[tuple[str, NDArray[np.float64], Tags]]:
+    """Everything of a map that has tags: its id, points of its shape, and its tags. A closed way is told once."""
+    yield from ((f"n{node.id}", node.xy[None], node.tags) for node in osm.nodes)
+    yield from ((f"w{way.id}", way.line, way.tags) for way in osm.ways)
+    relations: Iterable[tuple[str, NDArray[np.float64], Tags]] = (
+        (area.id, shapely.get_coordinates(area.polygon), area.tags) for area in osm.areas if area.id.startswith("r")
+    )
+    yield from relations
+
+
+def _note_on_value(text: str, of: Range) -> str | None:
+    """Say how a value was read, or why not; None where it is plain."""
+    if text in _PLAIN_WORDS and of.kind is Kind.SPEED:
+        return None
+    found = read(text, of.kind)
+    if found.value is None:
+        return "can't be read: decided by rule"
+    if not of.least <= found.value <= of.most:
+        return f"can't be ({of.least:g} to {of.most:g}{_UNITS[of.kind]}): decided by rule"
+    if found.rule:
+        return f"was read as {found.value:.4g}{_UNITS[of.kind]}: {found.rule}"
+    return None
+
 
 _TILE_MARGIN = 80.0  # metres: as far as the terrain goes beyond the window, and what hides its border
 _TILE_ERROR = 0.4  # metres: coarser tiles have photos too blurred for walls with texels of 10 cm
@@ -80,7 +161,7 @@ class Evidence:
     detections: Detections | None = None
 
 
-def gather(
+def read_evidence(
     sources: Sources, frame: LocalFrame, half: float, stages: Stages, *, part: tuple[OsmData, str] | None = None
 ) -> Evidence:
     """Read every source, and report what could not be read.
@@ -127,7 +208,7 @@ def gather(
     tiles = None
     if sources.tiles is not None:
         with stages.timed("tiles"):
-            tiles = _tiles(sources.tiles, frame, half, stages, credits)
+            tiles = _tile_mesh(sources.tiles, frame, half, stages, credits)
     images: list[StreetImage] = []
     if sources.photos is not None:
         with stages.timed("photos"):
@@ -182,7 +263,7 @@ def _report_map(data: OsmData, samples: HeightSamples | None, without: Dropped |
         },
         [Dropped(id=key, reason=reason) for key, reason in data.broken],
     )
-    if (typed := quantities_as_typed(data))[1]:
+    if (typed := quantity_notes(data))[1]:
         stages.report("values of the map", *typed)
     if without is not None:
         stages.report("map", {}, [without])
@@ -193,14 +274,14 @@ def _report_map(data: OsmData, samples: HeightSamples | None, without: Dropped |
             [Dropped(id=samples.name, reason=samples.beyond)],
         )
     if samples is not None and samples.outliers:
-        told = [Dropped(id=name, reason=reason) for name, reason in _outlying(samples)]
+        told = [Dropped(id=name, reason=reason) for name, reason in _outlier_notes(samples)]
         stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
     if samples is not None and (samples.voids or samples.doubtful):
-        told = [Dropped(id=name, reason=reason) for name, reason in _untagged(samples)]
+        told = [Dropped(id=name, reason=reason) for name, reason in _void_notes(samples)]
         stages.report("map", {"heights_void": sum(row[4] for row in samples.voids)}, told)
 
 
-def _untagged(samples: HeightSamples) -> list[tuple[str, str]]:
+def _void_notes(samples: HeightSamples) -> list[tuple[str, str]]:
     """Return the file of each patch of one height that is a void or may be one, and a sentence on it."""
     told = []
     for rows, said in (
@@ -219,7 +300,7 @@ def _untagged(samples: HeightSamples) -> list[tuple[str, str]]:
     return told
 
 
-def _outlying(samples: HeightSamples) -> list[tuple[str, str]]:
+def _outlier_notes(samples: HeightSamples) -> list[tuple[str, str]]:
     """Return each file with heights that no ground has, and a sentence on them."""
     told = []
     for name in dict.fromkeys(row[0] for row in samples.outliers):
@@ -300,7 +381,7 @@ def _detections(
     return found
 
 
-def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:
+def _tile_mesh(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:
     mesh, report = read_tileset(
         tile_source(source, web=HttpClient(cache=cache_folder() / "tiles")),
         frame,

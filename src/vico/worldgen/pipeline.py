@@ -28,15 +28,14 @@ from vico.io.files import (
 from vico.world.folder import read_world
 from vico.world.model import Manifest
 from vico.world.world import STAGES, WORLD_FOLDER, seal
-from vico.worldgen.ahead import Ahead
-from vico.worldgen.evidence import gather
+from vico.worldgen.background_stages import BackgroundStages
+from vico.worldgen.construction import map_of
+from vico.worldgen.evidence import read_evidence
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
-from vico.worldgen.previews.stage import write_previews
+from vico.worldgen.previews import write_previews
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
-from vico.worldgen.request import BuildOptions, WorldRequest
-from vico.worldgen.shaping import map_of
-from vico.worldgen.sources import LEAST_RADIUS, MOST_RADIUS, Sources
+from vico.worldgen.request import LEAST_RADIUS, MOST_RADIUS, BuildOptions, Sources, WorldRequest
 from vico.worldgen.stages import Progress, Stages
 
 #: Files that a tile lacks: its streets are its city's, and only that has them as OpenDRIVE.
@@ -165,13 +164,13 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions, kind: Folder
     with new_folder(out, force=True, work=folder, kind=kind):
         planned, part = (None, None) if request.place is None else (request.place.own, map_of(request.place))
         stages = Stages(folder / STAGES, again=options.again, progress=options.progress, beside=planned)
-        evidence = gather(request.sources, request.frame, request.reach, stages, part=part)
+        evidence = read_evidence(request.sources, request.frame, request.reach, stages, part=part)
         _clear(folder)
         if not (folder / STAGES).exists() and (out / STAGES).is_dir():
             # What did not change need not be made.
             shutil.copytree(out / STAGES, folder / STAGES, copy_function=os.link)
         write_json(folder / STAGES / _REQUEST, request.to_json())
-        with Ahead(request, folder / STAGES) as ahead:
+        with BackgroundStages(request, folder / STAGES) as ahead:
             world = make_world(evidence, request, folder, stages, ahead)
         del evidence  # the mesh of a photographed city is large, and so are its pictures
         if part is None:

@@ -18,52 +18,52 @@ from vico.world.model import Building, Dropped, Entrance, Place, Roads
 from vico.world.objects import Objects
 from vico.world.transit import Transit
 from vico.world.world import FILE, World, write_records
-from vico.worldgen.ahead import Ahead
-from vico.worldgen.as_typed import hours_as_typed
+from vico.worldgen.background_stages import BackgroundStages
 from vico.worldgen.buildings.stage import Cladding
-from vico.worldgen.evidence import Evidence
+from vico.worldgen.construction import Shape, build_shape, find_yards, make_cladding, make_ground, plan_site
+from vico.worldgen.evidence import Evidence, opening_hours_notes
 from vico.worldgen.facades.fronts import street_fronts
 from vico.worldgen.facades.street_names import Streets
 from vico.worldgen.facts.street_habits import street_habits
 from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
-from vico.worldgen.laying import cladding_in, ground_in, yards_in
 from vico.worldgen.objects.detections import things_from_detections
 from vico.worldgen.objects.parking import parking_from_osm
 from vico.worldgen.objects.stage import Surroundings, models_of, objects_from_osm
-from vico.worldgen.photos.streetview.renders import photographer_of
+from vico.worldgen.photos.streetview.reprojection import photographer_of
 from vico.worldgen.photos.texturing import (
     Texturing,
-    enhanced,
-    kept_where_photographed,
-    painted_as_built,
-    painted_from_street,
-    painted_from_tiles,
+    enhance,
+    keep_photographed_faces,
+    paint_as_built,
+    paint_from_street,
+    paint_from_tiles,
 )
 from vico.worldgen.places.stage import places_from_osm
 from vico.worldgen.request import WorldRequest
-from vico.worldgen.seams.join import CUT, TilePlace
-from vico.worldgen.shaping import Shape, planned, shaped
-from vico.worldgen.stages import Stages, kept_product
+from vico.worldgen.seams.joins import CUT, TilePlace
+from vico.worldgen.stages import Stages, load_product
+from vico.worldgen.streets.lane_shapes import CarriagewayEdges
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
-from vico.worldgen.streets.walk_lines import CarriagewayEdges
 from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_places
-from vico.worldgen.writing import Layers, WorldParts, WorldWriter, faces, manifest_of
+from vico.worldgen.world_writer import Layers, WorldParts, WorldWriter, faces, manifest_of
 
 # Faces that photos cover less than this share of keep their facade.
 _LEAST_COVERED = 0.3
 
 
-def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages, ahead: Ahead) -> World:
+def make_world(
+    evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages, ahead: BackgroundStages
+) -> World:
     """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
     if request.sources.installed_things:
         read_things()  # refuses before anything is built if they are not installed
     seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)
 
-    shape = shaped(planned(evidence, request, stages), request, stages)
+    shape = build_shape(plan_site(evidence, request, stages), request, stages)
     evidence, site, tiles, streets, height = (
         shape.plan.evidence, shape.plan.site, shape.plan.tiles, shape.plan.streets, shape.plan.height,
     )  # fmt: skip
@@ -73,10 +73,12 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     ahead.make("cladding", stages)
     write.terrain(levels, flat=evidence.samples is None and tiles is None)
     roads, lanes, transit = (
-        _streets_of(shape, request, stages, write) if request.place is None else _cut(request.place, stages, write)
+        _make_streets(shape, request, stages, write)
+        if request.place is None
+        else _cut_streets(request.place, stages, write)
     )
 
-    yards = yards_in(shape, request, stages)
+    yards = find_yards(shape, request, stages)
     outdoors, dropped = run(
         "objects",
         objects_from_osm,
@@ -120,15 +122,15 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     )
     buildings = write.buildings(built, entrances)
     stages.report("places", {"places": len(places), "entrances": len(entrances)}, dropped)
-    if (typed := hours_as_typed(places))[1]:
+    if (typed := opening_hours_notes(places))[1]:
         stages.report("opening hours", *typed)
-    indoors, undrawn = _furnished(places, entrances, buildings, height, request, stages)
+    indoors, undrawn = _furnish(places, entrances, buildings, height, request, stages)
     write.indoors(indoors, undrawn)
     objects = write.objects(outdoors, indoors)
 
-    ground = ground_in(shape, yards, trees, request, stages)
+    ground = make_ground(shape, yards, trees, request, stages)
     stages.report("ground", {"faces": faces(ground)})
-    cladding = cladding_in(shape, request, stages)
+    cladding = make_cladding(shape, request, stages)
     with stages.timed("fronts"):
         names = Streets(roads, outdoors, levels, street_habits(site.osm).plates)
         fronts = street_fronts(indoors.places, entrances, buildings, cladding.walls, seed=seed, streets=names)
@@ -153,13 +155,13 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     manifest = manifest_of(request, evidence, parts, stages, credits)
     if tiles is not None or evidence.images:
         seen = parts.world(manifest, folder, layers)
-        walls, roofs = _painted(evidence.images, tiles, cladding, seen, request.texturing, stages)
+        walls, roofs = _paint_photos(evidence.images, tiles, cladding, seen, request.texturing, stages)
         layers = replace(layers, walls=walls, roofs=roofs)
     write.meshes(layers, models)
     return parts.world(manifest, folder, layers)
 
 
-def _streets_of(
+def _make_streets(
     shape: Shape, request: WorldRequest, stages: Stages, write: WorldWriter
 ) -> tuple[Roads, LaneGraph, Transit]:
     """Make the streets of a world by itself: what is driven and walked on, and public transport."""
@@ -177,9 +179,9 @@ def _streets_of(
     return roads, lanes, transit
 
 
-def _cut(place: TilePlace, stages: Stages, write: WorldWriter) -> tuple[Roads, LaneGraph, Transit]:
+def _cut_streets(place: TilePlace, stages: Stages, write: WorldWriter) -> tuple[Roads, LaneGraph, Transit]:
     """Take the streets of a tile from those of its city."""
-    cut, digest = kept_product(place.own, CUT)
+    cut, digest = load_product(place.own, CUT)
     stages.given(cut.roads, f"roads {digest}")
     stages.given(cut.transit, f"transit {digest}")
     lanes = write.streets(cut.roads, cut.network)
@@ -199,7 +201,7 @@ def _with_detections(
     return stages.given(things.on(osm), f"{stages.digest(osm)} {stages.digest(things)}")
 
 
-def _furnished(
+def _furnish(
     places: list[Place],
     entrances: list[Entrance],
     buildings: list[Building],
@@ -225,7 +227,7 @@ def _furnished(
     return stages.run("indoor", furnish_drawn, places, author=author, **inside)
 
 
-def _painted(
+def _paint_photos(
     images: Sequence[StreetImage],
     tiles: TileMesh | None,
     cladding: Cladding,
@@ -238,17 +240,17 @@ def _painted(
         # Where street photos may still come, hardly covered faces wait for them.
         least = 0.0 if images else _LEAST_COVERED
         painted = stages.run(
-            "bake", painted_from_tiles, cladding.walls, cladding.roofs, tiles, texel=how.texel, least=least
+            "bake", paint_from_tiles, cladding.walls, cladding.roofs, tiles, texel=how.texel, least=least
         )
     else:
-        painted = stages.run("bake", painted_as_built, cladding.walls, cladding.roofs, texel=how.texel)
+        painted = stages.run("bake", paint_as_built, cladding.walls, cladding.roofs, texel=how.texel)
     if images:
         walls, roofs = painted.surfaces()
         layers = {"ground": world.surfaces("ground"), "buildings": walls, "roofs": roofs}
         seen = World(world.manifest, world.path, layers=layers, objects=world.objects, models=world.prototypes())
         painted, report = stages.run(
             "streetview",
-            painted_from_street,
+            paint_from_street,
             painted,
             list(images),
             world.height,
@@ -257,7 +259,7 @@ def _painted(
             how=how,
         )
         stages.report("streetview", report.counts, report.dropped)
-    painted = kept_where_photographed(cladding.walls, cladding.roofs, painted, least=_LEAST_COVERED)
-    painted = stages.run("enhance", enhanced, painted, how)
+    painted = keep_photographed_faces(cladding.walls, cladding.roofs, painted, least=_LEAST_COVERED)
+    painted = stages.run("enhance", enhance, painted, how)
     stages.report("texture", painted.counts)
     return painted.surfaces()

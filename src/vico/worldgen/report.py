@@ -1,4 +1,8 @@
-"""``report.html``: what was built, for a person: map, views, counts, what was left out and why, seconds, licences."""
+"""``report.html`` of a world and of a city: what was built, for a person; it opens from disk.
+
+A world's page has its map, views, counts, what was left out and why, seconds and licences. A city's page has its map,
+to be zoomed and dragged, what was built, and what was left out.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from vico.io.files import write_bytes
+from vico.world.city import TILES, City
 from vico.world.model import Dropped, StageReport
 from vico.world.world import World, stage_seconds
 
@@ -62,7 +67,7 @@ def report_page(world: World) -> str:
         parts.append(f"<h2>In its streets</h2><div class=views>{pictures}</div>")
     parts.append("<h2>What is there</h2>" + figures(manifest.counts))
     parts.append("<h2>Places by type</h2>" + _bars(manifest.places_by_type.items(), unit=""))
-    parts.append("<h2>What was left out or mended, and why</h2>" + left_out(manifest.stages))
+    parts.append("<h2>What was left out or mended, and why</h2>" + omissions(manifest.stages))
     parts.append("<h2>Stage by stage</h2>" + _stage_table(manifest.stages))
     parts.append("<h2>Seconds a stage</h2>" + _bars(seconds.items(), unit=" s"))
     rows = [
@@ -86,13 +91,13 @@ def write_report(world: World) -> None:
     write_bytes(world.file("report.html"), report_page(world).encode())
 
 
-def _words(name: str) -> str:
+def _label(name: str) -> str:
     return escape(name.replace("_", " "))
 
 
 def figures(counts: Mapping[str, float]) -> str:
     """Return numbers with what they count, HTML."""
-    cells = "".join(f"<div><b>{number:,}</b><span>{_words(name)}</span></div>" for name, number in counts.items())
+    cells = "".join(f"<div><b>{number:,}</b><span>{_label(name)}</span></div>" for name, number in counts.items())
     return f"<div class=figures>{cells}</div>"
 
 
@@ -100,14 +105,14 @@ def _bars(values: Iterable[tuple[str, float]], *, unit: str) -> str:
     pairs = list(values)
     most = max((value for _, value in pairs), default=0) or 1
     rows = "".join(
-        f"<tr><td>{_words(name)}</td><td class=n>{value if isinstance(value, int) else f'{value:.2f}'}{unit}</td>"
+        f"<tr><td>{_label(name)}</td><td class=n>{value if isinstance(value, int) else f'{value:.2f}'}{unit}</td>"
         f"<td class=bar><i style='width:{100 * value / most:.1f}%'></i></td></tr>"
         for name, value in pairs
     )
     return f"<table>{rows}</table>"
 
 
-def left_out(stages: Sequence[StageReport]) -> str:
+def omissions(stages: Sequence[StageReport]) -> str:
     """Return what stages left out, by reason, HTML."""
     parts = []
     for stage in stages:
@@ -118,7 +123,7 @@ def left_out(stages: Sequence[StageReport]) -> str:
             ids = ", ".join(escape(d.id) for d in them[:_SHOWN_IDS])
             more = f" and {len(them) - _SHOWN_IDS} more" if len(them) > _SHOWN_IDS else ""
             parts.append(
-                f"<details><summary>{_words(stage.name)}: {len(them):,} × {escape(reason + _mending(reason))}</summary>"
+                f"<details><summary>{_label(stage.name)}: {len(them):,} × {escape(reason + _mending(reason))}</summary>"
                 f"<p>{ids}{more}</p></details>"
             )
     return "".join(parts) or "<p>Nothing.</p>"
@@ -133,7 +138,7 @@ def _mending(reason: str) -> str:
 
 def _stage_table(stages: Sequence[StageReport]) -> str:
     rows = [
-        (_words(s.name), "; ".join(f"{_words(name)} {number:,}" for name, number in s.counts.items())) for s in stages
+        (_label(s.name), "; ".join(f"{_label(name)} {number:,}" for name, number in s.counts.items())) for s in stages
     ]
     return _table(("stage", "made"), rows)
 
@@ -142,3 +147,100 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     top = "".join(f"<th>{cell}</th>" for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><tr>{top}</tr>{body}</table>"
+
+
+# The map of a tile is the left of its picture; the rest is its legend.
+_PICTURE = 1880 / 1500
+_OWN_STYLE = """
+.map { position: relative; overflow: hidden; height: 78vh; border-radius: 4px; background: var(--line); cursor: grab;
+  touch-action: none; } .map:active { cursor: grabbing; }
+.map > div { position: absolute; transform-origin: 0 0; }
+.map a { position: absolute; overflow: hidden; outline: 1px solid transparent; }
+.map img { width: PERCENT; max-width: none; border-radius: 0; display: block; }
+.map.bordered a { outline-color: #0072b288; } .map a.lost { background: repeating-linear-gradient(45deg, #8884 0 8px,
+  #8882 8px 16px); color: var(--soft); font-size: .8rem; padding: .4rem; box-sizing: border-box; }
+.bar button { font: inherit; padding: .25rem .8rem; margin: .5rem .3rem .5rem 0; }
+""".replace("PERCENT", f"{100 * _PICTURE:.4f}%")
+_SCRIPT = """
+const map = document.querySelector(".map"), sheet = map.firstElementChild, whole = sheet.clientWidth;
+let zoom = 1, x = 0, y = 0;
+const show = () => { sheet.style.transform = `translate(${x}px, ${y}px) scale(${zoom})`; };
+const fit = () => { zoom = Math.min(map.clientWidth, map.clientHeight) / whole;
+  x = (map.clientWidth - whole * zoom) / 2; y = (map.clientHeight - whole * zoom) / 2; show(); };
+const by = (factor, px, py) => { const before = zoom; zoom = Math.min(Math.max(zoom * factor, 0.02), 8);
+  x = px - (px - x) * zoom / before; y = py - (py - y) * zoom / before; show(); };
+const middle = () => [map.clientWidth / 2, map.clientHeight / 2];
+map.addEventListener("wheel", (e) => { e.preventDefault(); const box = map.getBoundingClientRect();
+  by(Math.exp(-e.deltaY / 500), e.clientX - box.left, e.clientY - box.top); }, { passive: false });
+let from = null, moved = 0;
+map.addEventListener("pointerdown", (e) => { from = [e.clientX - x, e.clientY - y]; moved = 0; });
+addEventListener("pointermove", (e) => { if (!from) return; moved += Math.abs(e.movementX) + Math.abs(e.movementY);
+  x = e.clientX - from[0]; y = e.clientY - from[1]; show(); });
+addEventListener("pointerup", () => { from = null; });
+map.addEventListener("click", (e) => { if (moved > 6) e.preventDefault(); });
+map.addEventListener("dragstart", (e) => e.preventDefault());
+map.addEventListener("keydown", (e) => {
+  const step = { ArrowLeft: [80, 0], ArrowRight: [-80, 0], ArrowUp: [0, 80], ArrowDown: [0, -80] }[e.key];
+  if (step) { x += step[0]; y += step[1]; show(); e.preventDefault(); }
+  else if (e.key === "+" || e.key === "=") by(1.3, ...middle());
+  else if (e.key === "-") by(1 / 1.3, ...middle()); });
+document.getElementById("in").onclick = () => by(1.5, ...middle());
+document.getElementById("out").onclick = () => by(1 / 1.5, ...middle());
+document.getElementById("fit").onclick = fit;
+document.getElementById("tiles").onclick = () => map.classList.toggle("bordered");
+addEventListener("resize", fit); fit();
+"""
+_MAP_SIDE = 600  # pixels of a tile before it is zoomed
+
+
+def city_page(city: City) -> str:
+    """Return the page, HTML; its pictures are those of the tiles, by relative path."""
+    manifest = city.manifest
+    (west, south), (east, north) = manifest.first, manifest.last
+    squares = []
+    for tile in manifest.tiles:
+        there = f"left:{(tile.column - west) * _MAP_SIDE}px;top:{(north - tile.row) * _MAP_SIDE}px"
+        folder = f"{TILES}/{escape(tile.name)}"
+        squares.append(
+            f"<a style='{there}' href='{folder}/report.html' title='tile {escape(tile.name)}'>"
+            f"<img src='{folder}/map.png' alt='Map of tile {escape(tile.name)}' loading=lazy></a>"
+        )
+    for name, reason in manifest.failed.items():
+        column, row = map(int, name.split("_"))
+        there = f"left:{(column - west) * _MAP_SIDE}px;top:{(north - row) * _MAP_SIDE}px"
+        squares.append(f"<a class=lost style='{there}'>{escape(name)}: {escape(reason)}</a>")
+    width, height = (east - west + 1) * _MAP_SIDE, (north - south + 1) * _MAP_SIDE
+    area = len(manifest.tiles) * (manifest.size / 1000) ** 2
+    numbers: dict[str, float] = {
+        "square kilometres": round(area, 2),
+        "tiles": len(manifest.tiles),
+        "buildings": sum(tile.buildings for tile in manifest.tiles),
+        "places": sum(tile.places for tile in manifest.tiles),
+    }
+    for report in manifest.reports:
+        numbers |= {name.replace("_", " "): count for name, count in report.counts.items() if name != "tried"}
+    origin = manifest.origin
+    return "\n".join(
+        [
+            "<!doctype html><html lang=en><meta charset=utf-8>",
+            "<meta name=viewport content='width=device-width, initial-scale=1'>",
+            f"<title>{escape(city.path.name)}: a city</title><style>{STYLE}{_OWN_STYLE}"
+            f".map a {{ width:{_MAP_SIDE}px; height:{_MAP_SIDE}px }}",
+            f".map > div {{ width:{width}px; height:{height}px }}</style>",
+            f"<h1>{escape(city.path.name)}</h1>",
+            f"<p class=lead>{len(manifest.tiles)} tiles of {manifest.size:.0f} m around {origin.lat:.5f}, "
+            f"{origin.lon:.5f}; seed {manifest.seed}; {escape(manifest.producer)}</p>",
+            "<p class=bar><button id=in>zoom in</button><button id=out>zoom out</button>"
+            "<button id=fit>all of it</button><button id=tiles>borders of tiles</button> "
+            "drag to move; a click opens a tile's own report</p>",
+            f"<div class=map tabindex=0 aria-label='Map of the city'><div>{''.join(squares)}</div></div>",
+            f"<h2>What is there</h2>{figures(numbers)}",
+            f"<h2>What was left out of its streets, and why</h2>{omissions(manifest.reports)}",
+            f"<script>{_SCRIPT}</script></html>",
+        ]
+    )
+
+
+def write_city_report(city: City) -> None:
+    """Write ``report.html`` into a city's folder."""
+    write_bytes(city.path / "report.html", city_page(city).encode())

@@ -15,8 +15,8 @@ from vico.assets.robots import robot_model
 from vico.assets.shapes import box
 from vico.challenges.robot_tasks import arm_body
 from vico.errors import InputError
+from vico.geometry import rotation_matrix
 from vico.io.plain_data import decode, encode
-from vico.quaternions import matrix_of
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 
@@ -72,7 +72,7 @@ class Trial:
 
     @property
     def upright(self) -> float:
-        return float(matrix_of(self.sim.state.objects.orientation[0])[2, 2])
+        return float(rotation_matrix(self.sim.state.objects.orientation[0])[2, 2])
 
 
 @pytest.mark.parametrize(

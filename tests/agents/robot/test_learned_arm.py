@@ -21,8 +21,8 @@ from vico.assets.shapes import box
 from vico.challenges.learning.manipulation.scene import OPENING, ready_angles
 from vico.challenges.robot_tasks import arm_body
 from vico.errors import InputError
+from vico.geometry import rotation_matrix, yaw_quaternion
 from vico.io.plain_data import decode, encode
-from vico.quaternions import matrix_of, upright
 from vico.sim.config import SimConfig
 from vico.sim.loop.simulation import Simulation
 
@@ -113,7 +113,7 @@ class Trial:
 
     def truth(self, entity: int) -> ObjectPose | None:
         objects = self.sim.state.objects
-        rotation = matrix_of(objects.orientation[0])
+        rotation = rotation_matrix(objects.orientation[0])
         half = np.array(SIZE) / 2
         return (
             ObjectPose(objects.position[0] + rotation[:, 2] * half[2], rotation, half) if entity == self.thing else None
@@ -207,7 +207,7 @@ def test_what_is_not_there_is_not_picked() -> None:
 def observed(*, pixels: int, pressed: float, angle: float = 0.0) -> dict[str, Any]:
     """A picture whose middle is a thing a metre ahead of the camera, or nothing."""
     felt = sensors()
-    felt["base_pose"] = np.array([0.0, 0.0, 0.1, *upright(0.0)])
+    felt["base_pose"] = np.array([0.0, 0.0, 0.1, *yaw_quaternion(0.0)])
     felt["joint_position"] = np.array([*ready_angles(), 0.05, 0.05])
     felt["joint_position"][0] += angle
     felt["contacts"] = np.full(2, pressed)
@@ -243,7 +243,9 @@ def test_what_goes_out_of_view_is_where_it_was_or_goes_with_the_hand_that_presse
 
 def test_boxes_and_poses_go_back_and_forth_and_axes_are_right_handed() -> None:
     for yaw in np.linspace(-1.5, 1.5, 7):
-        pose = ObjectPose(np.array([0.6, 0.1, 0.2]), matrix_of(upright(float(yaw))), np.array([0.1, 0.05, 0.2]))
+        pose = ObjectPose(
+            np.array([0.6, 0.1, 0.2]), rotation_matrix(yaw_quaternion(float(yaw))), np.array([0.1, 0.05, 0.2])
+        )
         found = pose_of_box(pose.as_box())
         assert np.linalg.det(found.rotation) == pytest.approx(1.0)
         assert found.middle == pytest.approx(pose.middle)

@@ -11,7 +11,7 @@ import pytest
 from command_line import vico
 from shared_folders import Shared
 from vico.errors import MissingExtraError, MissingFileError
-from vico.viewer.browser import BrowserPage, browser_program, open_page
+from vico.viewer.headless import BrowserPage, browser_program, open_page
 from vico.viewer.three import three_module
 
 STEPS = 40

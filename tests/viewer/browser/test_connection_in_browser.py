@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import vico.viewer.three
-from vico.viewer.browser import open_page
+from vico.viewer.headless import open_page
 
 from .conftest import served
 

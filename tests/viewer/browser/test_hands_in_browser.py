@@ -10,7 +10,7 @@ import pytest
 from live_toy import LiveToy, live_toy
 from vico.sim.environment import weather_kinds
 from vico.sim.recording.interventions import read_interventions
-from vico.viewer.browser import BrowserPage, open_page
+from vico.viewer.headless import BrowserPage, open_page
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from vico.seeds import rng
 from vico.sim.animation import LONGEST_BLEND, STYLE, Transition, clip_index, free_hands, joint_places, pose, style_of
 from vico.sim.recording import PosedPeople, read_run
 from vico.sim.recording.run import looks_and_manners
-from vico.viewer.browser import BrowserPage
+from vico.viewer.headless import BrowserPage
 
 # Tables are read between their rows: no joint is farther off than this, metres and radians (all but straight knees turn
 # most), and none of those who change from one motion into another.

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from vico.sim.recording import read_run
-from vico.viewer.browser import BrowserPage, open_page
+from vico.viewer.headless import BrowserPage, open_page
 
 _AT = "vico.source.stepAt(vico.clock.time)"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from vico.sim.recording import read_run
-from vico.viewer.browser import BrowserPage, open_page
+from vico.viewer.headless import BrowserPage, open_page
 
 _PLACE = "vico.play.you.position"
 

@@ -9,7 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from vico.viewer.browser import BrowserPage, open_page
+from vico.viewer.headless import BrowserPage, open_page
 from viewer_client import address_of
 
 

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from vico.agents.base import AgentState
 from vico.agents.perception import points_from_depth
 from vico.exact import apply_matrix
-from vico.geometry import distance, distances
+from vico.geometry import distance, distances, rotation_matrix
 from vico.kinematics.arm import Chain, CollisionSpheres, Jaw, collision_spheres, hand_pose
-from vico.quaternions import matrix_of
 
 Array = NDArray[np.float64]
 
@@ -81,7 +80,7 @@ class Stance(NamedTuple):
     def of(cls, observation: Mapping[str, Any]) -> Stance:
         """Return it from an observation's odometry."""
         pose = np.asarray(observation["sensors"]["base_pose"], np.float64)
-        return cls(pose[:3], matrix_of(pose[3:]))
+        return cls(pose[:3], rotation_matrix(pose[3:]))
 
     def inside(self, points: Array) -> Array:
         """Return points in the frame of the base, shape ``(..., 3)``."""

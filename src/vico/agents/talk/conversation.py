@@ -20,7 +20,7 @@ from vico.agents.talk.acquaintance import (
 )
 from vico.agents.talk.grammar import vocation_of
 from vico.clock import DAY
-from vico.english import split_name, uncapitalized
+from vico.english import split_name, uncapitalize
 
 # People greet within this distance, metres, and not twice within this time, seconds.
 GREETING_DISTANCE = 6.0
@@ -286,7 +286,7 @@ class Conversation:
         return [f"{hi}! I'm {errand.words}.", f"Good to see you, {other}. I'm {errand.words}."]
 
     def _hobby(self) -> str:
-        return uncapitalized(self._choose(self._me.hobbies))
+        return uncapitalize(self._choose(self._me.hobbies))
 
     def _choose(self, options: Sequence[str]) -> str:
         return options[int(self._rng.integers(len(options)))]

@@ -15,7 +15,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vico.english import participle, uncapitalized, with_article
+from vico.english import participle, uncapitalize, with_article
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 
@@ -305,7 +305,7 @@ def activity_of(words: str) -> Activity:
         "Have dinner", "Chess table: play chess", "Team meeting", "Shopping".
     """
     verbs = read_verbs()
-    plain = uncapitalized(_without_group(words, verbs)) or "something"
+    plain = uncapitalize(_without_group(words, verbs)) or "something"
     for pattern, mine in _OF_ONESELF:
         plain = pattern.sub(mine, plain)
     parts = _JOINING_WORDS.split(plain)
@@ -349,8 +349,8 @@ def vocation_of(occupation: str) -> str:
     """Return what follows "I am": "an engineer", "a UX designer", "retired"; empty where there is none to say."""
     plain = " ".join(occupation.split()).strip(" .!,;:").replace("?", "")
     if not plain or _STATES.match(plain):
-        return uncapitalized(plain)
-    return with_article(uncapitalized(plain))
+        return uncapitalize(plain)
+    return with_article(uncapitalize(plain))
 
 
 def _without_group(words: str, verbs: Verbs) -> str:

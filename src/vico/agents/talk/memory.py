@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.base import AgentState, Info, Observation
-from vico.crowd import Crowd
+from vico.observation_arrays import CrowdObservations
 
 __all__ = [
     "LOOK_PERIOD",
@@ -231,7 +231,7 @@ class CrowdMemory:
             if memory is not None:
                 memory.settle = self.settle
 
-    def look(self, crowd: Crowd, asked: NDArray[np.int64], number: Callable[[], NDArray[np.int64]]) -> None:
+    def look(self, crowd: CrowdObservations, asked: NDArray[np.int64], number: Callable[[], NDArray[np.int64]]) -> None:
         """Take down who is about, if it is time to.
 
         Parameters

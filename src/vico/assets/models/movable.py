@@ -20,8 +20,8 @@ from vico.assets.models.parts import Scope, surfaces_of
 from vico.assets.models.schema import Grip, MovableEntry, MovableFile, SolidBox, SolidCylinder, SolidPart
 from vico.assets.shapes import Colour
 from vico.errors import InputError, SchemaError
+from vico.geometry import quaternion_from_matrix
 from vico.io.data_files import cached_data, data_files, read_record
-from vico.quaternions import quaternion_of
 from vico.world.mesh import Surface
 
 
@@ -170,7 +170,7 @@ class Solid(NamedTuple):
     @property
     def quaternion(self) -> Array:
         """The rotation as w, x, y, z."""
-        return quaternion_of(self.rotation)
+        return quaternion_from_matrix(self.rotation)
 
     @property
     def volume(self) -> float:

@@ -38,7 +38,7 @@ from vico.world.world import World
 
 
 class Group(Protocol):
-    """Objects elsewhere that are asked side by side: `vico.envs.workers.Workers`, `vico.jobs.actors.RayActors`."""
+    """Objects elsewhere that are asked side by side: `vico.envs.workers.Workers`, `vico.jobs.cluster.RayActors`."""
 
     def __len__(self) -> int: ...
 

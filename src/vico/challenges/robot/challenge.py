@@ -40,7 +40,7 @@ from vico.challenges.robot_episodes import (
 from vico.challenges.robot_tasks import check_made_for, team_of
 from vico.community.model import Community
 from vico.envs import Simulation
-from vico.quaternions import matrix_of
+from vico.geometry import rotation_matrix
 from vico.runner.foreign import Terms
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Runner
@@ -195,7 +195,7 @@ def truth_of(sim: Simulation, task: RobotTask) -> PoseOracle:
             return None
         objects = sim.state.objects
         k = objects.names.index(task.thing.name)
-        rotation = matrix_of(objects.orientation[k])
+        rotation = rotation_matrix(objects.orientation[k])
         # Things are placed by the middle of their underside.
         return ObjectPose(objects.position[k] + rotation[:, 2] * half[2], rotation, half)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vico.errors import SchemaError
 from vico.exact import apply_matrix, each
-from vico.quaternions import matrix_of, quaternion_of, upright
+from vico.geometry import quaternion_from_matrix, rotation_matrix, yaw_quaternion
 from vico.sim.animation import LONGEST_BLEND
 from vico.sim.bodies.arrays import OBJECT, Bodies
 
@@ -388,15 +388,15 @@ class MovableObjects(ArrayState):
 
     def set_yaw(self, k: int, yaw: float) -> None:
         """Stand an object upright, heading `yaw` radians counter-clockwise from east."""
-        self.orientation[k] = upright(yaw)
+        self.orientation[k] = yaw_quaternion(yaw)
 
     def rotation(self, k: int) -> NDArray[np.float64]:
         """Object to world, shape ``(3, 3)``."""
-        return matrix_of(self.orientation[k])
+        return rotation_matrix(self.orientation[k])
 
     def set_rotation(self, k: int, rotation: NDArray[np.float64]) -> None:
         """Turn an object; `rotation` is object to world, shape ``(3, 3)``."""
-        self.orientation[k] = quaternion_of(rotation)
+        self.orientation[k] = quaternion_from_matrix(rotation)
 
     def bodies(self) -> Bodies:
         """Those that lie outdoors: what people carry, or what lies on a robot, is part of whoever carries it."""
@@ -407,7 +407,7 @@ class MovableObjects(ArrayState):
         if not len(which):
             return Bodies.none()
         n, half = len(which), self.size[which] / 2
-        turn, yaw = matrix_of(self.orientation[which]), self.yaw[which]
+        turn, yaw = rotation_matrix(self.orientation[which]), self.yaw[which]
         middle = self.position[which] + turn[:, :, 2] * half[:, 2:]
         c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
         along, across = c * turn[:, 0] + s * turn[:, 1], c * turn[:, 1] - s * turn[:, 0]
@@ -461,7 +461,7 @@ class MovableObjects(ArrayState):
         self.prototypes.append(prototype)
         self.entity = np.append(self.entity, np.int32(entity))
         self.position = np.vstack([self.position, position])
-        self.orientation = np.vstack([self.orientation, upright(yaw)])
+        self.orientation = np.vstack([self.orientation, yaw_quaternion(yaw)])
         self.holder = np.append(self.holder, np.int32(0))
         self.offset = np.vstack([self.offset, np.zeros(3)])
         self.hand = np.append(self.hand, np.int8(-1))

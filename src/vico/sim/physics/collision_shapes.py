@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
 from vico.exact import apply_matrix
+from vico.geometry import rotation_matrix
 from vico.io.compiled import compiled
-from vico.quaternions import matrix_of
 from vico.sim.bodies.arrays import OBJECT, Bodies
 from vico.sim.physics.records import BALL, BOX, CYLINDER, PARTS, Capacity, RigidObject, RigidPart, StaticScene
 
@@ -378,7 +378,7 @@ class PartRows(NamedTuple):
 
     def bounds(self) -> tuple[Array, Array]:
         """Middles of the boxes round whole objects, and half their extents, metres, shape ``(n, 3)`` each."""
-        reach = np.einsum("...ij,...j->...i", np.abs(matrix_of(self.quaternion)), self.half)
+        reach = np.einsum("...ij,...j->...i", np.abs(rotation_matrix(self.quaternion)), self.half)
         low = np.where(self.used[..., None], self.position - reach, np.inf).min(axis=-2)
         high = np.where(self.used[..., None], self.position + reach, -np.inf).max(axis=-2)
         return (low + high) / 2, (high - low) / 2
@@ -390,7 +390,7 @@ class PartRows(NamedTuple):
         for k in np.flatnonzero(self.used).tolist():
             part, squares = mass * float(shares[k] / shares.sum()), self.half[k] ** 2
             own = part * _moments(PARTS[k], squares)
-            turn, away = matrix_of(self.quaternion[k]), self.position[k] ** 2
+            turn, away = rotation_matrix(self.quaternion[k]), self.position[k] ** 2
             found += apply_matrix(own, turn * turn) + part * (away.sum() - away)
         return found
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, LIMB, TOUCH, RobotModel
 from vico.errors import InputError, MissingExtraError
+from vico.geometry import rotation_matrix
 from vico.io.compiled import compiled
 from vico.io.mujoco import mujoco
-from vico.quaternions import matrix_of
 from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID, ground_grid, robot_spec
 from vico.sim.physics.records import Capacity, StaticScene
 
@@ -227,7 +227,7 @@ class GenesisIndex:
         bodies = [spec.body(int(body)).name for body in spec.site_bodyid]
         self.site_link = np.array([of[name] for name in bodies], np.int64)
         self.site_place = np.array(spec.site_pos, np.float64).reshape(-1, 3)
-        self.site_turn = matrix_of(np.array(spec.site_quat, np.float64).reshape(-1, 4)).reshape(-1, 3, 3)
+        self.site_turn = rotation_matrix(np.array(spec.site_quat, np.float64).reshape(-1, 4)).reshape(-1, 3, 3)
 
     def follow(self, targets: NDArray[np.float64], controls: tuple[NDArray[np.float64], ...]) -> None:
         """Have the motors follow `targets`: write what their joints do into `controls`, by `mode`."""
@@ -523,5 +523,7 @@ class GenesisShapes:
     def _bound(self, link: int) -> None:
         """Fit the box around a link's shapes, in its frame."""
         mine = range(int(self._first[link]), int(self._last[link]))
-        points = np.concatenate([self.corners[g] @ matrix_of(self._quaternion[g]).T + self._position[g] for g in mine])
+        points = np.concatenate(
+            [self.corners[g] @ rotation_matrix(self._quaternion[g]).T + self._position[g] for g in mine]
+        )
         self._link_low[link], self._link_high[link] = points.min(axis=0), points.max(axis=0)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.errors import InputError, SchemaError
+from vico.geometry import rotation_matrix
 from vico.io.compiled import compiled
-from vico.quaternions import matrix_of
 from vico.sim.physics.engine import Actuate
 from vico.sim.physics.genesis_model import GenesisIndex, build_scene, genesis, numpy_view, state_of
 from vico.sim.physics.mujoco_model import parked_object, place_bodies
@@ -264,7 +264,7 @@ class BuiltScene:
     def poses(self, links: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the poses of links, shape ``(n, 4, 4)``."""
         found = np.zeros((len(links), 4, 4))
-        found[:, :3, :3] = matrix_of(self.link_quaternion[links])
+        found[:, :3, :3] = rotation_matrix(self.link_quaternion[links])
         found[:, :3, 3] = self.link_position[links]
         found[:, 3, 3] = 1.0
         return found

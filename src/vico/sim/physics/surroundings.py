@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from vico.assets.models.movable import movable_mass, movable_solids
 from vico.errors import SchemaError
 from vico.exact import apply_matrix
-from vico.quaternions import matrix_of
+from vico.geometry import rotation_matrix
 from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.physics.engine import PhysicsEngine
 from vico.sim.physics.records import Chunk, RigidObject, RigidPart, StaticChunks, StaticScene
@@ -387,7 +387,7 @@ class LooseObjects:
 
     def _place(self, slot: int, k: int, lift: float) -> None:
         objects = self._objects
-        middle = objects.position[k] + matrix_of(objects.orientation[k])[:, 2] * objects.size[k, 2] / 2
+        middle = objects.position[k] + rotation_matrix(objects.orientation[k])[:, 2] * objects.size[k, 2] / 2
         middle[2] += lift
         size, prototype = objects.size[k], objects.prototypes[k]
         thing = RigidObject(size, movable_mass(prototype) or object_mass(size), middle, objects.orientation[k].copy())
@@ -434,7 +434,7 @@ class LooseObjects:
             k = objects.index(int(self.entity[slot]))
             if self._moved(k):
                 continue  # by somebody else, within a sub-step: `update` takes it from there
-            up = matrix_of(motion.quaternion[slot])[:, 2]
+            up = rotation_matrix(motion.quaternion[slot])[:, 2]
             objects.position[k] = motion.position[slot] - up * objects.size[k, 2] / 2
             objects.orientation[k] = motion.quaternion[slot]
             self._position[k], self._orientation[k] = objects.position[k], objects.orientation[k]

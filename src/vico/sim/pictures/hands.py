@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from vico.assets.models.library import placards, umbrellas
 from vico.assets.models.movable import movable_grip
 from vico.exact import each, product
-from vico.quaternions import matrix_of
+from vico.geometry import rotation_matrix
 from vico.sim.animation import Hands, Hold, clip_index, hand_frames
 from vico.sim.bodies.arrays import Drawn
 from vico.sim.bodies.state_arrays import FIRST_PEDESTRIAN_UMBRELLA, FIRST_UMBRELLA
@@ -280,7 +280,7 @@ def _objects(state: SimulationState, who: Holders) -> Drawn:
     objects = state.objects
     names = sorted(set(objects.prototypes))
     transforms = np.zeros((len(objects), 4, 4))
-    transforms[:, :3, :3] = matrix_of(objects.orientation)
+    transforms[:, :3, :3] = rotation_matrix(objects.orientation)
     transforms[:, 3, 3] = 1.0
     transforms[:, :3, 3] = objects.position
     for k in np.flatnonzero(objects.hand >= 0).tolist():

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.exact import apply_matrix
-from vico.geometry import distances
+from vico.geometry import distances, rotation_matrix
 from vico.kinematics.arm import hand_pose, reach_pose
 from vico.kinematics.hand_paths import CARRY, downward, path_down, path_to_carry
-from vico.quaternions import matrix_of
 from vico.sim.bodies.arrays import Bodies
 from vico.sim.bodies.collisions import DeckPose
 from vico.sim.bodies.state_arrays import MovableObjects
@@ -389,7 +388,7 @@ def _goals(run: RobotRun, work: ArmTasks, row: int, base: Base, kind: TaskKind) 
 
 def _grasps(work: ArmTasks, base: Base, objects: MovableObjects, k: int) -> list[Array] | None:
     """Grasps of a thing from above, across its narrower side first."""
-    turn = matrix_of(objects.orientation[k])
+    turn = rotation_matrix(objects.orientation[k])
     size = objects.size[k]
     middle = objects.position[k] + turn[:, 2] * size[2] / 2
     upright = int(np.abs(turn[2]).argmax())
@@ -492,7 +491,7 @@ def _depth_below_hand(run: RobotRun, robot: int, work: ArmTasks, objects: Movabl
     poses = np.empty((7, 3)), np.empty((7, 3)), np.empty((3, 4))
     hand_pose(work.chain, run.engine.joints(robot)[0][:7].copy(), *poses)
     hand = apply_matrix(poses[2][:, 3], base.rotation) + base.position
-    lies, half = matrix_of(objects.orientation[k]), objects.size[k] / 2
+    lies, half = rotation_matrix(objects.orientation[k]), objects.size[k] / 2
     middle = objects.position[k] + lies[:, 2] * half[2]
     # Long things are not held by their middle.
     if np.any(np.abs(apply_matrix(hand - middle, lies.T)) > half + _ABOUT):

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from vico.assets.robots import MobileManipulator, RobotModel
 from vico.errors import SchemaError
 from vico.exact import apply_matrix, product
+from vico.geometry import quaternion_from_matrix, rotation_matrix
 from vico.io.compiled import compiled
 from vico.kinematics.arm import Chain, hand_pose
-from vico.quaternions import matrix_of, quaternion_of
 from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.physics.engine import PhysicsEngine
 from vico.sim.physics.records import Motion
@@ -302,7 +302,7 @@ class OracleGrasp:
             inside = apply_matrix(at - objects.position[k], lies.T) - (0.0, 0.0, half[2])
             if np.all(np.abs(inside) <= half + MARGIN):
                 away = apply_matrix(objects.position[k] - at, turn.T)
-                self._place[robot] = [*away, *quaternion_of(product(turn.T, lies))]
+                self._place[robot] = [*away, *quaternion_from_matrix(product(turn.T, lies))]
                 # Who holds what is as wide as the jaw can still open it.
                 self._touched[robot] = min(float(self._apart[robot]), own.opening - OPENS - _CLOSES)
                 self.entity[robot], objects.holder[k], objects.hand[k] = objects.entity[k], self._robots[robot], -1
@@ -311,7 +311,7 @@ class OracleGrasp:
     def _move(self, robot: int, k: int, hand: Floats, objects: MovableObjects) -> None:
         place = self._place[robot]
         objects.position[k] = hand[:, 3] + apply_matrix(place[:3], hand[:, :3])
-        objects.set_rotation(k, product(hand[:, :3], matrix_of(place[3:])))
+        objects.set_rotation(k, product(hand[:, :3], rotation_matrix(place[3:])))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, copied."""

@@ -22,11 +22,8 @@ from starlette.types import ASGIApp
 from vico.errors import OutputError
 from vico.io.files import json_bytes, read_json
 from vico.sim.recording.schema import VIEWER_ADDRESS
-from vico.viewer.server.gate import Gate
-from vico.viewer.server.hub import Hub
-from vico.viewer.server.routes import routes
-from vico.viewer.server.state import ViewerState
-from vico.viewer.server.stream import LONGEST_MESSAGE, Stream
+from vico.viewer.server.routes import LONGEST_MESSAGE, Stream, routes
+from vico.viewer.server.state import Gate, Hub, ViewerState
 from vico.viewer.sources.source import Source
 from vico.world.model import Record
 
@@ -77,10 +74,10 @@ class ViewerServer:
         self.state, self.hub = state, Hub(state)
         known = None if keep is None else known_address(keep)
         token = known.token if known is not None else secrets.token_urlsafe(24)
-        self._socket = _listening(port, 0 if known is None else known.port)
+        self._socket = _listening_socket(port, 0 if known is None else known.port)
         self.address = Address(port=self._socket.getsockname()[1], token=token)
         if keep is not None:
-            _keep(keep, self.address)
+            _store_address(keep, self.address)
         self._server = uvicorn.Server(
             uvicorn.Config(
                 application(state, self.hub, self.address, hosts),
@@ -166,7 +163,7 @@ def known_address(folder: Path) -> Address | None:
         return None  # it is made anew
 
 
-def _keep(folder: Path, address: Address) -> None:
+def _store_address(folder: Path, address: Address) -> None:
     """Keep an address where its owner alone can read it; a folder that cannot be written keeps none."""
     path, work = folder / ADDRESS, folder / f".{ADDRESS}.partial"
     with contextlib.suppress(OSError):
@@ -176,7 +173,7 @@ def _keep(folder: Path, address: Address) -> None:
         os.replace(work, path)
 
 
-def _listening(asked: int, before: int) -> socket.socket:
+def _listening_socket(asked: int, before: int) -> socket.socket:
     """Return a socket that listens on this machine alone: on the port asked for, the one before, or a free one."""
     for port in [asked] if asked else [before, 0] if before else [0]:
         sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

@@ -1,17 +1,74 @@
-"""Frames: what the page needs to draw a step, and their bytes (docs/viewer_protocol.md)."""
+"""Frames: what the page needs to draw a step, with sun and weather, and their bytes (docs/viewer_protocol.md)."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
-from vico.viewer.sources.skylight import SKY_FIELDS, Skylight
+from vico.sim.environment.environment import Sky
 from vico.viewer.sources.tables import Columns, StepTables
+
+SKY_FIELDS = 16
+_WEATHER_FIELDS = (
+    "clouds",
+    "rain",
+    "snow",
+    "visibility",
+    "wind",
+    "wind_from",
+    "temperature",
+    "wet",
+    "snow_cover",
+    "ice",
+    "lamps",
+)
+_MINUTE = 60
+
+
+class Skylight:
+    """Tells where the sun stands over a run, and puts the weather beside it.
+
+    Parameters
+    ----------
+    sky
+        Over the run's world; None where that is not there: then nobody knows where the sun stands.
+    """
+
+    def __init__(self, sky: Sky | None) -> None:
+        self.over = sky
+        self._sun = lru_cache(maxsize=4096)(self._sun_at)
+
+    def sky(self, time: float, air: Mapping[str, Any] | None) -> NDArray[np.float32]:
+        """Return the sky of a step, float32, shape ``(16,)``; NaN for what is not known.
+
+        Parameters
+        ----------
+        time
+            Seconds since midnight of the first day.
+        air
+            Row of the table ``weather``; None in runs from before it.
+        """
+        found = np.full(SKY_FIELDS, np.nan, np.float32)
+        found[:4] = self._sun(int(time))
+        if air is not None:
+            found[4 : 4 + len(_WEATHER_FIELDS)] = [air[key] for key in _WEATHER_FIELDS]
+        found[15] = 0.0
+        return found
+
+    def _sun_at(self, second: int) -> tuple[float, float, float, float]:
+        if self.over is None:
+            return np.nan, np.nan, np.nan, np.nan
+        x, y, z = self.over.sun(second).tolist()
+        # As `vico.sim.environment.Environment.dark` has it: a minute at a time.
+        return x, y, z, self.over.dark(second // _MINUTE * _MINUTE)
+
 
 MAGIC, VERSION = 0x56, 2
 #: Flags: it answers a range; it is the newest.
@@ -67,7 +124,7 @@ class Frame:
     step, time
         Its number, and seconds since midnight of the first day.
     sky
-        As `vico.viewer.sources.skylight` has it, float32, shape ``(16,)``.
+        As `vico.viewer.sources.frames` has it, float32, shape ``(16,)``.
     tables
         Columns by table, as stored, of the types in `FRAME_COLUMNS`.
     """
@@ -94,7 +151,7 @@ class Frame:
         return b"".join(parts)
 
 
-def decoded(content: bytes) -> tuple[Frame, int, int]:
+def decode_frame(content: bytes) -> tuple[Frame, int, int]:
     """Return the frame that some bytes are, its flags, and the id of the range that it answers.
 
     Raises

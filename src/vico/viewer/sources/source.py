@@ -1,8 +1,13 @@
-"""A run as the viewer's server tells of it: its head, moments, events, metrics, cast and what can be found in it."""
+"""A run as the viewer's server tells of it: head, moments, events, metrics, cast, signals, relations, and search.
+
+What traffic signals show follows from the time of day. Relations are those of the run's community.
+"""
 
 from __future__ import annotations
 
 import json
+import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
@@ -12,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import InputError, MissingFileError
+from vico.community.folder import read_community
+from vico.errors import InputError, MissingFileError, VicoError
 from vico.io.files import read_json
 from vico.rules import ActionStatus, code_name
 from vico.runner.recording import bookmarks_of
@@ -25,13 +31,76 @@ from vico.sim.environment.environment import Sky
 from vico.sim.recording.interventions import read_interventions
 from vico.sim.recording.manifest import CastMember, read_manifest
 from vico.sim.recording.schema import AGENTS, TABLES
-from vico.viewer.sources.frames import Frame, frames_between
-from vico.viewer.sources.relations import relations_of
-from vico.viewer.sources.skylight import Skylight
-from vico.viewer.sources.tables import Columns, RecordedTables, StepTables
-from vico.viewer.sources.timeline import Timeline
+from vico.sim.state.base import SimulationBase
+from vico.sim.traffic import JunctionRule, TrafficNetwork
+from vico.sim.traffic.signals import SignalClock, SignalDay, SignalHeads
+from vico.sim.traffic.state import AMBER, GREEN, RED
+from vico.viewer.sources.frames import Frame, Skylight, frames_between
+from vico.viewer.sources.tables import Columns, RecordedTables, StepTables, Timeline
 from vico.world.folder import is_world, read_world
+from vico.world.heights import HeightField
 from vico.world.world import World
+
+_LETTERS = {GREEN: "g", AMBER: "a", RED: "r"}
+
+
+def signals_of(world: World, junctions: str, seed: int) -> dict[str, Any]:
+    """Return what ``/api/signals`` tells; no heads where the run's traffic obeys no signals.
+
+    Parameters
+    ----------
+    junctions, seed
+        As in the run's `vico.sim.config.SimConfig`.
+    """
+    dark = [name for name, kind in event_kinds().items() if kind.dark]
+    found: dict[str, Any] = {"cycles": [], "heads": []}
+    if JunctionRule(junctions).has_signals and len(world.lanes):
+        found = heads_on(SimulationBase.of(world).streets, world.height, seed)
+    return found | {"dark_events": dark}
+
+
+def heads_on(streets: TrafficNetwork, height: HeightField, seed: int) -> dict[str, Any]:
+    """Return the heads of all signals, and the cycles of what they show."""
+    clock = SignalClock(streets.lanes, streets.walks, seed)
+    placed = SignalHeads(streets.lanes, streets.walks, streets.poles, height).placed
+    days: list[tuple[str, SignalDay | None]] = [("signal", clock.day_of_lane(lane)) for lane in placed.lane.tolist()]
+    days += [("walk", clock.day_of_walkway(way)) for way in placed.walkway.tolist()]
+    days += [("signal_post", None)] * (len(placed.transforms) - len(days))
+    cycles: dict[str, int] = {}
+    heads = []
+    for (kind, day), transform in zip(days, placed.transforms.astype(np.float64), strict=True):
+        head: dict[str, Any] = {"kind": kind, "at": np.round(transform[:3, 3], 3).tolist()}
+        head["yaw"] = round(math.atan2(transform[1, 0], transform[0, 0]), 4)
+        head["scale"] = round(float(transform[2, 2]), 4)
+        if day is not None:
+            text = "".join(_LETTERS.get(light, "-") for light in day.light.tolist())
+            head["cycle"] = cycles.setdefault(text, len(cycles))
+            head["junction"] = [round(value, 2) for value in day.position]
+        heads.append(head)
+    return {"cycles": list(cycles), "heads": heads}
+
+
+def relations_of(path: Path, manifest: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Return whom each resident knows, the nearest first, by the resident's id; empty where the community is gone.
+
+    Each entry has ``name``, ``kind``, ``note`` and ``strength`` as `vico.community.model.Relation` describes them.
+    """
+    told = (manifest.get("community") or {}).get("path")
+    if not told:
+        return {}
+    try:
+        community = read_community(Path(os.path.normpath(path / told)))
+    except (VicoError, OSError):
+        # A recording is shown without its community as well.
+        return {}
+    names = {resident.id: resident.name for resident in community.residents}
+    found: dict[str, list[dict[str, Any]]] = {}
+    for relation in sorted(community.relations, key=lambda r: -r.strength):
+        for one, other in (relation.between, relation.between[::-1]):
+            entry = {"name": names.get(other, other), "kind": str(relation.kind.value), "note": relation.note}
+            found.setdefault(one, []).append(entry | {"strength": relation.strength})
+    return found
+
 
 PROTOCOL = 1
 
@@ -62,7 +131,7 @@ class Source:
         self.manifest = read_manifest(path)
         self.names = {agent["entity"]: agent["name"] for agent in self.agents}
         self.timeline = Timeline(tables)
-        self.skylight = Skylight(_sky(world, self.manifest["config"]))
+        self.skylight = Skylight(_sky_of_run(world, self.manifest["config"]))
         #: Gives the plans that agents publish now; only a run that goes on has any.
         self.plans: Callable[[Sequence[str]], Mapping[str, Any]] = lambda names: {}
 
@@ -141,7 +210,7 @@ class Source:
     def cast(self, since: int | None = None) -> dict[str, Any]:
         """Return what ``/api/cast`` tells."""
         cast = self.tables.cast().values()
-        told = [_member(m) for m in cast if since is None or _changed(m, since)]
+        told = [_member(m) for m in cast if since is None or _changed_since(m, since)]
         return {"step": self.last, "cast": told}
 
     def moment(self, step: int, agent: str = "") -> dict[str, Any]:
@@ -186,8 +255,6 @@ class Source:
     @cached_property
     def signals(self) -> dict[str, Any]:
         """What ``/api/signals`` tells."""
-        from vico.viewer.sources.signals import signals_of
-
         if self.world is None:
             return {"cycles": [], "heads": [], "dark_events": []}
         return signals_of(self.world, self.manifest["config"]["junctions"], self.manifest["seed"])
@@ -279,7 +346,7 @@ class Source:
         }
 
 
-def _sky(world: World | None, config: Mapping[str, Any]) -> Sky | None:
+def _sky_of_run(world: World | None, config: Mapping[str, Any]) -> Sky | None:
     if world is None:
         return None
     origin = world.manifest.origin
@@ -320,7 +387,7 @@ def _member(member: CastMember) -> dict[str, Any]:
     return told | {"size": list(member.size), "intervals": [list(interval) for interval in member.intervals]}
 
 
-def _changed(member: CastMember, since: int) -> bool:
+def _changed_since(member: CastMember, since: int) -> bool:
     """Whether a body came or went after a step."""
     first, until = member.intervals[-1]
     return first > since or (until is not None and until > since)

@@ -14,7 +14,7 @@ from PIL import Image
 from vico.errors import InputError, MissingFileError, VicoError
 from vico.sim.loop.simulation import Simulation
 from vico.sim.recording import Run
-from vico.viewer.repeat import RepeatedRun
+from vico.viewer.run_film import RepeatedRun
 
 #: Pictures there are; ``names`` tells what the colours of the segmentation are.
 OUTPUTS = ("rgb", "depth", "segmentation", "names")
@@ -30,7 +30,7 @@ class NoPictureError(InputError):
     """A step has no picture, or not yet, of what an agent sees; nothing is wrong with the question."""
 
 
-class Seen(NamedTuple):
+class AgentView(NamedTuple):
     """What an agent sees.
 
     Attributes
@@ -45,7 +45,7 @@ class Seen(NamedTuple):
     names: Mapping[int, Mapping[str, str]]
 
 
-def seen_by(sim: Simulation, agent: str) -> Seen:
+def render_agent_view(sim: Simulation, agent: str) -> AgentView:
     """Render what an agent sees now.
 
     Raises
@@ -68,12 +68,12 @@ def seen_by(sim: Simulation, agent: str) -> Seen:
         pictures: dict[str, NDArray[Any]] = {
             name: np.array(observation[name]) for name in ("rgb", "depth", "segmentation") if name in observation
         }
-        return Seen(pictures, dict(info["entities"]))
+        return AgentView(pictures, dict(info["entities"]))
     finally:
         sim.seeing = seeing
 
 
-def picture_of(seen: Seen, output: str) -> tuple[bytes | dict[str, Any], str]:
+def picture_of(seen: AgentView, output: str) -> tuple[bytes | dict[str, Any], str]:
     """Return a picture's bytes, or the names as a record, and the type of the content.
 
     Raises
@@ -94,7 +94,7 @@ def picture_of(seen: Seen, output: str) -> tuple[bytes | dict[str, Any], str]:
         return _bytes(near.astype(np.uint8), "PNG"), "image/png"
     if output == "segmentation":
         return _bytes(_colours(image), "PNG"), "image/png"
-    return {"names": _names(image, seen.names)}, "application/json"
+    return {"names": _entity_names(image, seen.names)}, "application/json"
 
 
 class RecordedViews:
@@ -110,7 +110,7 @@ class RecordedViews:
         self._run = run
         self._lock = threading.Lock()
         self._repeated: RepeatedRun | None = None
-        self._seen: tuple[str, int, Seen] | None = None
+        self._seen: tuple[str, int, AgentView] | None = None
 
     def view(self, agent: str, step: int, output: str) -> tuple[bytes | dict[str, Any], str]:
         """Return a picture; see `picture_of`.
@@ -131,10 +131,10 @@ class RecordedViews:
         with self._lock:
             if output == "rgb" and (film := self._run.views.get(agent)) is not None:
                 for _, picture in film.frames({step}):
-                    return picture_of(Seen({"rgb": picture}, {}), "rgb")
+                    return picture_of(AgentView({"rgb": picture}, {}), "rgb")
             return picture_of(self._again(agent, step), output)
 
-    def _again(self, agent: str, step: int) -> Seen:
+    def _again(self, agent: str, step: int) -> AgentView:
         if self._seen is not None and self._seen[:2] == (agent, step):
             return self._seen[2]
         if self._repeated is None:
@@ -152,7 +152,7 @@ class RecordedViews:
         if step < self._repeated.step and before == 0:
             self._repeated = RepeatedRun.of_folders(self._run)
         self._repeated.go_to(step)
-        seen = seen_by(self._repeated.sim, agent)
+        seen = render_agent_view(self._repeated.sim, agent)
         self._seen = agent, step, seen
         return seen
 
@@ -174,7 +174,7 @@ def _colours(image: NDArray[np.int32]) -> NDArray[np.uint8]:
     return _colour(image.astype(np.int64))
 
 
-def _names(image: NDArray[np.int32], names: Mapping[int, Mapping[str, str]]) -> list[dict[str, Any]]:
+def _entity_names(image: NDArray[np.int32], names: Mapping[int, Mapping[str, str]]) -> list[dict[str, Any]]:
     entities, pixels = np.unique(image[image > 0], return_counts=True)
     colours = _colour(entities.astype(np.int64)).reshape(-1, 3)
     told = [

@@ -14,8 +14,7 @@ from vico.seeds import rng
 from vico.world.mesh import Material
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER
 from vico.worldgen.facts.street_habits import Paving
-from vico.worldgen.kept_textures import Painters
-from vico.worldgen.texture_canvas import Canvas, periodic_noise
+from vico.worldgen.texture_canvas import Canvas, TextureCache, periodic_noise
 
 Rgb = tuple[int, int, int]
 Picture = NDArray[np.uint8]
@@ -404,7 +403,7 @@ _PAINTERS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "ground_blocks": _stone_blocks,
 }
 
-_PAINTED = Painters(__file__, __name__)
+_PAINTED = TextureCache(__file__, __name__)
 
 
 @cache

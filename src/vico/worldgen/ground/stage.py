@@ -147,7 +147,7 @@ def tree_pits(trees: NDArray[np.float64], pieces: Mapping[str, Sequence[Polygon]
 
 
 #: Metres of ground beyond the square of a world by itself: its edge is not in sight from within streets.
-APRON = 40.0
+GROUND_APRON = 40.0
 # Metres below: shows through nothing but the hairlines between two surfaces. Well below carriageways, too: it lies at
 # another depth in a tile whose ground is not level.
 _UNDERLAY, _UNDERLAY_SLOPED = 0.6, 3.0

@@ -1,19 +1,106 @@
-"""Charts: flat rectangles of texels on square pages, one for each plane piece of the buildings' walls and roofs."""
+"""Charts: flat rectangles of texels on square pages, one for each plane piece of the buildings' walls and roofs.
+
+Each chart has a plane, on which right and up are fixed. Rectangles are packed on pages along a skyline.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.io.compiled import compiled
 from vico.world.mesh import Material, Surface
-from vico.worldgen.photos.chart_planes import level_turns, plane_axes, projected
-from vico.worldgen.photos.packing import pack
+
+
+def plane_axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Right and up of planes as seen from outside: up is as near to the zenith as it gets."""
+    up = np.array([0.0, 0.0, 1.0]) - normal * normal[:, 2:]
+    level = np.linalg.norm(up, axis=1) < 1e-3
+    up[level] = np.array([0.0, 1.0, 0.0]) - normal[level] * normal[level, 1:2]
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    return np.cross(up, normal), up
+
+
+def plane_coordinates(
+    points: NDArray[np.float64],
+    patch: NDArray[np.int64],
+    base: NDArray[np.float64],
+    right: NDArray[np.float64],
+    up: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Coordinates of triangles' corners along right and up of the plane of each's patch, shape ``(n, 3)`` each."""
+    away = points - base[patch][:, None]
+    return np.einsum("nkc,nc->nk", away, right[patch]), np.einsum("nkc,nc->nk", away, up[patch])
+
+
+def level_turns(
+    x: NDArray[np.float64], y: NDArray[np.float64], patch: NDArray[np.int64], plane: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Angles that lay the charts of flat roofs along their longer sides; walls and slopes stand as they are."""
+    turn = np.zeros(len(plane))
+    level = plane[:, 2] > 0.995
+    take = level[patch]
+    if not take.any():
+        return turn
+    which = np.flatnonzero(level)
+    compact = np.cumsum(level) - 1
+    points = np.column_stack([x[take].ravel(), y[take].ravel()])
+    hulls = shapely.oriented_envelope(shapely.multipoints(points, indices=np.repeat(compact[patch[take]], 3)))
+    for k, hull in zip(which, hulls, strict=True):
+        ring = shapely.get_coordinates(hull)
+        if len(ring) == 5:
+            sides = np.diff(ring, axis=0)[:2]
+            along = sides[int(np.linalg.norm(sides[1]) > np.linalg.norm(sides[0]) + 1e-6)]
+            angle = math.atan2(along[1], along[0])
+            turn[k] = (angle + np.pi / 2) % np.pi - np.pi / 2
+    return turn
+
+
+def pack_rectangles(cells: NDArray[np.int64], page: int) -> NDArray[np.int64]:
+    """Place rectangles (width, height) on pages: page, x, y of each; the highest first, each as low as it goes."""
+    order = np.lexsort((np.arange(len(cells)), -cells[:, 0], -cells[:, 1]))
+    return _skyline(cells, order, page) if len(cells) else np.zeros((0, 3), np.int64)
+
+
+@compiled(nogil=True)
+def _skyline(cells, order, page):  # type: ignore[no-untyped-def]
+    places = np.zeros((len(cells), 3), np.int64)
+    tops = np.zeros((len(cells), page), np.int32)
+    pages = 1
+    queue = np.zeros(page, np.int64)
+    for index in order:
+        w, h = cells[index]
+        k = 0
+        while True:
+            top = tops[k]
+            best, best_x = page + 1, -1
+            head, tail = 0, 0
+            for x in range(page):
+                while tail > head and top[queue[tail - 1]] <= top[x]:
+                    tail -= 1
+                queue[tail] = x
+                tail += 1
+                left = x - w + 1
+                if left >= 0:
+                    if queue[head] < left:
+                        head += 1
+                    if top[queue[head]] < best:
+                        best, best_x = top[queue[head]], left
+            if best + h <= page:
+                places[index] = k, best_x, best
+                top[best_x : best_x + w] = best + h
+                break
+            k += 1
+            pages = max(pages, k + 1)
+    return places
+
 
 _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
 _BEND = np.cos(np.radians(14.0))  # neighbouring faces that turn less than this share a chart ...
@@ -169,7 +256,7 @@ def unwrap(
     for layer in (False, True):
         mine = np.flatnonzero(roof[index] == layer)
         if len(mine):
-            places[mine] = pack(cells[mine] + 2 * _GUTTER, page)
+            places[mine] = pack_rectangles(cells[mine] + 2 * _GUTTER, page)
             places[mine, 0] += first
             first = int(places[mine, 0].max()) + 1
     charts = []
@@ -197,7 +284,7 @@ def unwrap(
     chart_of = np.full(count + 1, -1, np.int64)
     chart_of[index] = np.arange(len(index))
     face_chart = chart_of[patches.face_patch]
-    flat = _flattened(charts, patches.corners, face_chart)
+    flat = _corner_pixels(charts, patches.corners, face_chart)
     for k in range(len(sizes)):
         faces = np.flatnonzero((face_chart >= 0) & (places[face_chart, 0] == k)) if len(charts) else np.zeros(0, int)
         boxes = np.array([(charts[c].x, charts[c].y, charts[c].width, charts[c].height) for c in face_chart[faces]])
@@ -214,12 +301,12 @@ def unwrap(
     first = 0
     for k, surface in enumerate(surfaces):
         part = slice(first, first + len(surface.triangles))
-        made[k >= len(walls)].extend(_charted(surface, face_chart[part], flat[part], charts, sizes))
+        made[k >= len(walls)].extend(_split_by_page(surface, face_chart[part], flat[part], charts, sizes))
         first += len(surface.triangles)
     return made[0], made[1], atlas
 
 
-def textured(surfaces: Sequence[Surface], atlas: Atlas) -> list[Surface]:
+def with_atlas_pages(surfaces: Sequence[Surface], atlas: Atlas) -> list[Surface]:
     """Put the pages into the materials of unwrapped surfaces; their vertices turn white, so that photos keep colour."""
     pages = {f"atlas_{k}": Material(f"atlas_{k}", page, photo=True) for k, page in enumerate(atlas.pages)}
     return [
@@ -239,7 +326,7 @@ def coverage(atlas: Atlas) -> NDArray[np.float64]:
     return shares
 
 
-def repacked(
+def repack(
     walls: Sequence[Surface], roofs: Sequence[Surface], atlas: Atlas, *, least: float = 0.3, page: int | None = None
 ) -> tuple[list[Surface], list[Surface], Atlas]:
     """Drop the charts that photos hardly cover, so that their faces wear their procedural facade again.
@@ -316,13 +403,13 @@ def _patches(surfaces: Sequence[Surface], layers: int) -> _Patches:
     by_patch = np.argsort(patch, kind="stable")
     patch, member = patch[by_patch], member[by_patch]
     base = points[seeds, 0].reshape(-1, 3)
-    flat_x, flat_y = projected(points[member], patch, base, right, up)
+    flat_x, flat_y = plane_coordinates(points[member], patch, base, right, up)
     turn = level_turns(flat_x, flat_y, patch, plane)
     right, up = (
         np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up,
         -np.sin(turn)[:, None] * right + np.cos(turn)[:, None] * up,
     )
-    flat_x, flat_y = projected(points[member], patch, base, right, up)
+    flat_x, flat_y = plane_coordinates(points[member], patch, base, right, up)
     first = np.searchsorted(patch, np.arange(n))
     low = np.zeros((n, 2))
     high = np.zeros((n, 2))
@@ -396,7 +483,7 @@ def _page_sizes(charts: Sequence[Chart], page: int) -> list[tuple[int, int]]:
     return [(min(1 << (max(height, 64) - 1).bit_length(), page), page) for height in used]
 
 
-def _flattened(
+def _corner_pixels(
     charts: Sequence[Chart], corners: NDArray[np.float64], face_chart: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Pixel coordinates of charted triangles' corners on their pages, shape ``(m, 3, 2)``."""
@@ -440,7 +527,7 @@ def _rasterise(triangles, boxes, inside):  # type: ignore[no-untyped-def]
                     inside[row, column] = True
 
 
-def _charted(
+def _split_by_page(
     surface: Surface,
     face_chart: NDArray[np.int64],
     flat: NDArray[np.float64],

@@ -15,14 +15,21 @@ from vico.geo.tiles3d import TileMesh
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.photos.atlas import Atlas, coverage, repacked, textured
+from vico.worldgen.photos.atlas import Atlas, coverage, repack, with_atlas_pages
 from vico.worldgen.photos.baking import bake
-from vico.worldgen.photos.daylight import sun_in, without_sun
-from vico.worldgen.photos.enhance.steps import Inpainter, Upscaler, evened, inpainted, padded, upscaled
-from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, Movers, StandingDifferences
+from vico.worldgen.photos.enhancement import (
+    Inpainter,
+    Upscaler,
+    even_out_light,
+    find_sun,
+    inpaint_atlas,
+    pad_gutters,
+    remove_sunlight,
+    upscale_atlas,
+)
+from vico.worldgen.photos.streetview.masking import LanguageGroundedMovers, Movers, StandingDifferences
 from vico.worldgen.photos.streetview.matching import LoftrMatcher, Matcher, SiftMatcher, XfeatMatcher
-from vico.worldgen.photos.streetview.photo import Photographer, StreetviewConfig
-from vico.worldgen.photos.streetview.reprojection import StreetviewReport, reproject
+from vico.worldgen.photos.streetview.reprojection import Photographer, StreetviewConfig, StreetviewReport, reproject
 
 METHODS = {
     "inpaint": ("exemplar", "patchmatch", "diffusion", "none"),
@@ -117,7 +124,7 @@ class Texturing:
 
 
 @dataclass(frozen=True)
-class Painted:
+class PhotoSurfaces:
     """Walls and roofs that wear photos where there are any, and what was done.
 
     Attributes
@@ -137,16 +144,16 @@ class Painted:
 
     def surfaces(self) -> tuple[list[Surface], list[Surface]]:
         """Walls and roofs with the pages as their textures."""
-        return textured(self.walls, self.atlas), textured(self.roofs, self.atlas)
+        return with_atlas_pages(self.walls, self.atlas), with_atlas_pages(self.roofs, self.atlas)
 
 
-def painted_from_tiles(
+def paint_from_tiles(
     walls: Sequence[Surface], roofs: Sequence[Surface], mesh: TileMesh, *, texel: float, least: float = 0.0
-) -> Painted:
+) -> PhotoSurfaces:
     """Bake the colours of a tile mesh onto walls and roofs; holes stay unknown.
 
     With `least`, faces that photos cover less than that share of get their procedural facade back at once, as by
-    `kept_where_photographed`: only where no street photos are to come, and then in less memory than afterwards.
+    `keep_photographed_faces`: only where no street photos are to come, and then in less memory than afterwards.
     """
     baked = bake(walls, roofs, mesh, texel=texel)
     known = sum(int(mask.sum()) for mask in baked.atlas.known)
@@ -158,26 +165,26 @@ def painted_from_tiles(
         "texels": inside,
         "texels_known": known,
     }
-    painted = Painted(baked.walls, baked.roofs, baked.atlas, counts)
-    return kept_where_photographed(walls, roofs, painted, least=least) if least > 0.0 else painted
+    painted = PhotoSurfaces(baked.walls, baked.roofs, baked.atlas, counts)
+    return keep_photographed_faces(walls, roofs, painted, least=least) if least > 0.0 else painted
 
 
-def painted_as_built(walls: Sequence[Surface], roofs: Sequence[Surface], *, texel: float) -> Painted:
+def paint_as_built(walls: Sequence[Surface], roofs: Sequence[Surface], *, texel: float) -> PhotoSurfaces:
     """Put the procedural facades themselves on pages, all unknown: what street photos are painted over."""
-    own = painted_from_tiles(walls, roofs, mesh_of([*walls, *roofs]), texel=texel)
+    own = paint_from_tiles(walls, roofs, mesh_of([*walls, *roofs]), texel=texel)
     atlas = replace(own.atlas, known=tuple(np.zeros_like(mask) for mask in own.atlas.known))
     return replace(own, atlas=atlas)
 
 
-def painted_from_street(
-    painted: Painted,
+def paint_from_street(
+    painted: PhotoSurfaces,
     images: Sequence[StreetImage],
     height: HeightField,
     *,
     others: Sequence[Surface],
     photograph: Photographer,
     how: Texturing | None = None,
-) -> tuple[Painted, StreetviewReport]:
+) -> tuple[PhotoSurfaces, StreetviewReport]:
     """Paint street photos over what is on the pages.
 
     `others` are surfaces that hide walls beside these: the ground. The report has what became of each photo.
@@ -190,39 +197,39 @@ def painted_from_street(
     return replace(painted, atlas=atlas, counts={**painted.counts, "texels_known": known}), report
 
 
-def kept_where_photographed(
-    walls: Sequence[Surface], roofs: Sequence[Surface], painted: Painted, *, least: float
-) -> Painted:
+def keep_photographed_faces(
+    walls: Sequence[Surface], roofs: Sequence[Surface], painted: PhotoSurfaces, *, least: float
+) -> PhotoSurfaces:
     """Give faces that photos hardly cover their procedural facade back; `walls` and `roofs` as before painting."""
     if not len(painted.atlas.charts) or bool((coverage(painted.atlas) >= least).all()):
         return painted
-    new_walls, new_roofs, atlas = repacked(walls, roofs, painted.atlas, least=least)
+    new_walls, new_roofs, atlas = repack(walls, roofs, painted.atlas, least=least)
     return replace(painted, walls=new_walls, roofs=new_roofs, atlas=atlas)
 
 
-def enhanced(painted: Painted, how: Texturing) -> Painted:
+def enhance(painted: PhotoSurfaces, how: Texturing) -> PhotoSurfaces:
     """Fill what no photo shows, and make the texels finer if asked to."""
     # One copy for all the steps: the pages of a district fill half a gigabyte.
     atlas = replace(painted.atlas, pages=tuple(page.copy() for page in painted.atlas.pages))
     counts = dict(painted.counts)
     if how.even and atlas.charts:
         sight = _sight_of([*painted.walls, *painted.roofs])
-        sun = sun_in(atlas, sight)
+        sun = find_sun(atlas, sight)
         if sun is None:
-            atlas = evened(atlas, over=True)
+            atlas = even_out_light(atlas, over=True)
         else:
-            atlas = without_sun(atlas, sun, sight, over=True)
+            atlas = remove_sunlight(atlas, sun, sight, over=True)
             counts["sun_azimuth"] = round(sun.azimuth)
             counts["sun_height"] = round(sun.height)
     if how.inpaint != "none":
-        atlas = inpainted(atlas, inpainter=_inpainter(how), over=True)
+        atlas = inpaint_atlas(atlas, inpainter=_inpainter(how), over=True)
         counts["texels_filled"] = sum(
             int((inside & ~known).sum()) for inside, known in zip(atlas.inside, atlas.known, strict=True)
         )
     upscaler = _upscaler(how)
     if upscaler is not None:
-        atlas = upscaled(atlas, upscaler=upscaler)
-    return replace(painted, atlas=padded(atlas, over=True), counts=counts)
+        atlas = upscale_atlas(atlas, upscaler=upscaler)
+    return replace(painted, atlas=pad_gutters(atlas, over=True), counts=counts)
 
 
 def mesh_of(surfaces: Sequence[Surface]) -> TileMesh:
@@ -270,19 +277,19 @@ def streetview_config(how: Texturing) -> StreetviewConfig:
 
 
 def _inpainter(how: Texturing) -> Inpainter | None:
-    from vico.worldgen.photos.enhance import plugins
+    from vico.worldgen.photos import enhancement_plugins
 
     if how.inpaint == "patchmatch":
-        return plugins.PatchMatchFill()
-    return plugins.DiffusionInpainter(how.model) if how.inpaint == "diffusion" else None
+        return enhancement_plugins.PatchMatchFill()
+    return enhancement_plugins.DiffusionInpainter(how.model) if how.inpaint == "diffusion" else None
 
 
 def _upscaler(how: Texturing) -> Upscaler | None:
-    from vico.worldgen.photos.enhance import plugins
-    from vico.worldgen.photos.enhance.back_projection import BackProjection
+    from vico.worldgen.photos import enhancement_plugins
+    from vico.worldgen.photos.enhancement import BackProjection
 
     if how.upscale == "sharpen":
         return BackProjection()
     if how.upscale == "realesrgan":
-        return plugins.RealEsrgan()
-    return plugins.DiffusionUpscaler(how.model) if how.upscale == "diffusion" else None
+        return enhancement_plugins.RealEsrgan()
+    return enhancement_plugins.DiffusionUpscaler(how.model) if how.upscale == "diffusion" else None

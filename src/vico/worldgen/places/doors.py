@@ -38,7 +38,7 @@ _OUTDOORS = (Category.OPEN, Category.TRANSIT)
 
 
 @dataclass(frozen=True)
-class _Doors:
+class _DoorSpots:
     """Where a building could have doors.
 
     Attributes
@@ -55,7 +55,7 @@ class _Doors:
     cost: NDArray[np.float64]
 
 
-class Finder:
+class DoorFinder:
     """Finds buildings and doors, and keeps the doors it made."""
 
     def __init__(self, osm: OsmData, buildings: Sequence[Building], walkable: WalkableMap, height: HeightField) -> None:
@@ -71,7 +71,7 @@ class Finder:
         self._through: Counter[str] = Counter()
         self._taken: dict[int, dict[str, tuple[float, float]]] = defaultdict(dict)
         self._own: dict[str, list[Entrance]] = defaultdict(list)
-        self._doors: dict[int, _Doors] = {}
+        self._doors: dict[int, _DoorSpots] = {}
         self._area_tags = {area.id: area.tags for area in osm.areas}
         self._mapped = self._mapped_entrances()
 
@@ -254,7 +254,7 @@ class Finder:
             return None
         return self._made(at, doors, best)
 
-    def _made(self, at: int, doors: _Doors, k: int) -> Entrance:
+    def _made(self, at: int, doors: _DoorSpots, k: int) -> Entrance:
         """Return the entrance at a candidate, or the one that is there already."""
         building = self.buildings[at]
         for other in self._own[building.id]:
@@ -289,7 +289,7 @@ class Finder:
                        if door[1] in ("main", "home", "staircase", "yes") else 4)  # fmt: skip
         return found
 
-    def _candidates(self, at: int) -> _Doors:
+    def _candidates(self, at: int) -> _DoorSpots:
         """Points of a building's outer ring that can be reached from outside."""
         if at in self._doors:
             return self._doors[at]
@@ -310,7 +310,7 @@ class Finder:
             corner.append(np.abs(offsets - length / 2) * 0.05 + np.maximum(0.0, 6.0 - length) * 0.5)
         if not spots:
             nowhere = np.zeros((0, 2))
-            self._doors[at] = _Doors(nowhere, nowhere, nowhere, np.zeros(0))
+            self._doors[at] = _DoorSpots(nowhere, nowhere, nowhere, np.zeros(0))
             return self._doors[at]
         where, out, cost = np.concatenate(spots), np.concatenate(outs), np.concatenate(corner)
         # What a door opens to: the sidewalk best, then open ground, then the roadway.
@@ -331,5 +331,5 @@ class Finder:
             cost = cost + np.where(np.isin(seen, (SIDEWALK, CROSSING, ROADWAY)), 0.0, 1.0)
         # A wall that comes back on itself within a hand's breadth has its other side before it.
         good = np.isfinite(best) & ~faces_into(self.shapes[at], np.round(where, 3), out)
-        self._doors[at] = _Doors(where[good], out[good], approach[good], (cost + best)[good])
+        self._doors[at] = _DoorSpots(where[good], out[good], approach[good], (cost + best)[good])
         return self._doors[at]

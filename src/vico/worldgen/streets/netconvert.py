@@ -23,16 +23,9 @@ from vico.world.heights import HeightField
 from vico.world.model import FAILED
 from vico.worldgen.facts.fault_isolation import leave_out
 from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.streets.opendrive import sound_opendrive
-from vico.worldgen.streets.roads import (
-    DEFAULTS,
-    SIDEWALK_WIDTH,
-    WALKING,
-    NetworkStreet,
-    is_traffic_street,
-)
-from vico.worldgen.streets.smoothing import without_kinks
-from vico.worldgen.streets.walk_lines import CarriagewayEdges, sidewalks_beside
+from vico.worldgen.streets.lane_shapes import CarriagewayEdges, move_sidewalks, smooth_lanes
+from vico.worldgen.streets.opendrive import repair_opendrive
+from vico.worldgen.streets.roads import DEFAULTS, SIDEWALK_WIDTH, WALKING, NetworkStreet, is_traffic_street
 
 _NO_RAIL = (
     "rail rail_urban rail_electric rail_fast tram drone aircraft scooter container wheelchair subway cable_car ship"
@@ -206,11 +199,11 @@ def _converted(
             raise NetconvertError(
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
-        plain = without_kinks(_plain_net(net.read_bytes()))
+        plain = smooth_lanes(_plain_net(net.read_bytes()))
         if kerbs is not None:
-            plain = sidewalks_beside(plain, kerbs, left_driving=site.left_driving)
-        roads = sound_opendrive(_plain_xodr(xodr.read_bytes()), height)
-        return RoadNetwork(plain if height is None else _laid(plain, height), roads)
+            plain = move_sidewalks(plain, kerbs, left_driving=site.left_driving)
+        roads = repair_opendrive(_plain_xodr(xodr.read_bytes()), height)
+        return RoadNetwork(plain if height is None else _lay_lanes(plain, height), roads)
 
 
 def empty_network(frame: LocalFrame, half: float) -> RoadNetwork:
@@ -253,7 +246,7 @@ def _plain_net(content: bytes) -> bytes:
 _SHAPE = re.compile(rb'(<lane [^>]*? shape=")([^"]*)(")')
 
 
-def _laid(content: bytes, height: HeightField) -> bytes:
+def _lay_lanes(content: bytes, height: HeightField) -> bytes:
     """Put every point of the lanes on the surface it is nearest to.
 
     netconvert knows heights at the nodes of the map alone. Between them the ground is not straight, but it is clear

@@ -64,7 +64,7 @@ class _Turn:
     lanes: list[tuple[int, int, Element]]
 
 
-def sound_opendrive(content: bytes, height: HeightField | None = None) -> bytes:
+def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes:
     """Return an OpenDRIVE file of netconvert's that keeps the standard's rules (version 1.4).
 
     Parameters
@@ -106,7 +106,7 @@ def sound_opendrive(content: bytes, height: HeightField | None = None) -> bytes:
     _write_streets(streets, turns)
     for junction in root.findall("junction"):
         junction[:] = connections[str(junction.get("id"))]
-    return _written(root, [s.element for s in streets.values()], [way for listed in ways.values() for way in listed])
+    return _write_file(root, [s.element for s in streets.values()], [way for listed in ways.values() for way in listed])
 
 
 def _length(curves: Iterable[Curve]) -> float:
@@ -243,10 +243,10 @@ def _lay(streets: Iterable[_Street], height: HeightField | None) -> None:
     for street, along in zip(listed, stations, strict=True):
         levels = np.round(found[first : first + len(along)], 2)
         first += len(along)
-        street.elevations = [(float(along[k]), float(levels[k])) for k in _needed(along, levels)]
+        street.elevations = [(float(along[k]), float(levels[k])) for k in _simplify_profile(along, levels)]
 
 
-def _needed(along: Floats, levels: Floats) -> list[int]:
+def _simplify_profile(along: Floats, levels: Floats) -> list[int]:
     """Return the points of a profile between which straight lines tell the others (Douglas and Peucker)."""
     kept, open_ = {0, len(along) - 1}, [(0, len(along) - 1)]
     while open_:
@@ -288,12 +288,12 @@ def _way(turn: _Turn, number: str, streets: Mapping[str, _Street]) -> Element:
         offset = [sum(side) for side in zip(*wide, strict=True)]
         SubElement(lanes, "laneOffset", {"s": "0", **_blend(offset[0], offset[1], length)})
     section = SubElement(lanes, "laneSection", s="0")
-    section.append(deepcopy(_found(turn.road, "lanes/laneSection/center")))
+    section.append(deepcopy(_find_element(turn.road, "lanes/laneSection/center")))
     side = SubElement(section, "right")
     for k, (one, other, old) in enumerate(turn.lanes):
         lane = deepcopy(old)
         lane.set("id", str(-1 - k))
-        joins = _found(lane, "link")
+        joins = _find_element(lane, "link")
         joins[:] = [Element("predecessor", id=str(one)), Element("successor", id=str(other))]
         for width in lane.findall("width"):
             lane.remove(width)
@@ -308,7 +308,7 @@ def _width(street: _Street, lane: int) -> float:
     return abs(outer - inner)
 
 
-def _found(element: Element, path: str) -> Element:
+def _find_element(element: Element, path: str) -> Element:
     found = element.find(path)
     assert found is not None, f"netconvert always writes {path}"
     return found
@@ -376,8 +376,8 @@ def _write_streets(streets: Mapping[str, _Street], turns: Sequence[_Turn]) -> No
                 if way in leads[name]:
                     SubElement(link, way, elementType="junction", elementId=leads[name][way])
             road.insert(0, link)
-        _plan(_found(road, "planView"), street.curves)
-        _profile(_found(road, "elevationProfile"), street.elevations)
+        _plan(_find_element(road, "planView"), street.curves)
+        _profile(_find_element(road, "elevationProfile"), street.elevations)
         for thing in [*road.iter("object"), *road.iter("signal")]:
             thing.set("s", f"{min(max(float(thing.get('s', '0')), 0.0), math.floor(sum(lengths) * 1e6) / 1e6):.8f}")
         # Version 1.4, which all readers know, has none of these.
@@ -387,9 +387,9 @@ def _write_streets(streets: Mapping[str, _Street], turns: Sequence[_Turn]) -> No
                 corner.attrib.pop("id", None)
 
 
-def _written(root: Element, streets: Sequence[Element], ways: Sequence[Element]) -> bytes:
+def _write_file(root: Element, streets: Sequence[Element], ways: Sequence[Element]) -> bytes:
     """Return the file: the header, roads, controllers and junctions that have something in them."""
-    header = _found(root, "header")
+    header = _find_element(root, "header")
     roads = [*streets, *ways]
     signals = {signal.get("id") for road in roads for signal in road.iter("signal")}
     # netconvert writes the controller of signals that it joined once for each junction that they stand at.
@@ -400,7 +400,7 @@ def _written(root: Element, streets: Sequence[Element], ways: Sequence[Element])
         controller.extend(one for one in given if one.get("signalId") in signals - known)
     kept = [*controllers.values(), *root.findall("junction")]
     root[:] = [header, *roads, *(element for element in kept if len(element))]
-    _bound(header, roads)
+    _set_bounds(header, roads)
     geo = header.find("geoReference")
     where = "" if geo is None else str(geo.text).strip()
     if geo is not None:
@@ -411,7 +411,7 @@ def _written(root: Element, streets: Sequence[Element], ways: Sequence[Element])
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _bound(header: Element, roads: Iterable[Element]) -> None:
+def _set_bounds(header: Element, roads: Iterable[Element]) -> None:
     """Set the header's bounds to the box around all roads with their lanes."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for road in roads:

@@ -257,11 +257,11 @@ def streets_from_osm(
         pieces, new_id = _cut(way, site.osm, new_id)
         with drop_on_failure(f"w{way.id}"):
             found = _parts(way, pieces, site, standing)
-            streets += [_opened(street) if way.id in usable else street for street in found]
+            streets += [_open_street(street) if way.id in usable else street for street in found]
     return _medians_cleared(streets, lefthand=site.left_driving)
 
 
-def _opened(street: NetworkStreet) -> NetworkStreet:
+def _open_street(street: NetworkStreet) -> NetworkStreet:
     """Return a street on a deck or in a tunnel that can be used; tunnels that are not for walkers have no sidewalks."""
     street = replace(street, deck=True, closed=None)
     return replace(street, sidewalk="none") if street.below and street.tags.get("foot") == "no" else street
@@ -277,7 +277,7 @@ def _parts(
         if street is not None and np.linalg.norm(line[1:] - line[:-1], axis=1).sum() > 0.5:
             if way.id in site.levels.above:
                 street = replace(street, closed=OVER_A_STREET)
-            elif street.closed is None and _is_passage(way.tags) and _blocked(line, standing):
+            elif street.closed is None and _is_passage(way.tags) and _is_blocked(line, standing):
                 street = replace(street, closed=THROUGH_A_BUILDING)
             found.append(street)
     return found
@@ -288,7 +288,7 @@ def _is_passage(tags: Mapping[str, str]) -> bool:
     return tags.get("tunnel") == "building_passage" or tags.get("covered", "no") != "no"
 
 
-def _blocked(line: NDArray[np.float64], standing: shapely.STRtree) -> bool:
+def _is_blocked(line: NDArray[np.float64], standing: shapely.STRtree) -> bool:
     """Whether something stands across a line, by more than the edges of a passage that is drawn a little off."""
     path = shapely.LineString(line)
     across = standing.geometries[standing.query(path, predicate="intersects")]
@@ -367,7 +367,9 @@ def roads_from_osm(site: SiteFacts, streets: Sequence[NetworkStreet]) -> Roads:
         node.id for node in osm.nodes if node.tags.get("highway") == "traffic_signals" or "traffic_signals" in node.tags
     }
     junctions = [
-        Junction(id=f"j{node}", position=places[node], roads=meet, signals=_signalled(places[node], node, signals, osm))
+        Junction(
+            id=f"j{node}", position=places[node], roads=meet, signals=_has_signals(places[node], node, signals, osm)
+        )
         for node, meet in ends.items()
         if len(meet) >= 3
     ]
@@ -401,7 +403,7 @@ def _point(xy: NDArray[np.float64] | Sequence[float]) -> tuple[float, float]:
     return round(float(xy[0]), 3), round(float(xy[1]), 3)
 
 
-def _signalled(place: tuple[float, float], node: int, signals: set[int], osm: OsmData) -> bool:
+def _has_signals(place: tuple[float, float], node: int, signals: set[int], osm: OsmData) -> bool:
     """Whether a junction has signals: on its node, or on an approach within 20 m (as Europe maps them)."""
     if node in signals:
         return True

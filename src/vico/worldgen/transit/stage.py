@@ -1,50 +1,60 @@
-"""Public transport: stops, bus lines from timetables, the map or planned, all driveable, and bicycle stations."""
+"""Public transport: stops, bus lines from timetables, the map or planned, all driveable, and bicycle stations.
+
+Bicycle stations are those of the map, else planned on sidewalks near where people go.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
+from vico.geo import overlay
 from vico.geo.gtfs_feed import NO_TIMETABLE, Feed
 from vico.geo.osm import OsmData
+from vico.geometry import distances
 from vico.rules import BUS_DOOR_BEHIND_FRONT
+from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FAILED, FIRST_STOP, Dropped
-from vico.world.transit import Line, Stop, Transit
+from vico.world.transit import BikeStation, Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
 from vico.worldgen.facts.fault_isolation import drop_on_failure, leave_out
 from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
-from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
-from vico.worldgen.transit.plan import (
-    MAX_LOOP,
-    MAX_STOPS,
-    MIN_STOPS,
-    as_many,
-    planned_berths,
-    planned_loop,
-    times_as_wide,
-)
-from vico.worldgen.transit.rails import trams_from_osm
-from vico.worldgen.transit.routes import NOT_ON_THE_MAP, Pole, Route, routes_from_gtfs, routes_from_osm
-from vico.worldgen.transit.times import (
+from vico.worldgen.transit.bus_lines import (
+    BUS_LENGTH,
     BUS_SPEED,
     DWELL,
     FIRST_DEPARTURE,
     HEADWAY,
     LAST_DEPARTURE,
+    MAX_LOOP,
+    MAX_STOPS,
+    MIN_STOPS,
+    Berth,
+    Drive,
+    Kerbs,
     Timing,
+    destinations,
+    k_means,
     line_record,
+    merge_berth,
+    planned_berths,
+    planned_loop,
+    scaled_by_area,
     timing,
+    width_in_districts,
 )
+from vico.worldgen.transit.routes import NOT_ON_THE_MAP, Pole, Route, routes_from_gtfs, routes_from_osm, trams_from_osm
 
-__all__ = (
+__all__ = [
     "BUS_LENGTH",
     "BUS_SPEED",
     "DWELL",
@@ -53,8 +63,110 @@ __all__ = (
     "FIRST_STOP",
     "HEADWAY",
     "LAST_DEPARTURE",
+    "bike_stations",
     "transit_from_osm",
-)
+]
+FIRST_STATION = 95_000
+
+_CAPACITY = 12
+_EACH = 40_000.0  # square metres of window for each planned station
+_FEWEST, _MOST = 2, 6
+_APART = 80.0
+_INSIDE = 5.0  # metres from the window's edge
+_ASIDE = 2.2  # metres from the middle of a footway
+_FOOTWAYS = ("pedestrian", "footway", "living_street", "path", "cycleway")
+
+
+def bike_stations(
+    site: SiteFacts, lanes: LaneGraph, walks: Walkways, height: HeightField, seed: int
+) -> tuple[list[BikeStation], str]:
+    """Rental stations and where they come from (osm, planned)."""
+    osm = site.osm
+    random = rng(seed, "transit", "bikes")
+    found: list[tuple[NDArray[np.float64], str, int]] = []
+    places = [(f"n{n.id}", shapely.Point(n.xy), n.tags) for n in osm.nodes]
+    places += [(a.id, a.polygon, a.tags) for a in osm.areas if not a.polygon.is_empty]
+    for key, shape, tags in places:
+        if tags.get("amenity") != "bicycle_rental":
+            continue
+        with drop_on_failure(key):
+            xy = np.array(shape.centroid.coords[0])
+            if osm.holds(xy, inset=_INSIDE):
+                size = re.match(r"\d{1,4}", tags.get("capacity", ""))
+                capacity = int(np.clip(int(size.group()) if size else _CAPACITY, 2, 60))
+                name = tags.get("name") or f"Bike station {len(found) + 1}"
+                found.append((_off_the_lanes(lanes, xy), name, capacity))
+    origin = "osm"
+    if not found:
+        origin = "planned"
+        found = [(xy, f"Bike station {k + 1}", _CAPACITY) for k, xy in enumerate(_plan_stations(site, walks, seed))]
+    stations = [
+        BikeStation(
+            id=f"bikes_{k}",
+            entity=FIRST_STATION + k,
+            name=name,
+            position=(round(float(xy[0]), 3), round(float(xy[1]), 3), round(float(height(xy)), 3)),
+            capacity=capacity,
+            bikes=max(1, int(capacity * random.uniform(0.4, 0.8))),
+        )
+        for k, (xy, name, capacity) in enumerate(found)
+    ]
+    return stations, origin
+
+
+def _plan_stations(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.float64]]:
+    """Points of long stretches of sidewalk (of footways where there is none), nearest to where people go."""
+    osm = site.osm
+    stretches = [shapely.LineString(walks.line(int(i))) for i in np.flatnonzero(walks.kind == SIDEWALK)]
+    stretches = [line for line in stretches if line.length > 15.0]
+    if not stretches:
+        west, south, east, north = osm.box
+        window = shapely.box(west + _INSIDE, south + _INSIDE, east - _INSIDE, north - _INSIDE)
+        for way in osm.ways:
+            if way.tags.get("highway") in _FOOTWAYS and len(way.line) > 1:
+                # Beside the way, not on it.
+                with drop_on_failure(f"w{way.id}"):
+                    beside = overlay.offset_curve(shapely.LineString(way.line), -_ASIDE)
+                    stretches += [part for part in shapely.get_parts(overlay.intersection(beside, window))
+                                  if part.geom_type == "LineString" and part.length > 15.0]  # fmt: skip
+    if not stretches:
+        return []
+    # Not at the very corners, where people cross.
+    spots = np.concatenate(
+        [shapely.get_coordinates(line.interpolate(np.arange(6.0, line.length - 5.0, 4.0))) for line in stretches]
+    )
+    spots = spots[osm.holds(spots, inset=_INSIDE, edge=False)]
+    wide, high = osm.sides
+    count = int(np.clip(round(wide * high / _EACH), _FEWEST, _MOST))
+    wanted = destinations(site)
+    chosen: list[NDArray[np.float64]] = []
+    for centre in k_means(wanted if len(wanted) else spots, count, rng(seed, "transit", "racks")):
+        away = distances(spots, centre)
+        for other in chosen:
+            away = np.where(distances(spots, other) < _APART, np.inf, away)
+        if len(away) and np.isfinite(away).any():
+            chosen.append(spots[int(np.argmin(away))])
+    return chosen
+
+
+def _off_the_lanes(lanes: LaneGraph, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Move a rack from the carriageway onto the kerb where the map has it on the street."""
+    for _ in range(6):
+        near = lanes.nearest(xy, among=np.ones(len(lanes), bool), reach=8.0)
+        if near is None:
+            break
+        lane, offset, away = near
+        least = float(lanes.width[lane]) / 2 + 1.0
+        if away >= least:
+            break
+        x, y, yaw = lanes.at(lane, offset)
+        aside = xy - (x, y)
+        # To the side it is on already; to the right of the lane where it is on its middle.
+        right = np.array([math.sin(yaw), -math.cos(yaw)])
+        step = aside / away if away > 0.3 else right
+        xy = np.array([x, y]) + step * (least + 0.05)
+    return xy
+
 
 _REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
 _FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
@@ -68,7 +180,7 @@ _LONG_WAIT = 75.0  # seconds for their time that buses may stand where others dr
 
 
 @dataclass(frozen=True)
-class _Chosen:
+class _DrivenLine:
     """A line that is driven: its names, its loop, who drives it, the sources' routes it stands for, and its delay.
 
     `later` is how many seconds after others its first bus leaves, where nobody says when it does.
@@ -132,7 +244,7 @@ def transit_from_osm(
     Returns
     -------
     Transit
-        Lines are closed drives past two stops at least; `left_out` says why a route of the sources is none.
+        Lines are closed drives past two stops at least; `omissions` says why a route of the sources is none.
     """
     osm = site.osm
     kerbs = Kerbs(lanes, height, solids or [])
@@ -142,13 +254,13 @@ def transit_from_osm(
     known = {route.name for route in timed}
     left_out += [what for what in untold if not known]
     routes = timed + [route for route in drawn if route.name not in known]
-    chosen = _driven(routes, kerbs, mapped, left_out, osm)
+    chosen = _choose_driven_lines(routes, kerbs, mapped, left_out, osm)
     names = "osm" if mapped else "planned"
     if timed and any(line.route is not None and line.route.origin == "gtfs" for line in chosen):
         names = "osm and gtfs" if mapped else "gtfs"
     if all(len(line.loop) < MIN_STOPS for line in chosen):
         # Routes that only cut a corner of the window take nobody anywhere: a round is planned beside them.
-        planned, source = _planned(site, kerbs, mapped, seed, least=MIN_STOPS if chosen else 2)
+        planned, source = _plan_round(site, kerbs, mapped, seed, least=MIN_STOPS if chosen else 2)
         if planned is not None:
             chosen = [planned, *chosen]
             names = source if len(chosen) == 1 or source != "osm" else names
@@ -172,7 +284,7 @@ def transit_from_osm(
                 offset=round(berth.offset, 2),
             )
     lines: list[Line] = []
-    for k, line in enumerate(_staggered(chosen)):
+    for k, line in enumerate(_stagger(chosen)):
         name = "/".join(line.names)
         lost = [berth.name for berth in line.loop if berth not in stops]
         if lost:
@@ -187,7 +299,7 @@ def transit_from_osm(
     on_rails = {f"tram {line.name}: {NOT_ON_THE_MAP}" for line in tram_lines}
     left_out = [what for what in left_out if what.reason not in on_rails] + off_rails
     if all(line.route is None or line.route.origin != "gtfs" for line in chosen):
-        left_out += _unused(feeds)
+        left_out += _unused_feeds(feeds)
     origins = dict.fromkeys("planned" if line.route is None else line.route.origin for line in chosen)
     return Transit(
         stops=list(stops.values()),
@@ -200,35 +312,35 @@ def transit_from_osm(
     )
 
 
-def _unused(feeds: Sequence[Feed]) -> list[Dropped]:
+def _unused_feeds(feeds: Sequence[Feed]) -> list[Dropped]:
     """Say so of feeds whose buses serve the window, as none of them is driven."""
     why = "none of its bus routes can be driven on the map's streets; each is told of with its reason"
     with_buses = [feed for feed in feeds if not feed.nothing and any(route.kind == "bus" for route in feed.routes)]
     return [Dropped(id=feed.name, reason=f"{NO_TIMETABLE} here: {why}") for feed in with_buses]
 
 
-def _planned(
+def _plan_round(
     site: SiteFacts, kerbs: Kerbs, mapped: Sequence[Berth], seed: int, *, least: int
-) -> tuple[_Chosen | None, str]:
+) -> tuple[_DrivenLine | None, str]:
     """Plan a round over the mapped stops, else over planned ones too, and say where its stops come from."""
     drive = Drive(kerbs.lanes)
     if loop := planned_loop(drive, mapped):
-        return _Chosen(("Loop 1",), None, tuple(loop), drive), "osm"
-    more = [b for b in planned_berths(site, kerbs, seed) if merged(b, mapped) == b]
+        return _DrivenLine(("Loop 1",), None, tuple(loop), drive), "osm"
+    more = [b for b in planned_berths(site, kerbs, seed) if merge_berth(b, mapped) == b]
     source = "osm and planned" if mapped else "planned"
     for few in dict.fromkeys((MIN_STOPS, least)):
         if loop := planned_loop(drive, [*mapped, *more], least=few):
-            return _Chosen(("Loop 1",), None, tuple(loop), drive), source
+            return _DrivenLine(("Loop 1",), None, tuple(loop), drive), source
     return None, source
 
 
-def _staggered(chosen: Sequence[_Chosen]) -> list[_Chosen]:
+def _stagger(chosen: Sequence[_DrivenLine]) -> list[_DrivenLine]:
     """Lines whose first buses leave one after another where they share a stop."""
     shared = [sum(bool(set(other.loop) & set(line.loop)) for other in chosen[:k]) for k, line in enumerate(chosen)]
     return [replace(line, later=_STAGGER * count) for line, count in zip(chosen, shared, strict=True)]
 
 
-def _record(number: int, line: _Chosen, stops: dict[Berth, Stop]) -> Line:
+def _record(number: int, line: _DrivenLine, stops: dict[Berth, Stop]) -> Line:
     colour = line.route.colour if line.route else ""
     return line_record(number, "/".join(line.names), line.timing, line.drive, stops, colour)
 
@@ -255,23 +367,23 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs, left_out: list[Dropped]) -> list[
             near = kerbs.near(xy, _REACH)
             if near:
                 berth = Berth(key, tags.get("name") or f"Stop {len(berths) + 1}", near[0][1], near[0][2])
-                if merged(berth, berths) == berth:
+                if merge_berth(berth, berths) == berth:
                     berths.append(berth)
             elif kerbs.passes(xy, _REACH):
                 left_out.append(Dropped(id=key, reason="bus stop: walls leave no room to wait beside a bus there"))
     return berths
 
 
-def _driven(
+def _choose_driven_lines(
     routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped], osm: OsmData
-) -> list[_Chosen]:
+) -> list[_DrivenLine]:
     """Choose some routes that can be driven as closed rounds: timetables first, then the longest on the map."""
     fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
     ways: list[tuple[set[int], int]] = []
-    most, wide = as_many(_MOST_LINES, osm), times_as_wide(osm)
+    most, wide = scaled_by_area(_MOST_LINES, osm), width_in_districts(osm)
     for route in routes:
         with drop_on_failure(route.id):
-            fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)], wide)
+            fit = _fit_route(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)], wide)
             if isinstance(fit, str):
                 left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
             else:
@@ -283,7 +395,7 @@ def _driven(
         frequent = -float(len(route.departures))
         return ways[k][1] > 0, route.origin != "gtfs", len(loop) < MIN_STOPS, frequent or cost / len(loop), k
 
-    chosen: list[_Chosen] = []
+    chosen: list[_DrivenLine] = []
     streets: set[int] = set()
     # First those that share no stop with a better one, so that few lines serve many stops.
     fresh: dict[int, set[Berth]] = {}
@@ -311,7 +423,7 @@ def _driven(
             if ways[k][1]:
                 seconds = _round_seconds(kerbs.lanes, ways[k][0], loop)
                 route = replace(route, interval=max(route.interval or 0, int(seconds)))
-            chosen.append(_Chosen((route.name,), route, loop, drive, route.departures, (route.id,)))
+            chosen.append(_DrivenLine((route.name,), route, loop, drive, route.departures, (route.id,)))
             streets |= ways[k][0]
         else:
             serve = ", ".join("/".join(line.names) for line in chosen if set(loop) & set(line.loop))
@@ -324,14 +436,14 @@ def _driven(
     return chosen
 
 
-def _goes_along(route: Route, loop: tuple[Berth, ...], line: _Chosen) -> bool:
+def _goes_along(route: Route, loop: tuple[Berth, ...], line: _DrivenLine) -> bool:
     """Whether a route can be driven as one with a chosen line: the same round, or without timetables a part of it."""
     if len(line.names) >= _MOST_NAMES or bool(route.departures) != bool(line.departures):
         return False
     return line.loop == loop or (not line.timed and route.interval is None and set(loop) <= set(line.loop))
 
 
-def _waiting_apart(chosen: Sequence[_Chosen], left_out: list[Dropped]) -> list[_Chosen]:
+def _waiting_apart(chosen: Sequence[_DrivenLine], left_out: list[Dropped]) -> list[_DrivenLine]:
     """Lines whose buses can wait for their time, minutes at a stop, in a lane that no other line drives.
 
     No bus gets past one that stands at the kerb: buses of several lines that wait in one lane hold one another up for
@@ -371,7 +483,7 @@ def _round_seconds(lanes: LaneGraph, way: set[int], loop: Sequence[Berth]) -> fl
     return float(lanes.length[sorted(way)].sum()) / 6.0 + 45.0 * len(loop)
 
 
-def _fit(
+def _fit_route(
     route: Route, kerbs: Kerbs, known: Sequence[Berth], wide: float
 ) -> tuple[tuple[Berth, ...], Drive, float] | str:
     """Find a closed drive past a route's stops, there and back, else there and round; say why not if there is none."""

@@ -142,7 +142,7 @@ class _Finder:
         rails = overlay.union_all([shapely.LineString(track).buffer(_FROM_TRACK) for track in tracks], grid=None)
         pavement = overlay.union_all([streets.sidewalk, streets.pedestrian], grid=None)
         inside = [overlay.buffer(pavement, -inset) for inset in _FROM_EDGE]
-        self._pavements = [_Parted(overlay.difference(area, rails, grid=None)) for area in inside]
+        self._pavements = [_SplitArea(overlay.difference(area, rails, grid=None)) for area in inside]
         self._carriageway, self._lanes = streets.carriageway, lanes
         self._walls = shapely.STRtree(list(solids))
         shapely.prepare(self._carriageway)
@@ -197,12 +197,12 @@ class _Finder:
         return None
 
 
-class _Parted:
+class _SplitArea:
     """An area as large as a city, cut into squares: what of it lies somewhere is found without all the rest."""
 
     def __init__(self, whole: shapely.Geometry) -> None:
         self.whole = whole
-        self._tree = shapely.STRtree(_parted(whole))
+        self._tree = shapely.STRtree(_split_area(whole))
 
     def within(self, other: shapely.Geometry) -> shapely.Geometry:
         """Return what lies in another area."""
@@ -211,7 +211,7 @@ class _Parted:
         return overlay.union_all(parts, grid=None)
 
 
-def _parted(area: shapely.Geometry) -> list[shapely.Polygon]:
+def _split_area(area: shapely.Geometry) -> list[shapely.Polygon]:
     """Halve an area until its parts are small."""
     if area.is_empty:
         return []
@@ -224,7 +224,7 @@ def _parted(area: shapely.Geometry) -> list[shapely.Polygon]:
     else:
         middle = (south + north) / 2
         halves = (west, south, east, middle), (west, middle, east, north)
-    return [part for half in halves for part in _parted(shapely.clip_by_rect(area, *half))]
+    return [part for half in halves for part in _split_area(shapely.clip_by_rect(area, *half))]
 
 
 def _half_plane(start: shapely.Point, outward: Point2) -> shapely.Polygon:

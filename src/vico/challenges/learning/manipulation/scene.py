@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import LIMB, TOUCH, MobileManipulator, RobotModel, robot_model
 from vico.errors import EmptyInputError, InputError
+from vico.geometry import yaw_quaternion
 from vico.io.mujoco import mujoco
 from vico.kinematics.arm import Chain, reach_pose
 from vico.kinematics.hand_paths import downward
-from vico.quaternions import upright
 
 #: Control steps a second, and seconds of a step of physics.
 RATE, PHYSICS_STEP = 20, 0.01
@@ -410,7 +410,7 @@ def standing_box(chance: np.random.Generator, options: ManipulationOptions) -> E
     place, yaw = draw_spot(chance), float(chance.uniform(-math.pi, math.pi))
     position = np.array([*place, thing.surface + half[2]])
     arm = first_angles(chance, options)
-    return EpisodeDraw(thing, position, upright(yaw), position.copy(), arm, OPENING, OPENING)
+    return EpisodeDraw(thing, position, yaw_quaternion(yaw), position.copy(), arm, OPENING, OPENING)
 
 
 def held_box(chance: np.random.Generator, options: ManipulationOptions) -> EpisodeDraw:

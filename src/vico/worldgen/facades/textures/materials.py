@@ -20,8 +20,7 @@ from vico.worldgen.facades.textures.ground_floors import GROUNDS, paint_doors
 from vico.worldgen.facades.textures.regional_walls import UPPER_FLOORS
 from vico.worldgen.facades.textures.walls import BAYS
 from vico.worldgen.facades.textures.windows import window, window_style, windows_digest
-from vico.worldgen.kept_textures import Painters
-from vico.worldgen.texture_canvas import Canvas, blocks, bricks, plaster
+from vico.worldgen.texture_canvas import Canvas, TextureCache, blocks, bricks, plaster
 
 _PX = 128
 _RAIL = 64  # pixels a bay of railing, and its height
@@ -327,7 +326,7 @@ PAINTERS: dict[str, Callable[[np.random.Generator], NDArray[np.uint8]]] = {
 }
 
 
-_PAINTED = Painters(__file__, __name__)
+_PAINTED = TextureCache(__file__, __name__)
 
 
 def material(name: str, seed: int = 0) -> Material:

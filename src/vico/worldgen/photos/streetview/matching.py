@@ -118,8 +118,8 @@ class SiftMatcher:
             self._last[:] = [(photo, self._features(photo, None))]
         a, b = self._features(render, reach > 0), self._last[0][1]
         if len(a.xy) < 2 or len(b.xy) < 2:
-            return _none()
-        return _gated(a, b, reach, self)
+            return _no_matches()
+        return _match_within_reach(a, b, reach, self)
 
     def _features(self, picture: NDArray[np.uint8], where: NDArray[np.bool_] | None) -> _Features:
         cv2 = opencv()
@@ -158,7 +158,7 @@ class _Limits(Protocol):
     def scale(self) -> float: ...
 
 
-def _gated(a: _Features, b: _Features, reach: NDArray[np.float32], limits: _Limits) -> Matches:
+def _match_within_reach(a: _Features, b: _Features, reach: NDArray[np.float32], limits: _Limits) -> Matches:
     """Mutual nearest neighbours among the features that the reach allows, by the ratio test."""
     column, row = a.xy[:, 0].astype(np.int64), a.xy[:, 1].astype(np.int64)
     far = reach[np.clip(row, 0, reach.shape[0] - 1), np.clip(column, 0, reach.shape[1] - 1)]
@@ -168,7 +168,7 @@ def _gated(a: _Features, b: _Features, reach: NDArray[np.float32], limits: _Limi
     back_of = np.full(len(b.xy), -1)
     for mine, theirs in _near(a.xy, b.xy, far):
         here, there = a.xy[mine], b.xy[theirs]
-        open_ = _squared(here, there) <= (far[mine] ** 2)[:, None]
+        open_ = _squared_distances(here, there) <= (far[mine] ** 2)[:, None]
         open_ &= np.abs(a.octave[mine, None] - b.octave[None, theirs]) <= np.float32(np.log(limits.scale))
         turn = np.abs(a.angle[mine, None] - b.angle[None, theirs])
         open_ &= np.minimum(turn, np.float32(360.0) - turn) <= limits.turn
@@ -182,8 +182,8 @@ def _gated(a: _Features, b: _Features, reach: NDArray[np.float32], limits: _Limi
         better = value > back[theirs]
         back[theirs[better]], back_of[theirs[better]] = value[better], mine[nearest[better]]
         # One spot may have several features: the runner-up must be another spot.
-        alike[_squared(there[best], there) <= 16.0] = -np.inf
-        near, next_ = _apart(first), _apart(alike.max(axis=1))
+        alike[_squared_distances(there[best], there) <= 16.0] = -np.inf
+        near, next_ = _descriptor_distances(first), _descriptor_distances(alike.max(axis=1))
         good = (near <= limits.farthest) & (near <= limits.ratio * next_)
         partner[mine[good]] = theirs[best[good]]
         quality[mine[good]] = 1.0 - near[good] / np.minimum(next_[good], 1.4)
@@ -192,7 +192,7 @@ def _gated(a: _Features, b: _Features, reach: NDArray[np.float32], limits: _Limi
     return _distinct(Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual]))
 
 
-def _apart(alike: NDArray[np.float32]) -> NDArray[np.float32]:
+def _descriptor_distances(alike: NDArray[np.float32]) -> NDArray[np.float32]:
     """Distance of descriptors of unit length from their product; infinite where there is no pair."""
     return np.asarray(np.sqrt(np.maximum(2.0 - 2.0 * alike, 0.0)), np.float32)
 
@@ -214,7 +214,7 @@ def _near(
             yield part[start : start + _ROWS], near
 
 
-def _squared(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float32]:
+def _squared_distances(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float32]:
     """Squared distances of pixels, shape ``(n, m)``."""
     x, y = a.astype(np.float32), b.astype(np.float32)
     across, down = x[:, None, 0] - y[None, :, 0], x[:, None, 1] - y[None, :, 1]
@@ -328,8 +328,8 @@ class XfeatMatcher:
             none = np.zeros(len(xy), np.float32)
             sides.append(_Features(xy, none, none, looks))
         if min(len(side.xy) for side in sides) < 2:
-            return _none()
-        return _gated(sides[0], sides[1], reach, self)
+            return _no_matches()
+        return _match_within_reach(sides[0], sides[1], reach, self)
 
 
 def _kornia(what: str) -> tuple[Any, Any]:
@@ -341,7 +341,7 @@ def _kornia(what: str) -> tuple[Any, Any]:
         ) from None
 
 
-def _none() -> Matches:
+def _no_matches() -> Matches:
     return Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
 
 

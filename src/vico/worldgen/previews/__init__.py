@@ -1,1 +1,0 @@
-"""Pictures of a finished world: its map, and views at eye height."""
