@@ -24,7 +24,7 @@ FIELDS = {
     "ways_of_life": {"at_desk", "at_cafe", "activity"},
 }  # fmt: skip
 # Modules whose capitalised texts are activities.
-WRITERS = ("company", "day", "homelife", "outings", "rides", "schedules", "school_days", "llm/fitting", "llm/lives")
+WRITERS = ("day", "mode_choice", "outings", "schedules", "schooling", "llm/lives")
 
 
 def of_data() -> list[str]:

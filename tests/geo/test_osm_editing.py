@@ -144,7 +144,7 @@ def test_an_answer_of_overpass_without_nodes_is_said_to_be_one(tmp_path: Path) -
     ("content", "says"),
     [
         (b'{"version": 0.6, "elements": []}', "is JSON, which is not read"),
-        (gzip.compress(b"<osm/>"), "is packed with gzip; give it a name that ends in .osm.gz"),
+        (gzip.compress(b"<osm/>", mtime=0), "is packed with gzip; give it a name that ends in .osm.gz"),
         (bz2.compress(b"<osm/>"), "is packed with bzip2"),
         (b"PK\x03\x04rest", "is a ZIP archive; unpack it"),
         (b"<!DOCTYPE html><html>", "is a web page, not a map"),
