@@ -1,6 +1,6 @@
 """Measure how often people are at the places of their day, by kind of place and hour.
 
-    python scripts/measure_habits.py WORLD... > src/vico/data/assistant/habits.toml
+    python scripts/measure_habits.py WORLD... > src/vico/data/agents/assistant/habits.toml
 
 Takes communities as Carry has them. Give worlds that no reported task takes place in.
 """

@@ -1,6 +1,6 @@
 """Train the PPO and A2C commuters in the abstract city (extra ``rl``: stable-baselines3 on a CPU build of torch).
 
-    python scripts/train_commute.py --method ppo --worlds W1 W2 --out src/vico/data/commute --curve benchmarks/results
+    python scripts/train_commute.py --method ppo --worlds W1 W2 --out OUT --curve benchmarks/results
 
     python scripts/train_commute.py --method ppo --worlds W1 W2 --ray --out OUT --curve OUT      # a city a machine
 

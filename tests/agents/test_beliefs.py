@@ -130,7 +130,7 @@ def test_habits_name_every_kind_of_place_or_what_stands_for_it() -> None:
 
 
 def test_habits_without_what_stands_for_others_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
-    folder = tmp_path / "assistant"
+    folder = tmp_path / "agents/assistant"
     folder.mkdir(parents=True)
     (folder / "habits.toml").write_text(f'about = "x"\n[places]\noffice = {[0.1] * 24}\n')
     monkeypatch.setenv(VARIABLE, str(tmp_path))

@@ -179,7 +179,7 @@ def test_the_same_seed_gives_the_same_episodes() -> None:
 def test_the_packaged_policies_fit(name: str) -> None:
     from vico.io.data_files import PACKAGED
 
-    network = Network.read(PACKAGED / "commute" / f"{name}.npz")
+    network = Network.read(PACKAGED / "agents" / "commute" / f"{name}.npz")
     logits = network.logits(np.zeros(OBSERVATION_SIZE, np.float32))
     assert logits.shape == (len(ACTIONS),)
     assert np.isfinite(logits).all()

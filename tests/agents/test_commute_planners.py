@@ -220,7 +220,7 @@ def test_what_is_put_into_the_prompt_cannot_close_its_marks() -> None:
 
 
 def test_a_prompt_of_ones_own_is_read_strictly(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "prompts" / "commute"
+    folder = tmp_path / "llm/prompts" / "commute"
     folder.mkdir(parents=True)
     (folder / "plan.toml").write_text('about = "x"\nreply = "CommutePlan"\nsystem = "s"\nuser = "{{who}}"\n[inputs]\n')
     monkeypatch.setenv("VICO_DATA", str(tmp_path))

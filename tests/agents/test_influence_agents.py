@@ -264,7 +264,7 @@ def test_prompts_take_their_inputs_and_no_others(tmp_path: Path, monkeypatch: py
     for name, reply in replies.items():
         with pytest.raises(InputError, match="no value is given for it"):
             read_prompt("influence", name, reply).messages(nonsense=1)
-    own = tmp_path / "prompts" / "influence"
+    own = tmp_path / "llm/prompts" / "influence"
     own.mkdir(parents=True)
     (own / "first_message.toml").write_text(
         'about = "a"\nreply = "MessageReply"\nsystem = "s"\nuser = "u {{me}}"\n'

@@ -93,7 +93,7 @@ def test_an_entry_is_found_by_its_tag_and_thanked(tmp_path: Path, monkeypatch: p
     surfaces, (thanks,) = models_of(Objects.from_rows([row]), installed=False)
     assert (thanks.name, thanks.licence, thanks.attribution) == ("red_ball", "CC-BY-4.0", 'Jo "Doe"')
     assert len(surfaces["red_ball"][0].triangles) == model.triangles
-    (tmp_path / "models/outdoor/generated_red_ball.glb").write_bytes(b"glTF")
+    (tmp_path / "assets/models/outdoor/generated_red_ball.glb").write_bytes(b"glTF")
     again = tmp_path.with_name("again")
     tmp_path.rename(again)
     monkeypatch.setenv("VICO_DATA", str(again))

@@ -18,7 +18,7 @@ from vico.errors import InputError, SchemaError
 from vico.io.data_files import PACKAGED
 from vico.world.model import LANDING
 
-DATA = PACKAGED / "models"
+DATA = PACKAGED / "assets" / "models"
 GUIDE = Path(__file__).parents[2] / "docs" / "adding_a_model.md"
 # Extents along x, y, z in metres, read off the models when they became data.
 SIZES = {
@@ -44,7 +44,7 @@ def places(part: BoxPart | GroupPart) -> list[list[float]]:
 def test_the_example_of_the_guide_is_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ours = set(street_models())
     examples = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
-    folder = tmp_path / "models" / "outdoor"
+    folder = tmp_path / "assets/models" / "outdoor"
     folder.mkdir(parents=True)
     (folder / "benches.toml").write_text(examples[0])
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
@@ -152,8 +152,8 @@ def test_a_folder_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest
 def test_a_thing_to_carry_of_a_users_own_comes_in_our_colours_and_theirs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "models").mkdir()
-    (tmp_path / "models" / "movable_kasse.toml").write_text(
+    (tmp_path / "assets/models").mkdir(parents=True)
+    (tmp_path / "assets/models" / "movable_kasse.toml").write_text(
         """
         [paints]
         tuerkis = [40, 170, 170]

@@ -24,7 +24,7 @@ def test_a_users_files_come_after_the_packages(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
     assert [path.name for path in data_files("community", "trades")] == ["trades.toml", "trades_aaa.toml"]
     assert own_files("community") == [mine]
-    assert data_files("models/indoor", first=("shops",))[0].name == "shops.toml"
+    assert data_files("assets/models/indoor", first=("shops",))[0].name == "shops.toml"
 
 
 def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,3 +77,10 @@ def test_what_was_made_of_data_is_kept_for_each_folder(tmp_path: Path, monkeypat
     assert [count(1), count(1)] == [3, 3]
     monkeypatch.delenv("VICO_DATA")
     assert count(1) == 1
+
+
+def test_a_folder_by_its_old_name_is_told_instead_of_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "facades").mkdir()
+    monkeypatch.setenv("VICO_DATA", str(tmp_path))
+    with pytest.raises(InputError, match=r"facades: folders bear their room's name; move it to worldgen/facades there"):
+        data_files("worldgen/facades", "regions")

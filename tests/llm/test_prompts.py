@@ -128,7 +128,7 @@ def test_faults_of_a_file_are_named_with_their_place(tmp_path: Path, change: tup
 def test_a_prompt_of_ones_own_takes_the_place_of_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(MissingFileError, match=r"greet\.toml"):
         read_prompt("nobody", "greet", Greeting)
-    own = tmp_path / "prompts" / "nobody"
+    own = tmp_path / "llm/prompts" / "nobody"
     own.mkdir(parents=True)
     (own / "greet.toml").write_text(GOOD)
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
@@ -136,7 +136,7 @@ def test_a_prompt_of_ones_own_takes_the_place_of_ours(tmp_path: Path, monkeypatc
 
 
 def test_a_prompt_for_another_record_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    own = tmp_path / "prompts" / "nobody"
+    own = tmp_path / "llm/prompts" / "nobody"
     own.mkdir(parents=True)
     (own / "greet.toml").write_text(GOOD.replace("Greeting", "Farewell"))
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
@@ -151,7 +151,7 @@ def test_the_digest_changes_with_the_words(tmp_path: Path) -> None:
 
 
 def test_all_packaged_prompts_are_sound() -> None:
-    paths = sorted((PACKAGED / "prompts").rglob("*.toml"))
+    paths = sorted((PACKAGED / "llm" / "prompts").rglob("*.toml"))
     assert {path.stem for path in paths} >= {"characters", "social_network", "daily_plan"}
     for path in paths:
         assert prompt_of(path).file.about

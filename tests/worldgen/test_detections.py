@@ -105,14 +105,14 @@ def test_what_an_order_of_the_file_is_does_not_matter(tmp_path: Path) -> None:
 
 def test_classes_are_data_that_is_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
-    (tmp_path / "objects").mkdir()
-    file = tmp_path / "objects" / "detections_mine.toml"
+    (tmp_path / "worldgen/objects").mkdir(parents=True)
+    file = tmp_path / "worldgen/objects" / "detections_mine.toml"
     file.write_text('[[class]]\nnames = ["Bench"]\ntags = { amenity = "nothing at all" }\n')
     with pytest.raises(SchemaError, match=r"class.0.tags: no model stands for them"):
         detected_classes()
     other = tmp_path / "other"
-    (other / "objects").mkdir(parents=True)
-    (other / "objects" / "detections_mine.toml").write_text(
+    (other / "worldgen/objects").mkdir(parents=True)
+    (other / "worldgen/objects" / "detections_mine.toml").write_text(
         '[[class]]\nnames = ["Bench"]\ntags = { leisure = "x", amenity = "clock" }\n'
     )
     monkeypatch.setenv("VICO_DATA", str(other))

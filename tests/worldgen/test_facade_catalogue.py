@@ -21,9 +21,9 @@ LISBON = (38.711, -9.139)
 @pytest.fixture
 def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of data beside the package's."""
-    (tmp_path / "facades").mkdir()
+    (tmp_path / "worldgen/facades").mkdir(parents=True)
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
-    return tmp_path / "facades"
+    return tmp_path / "worldgen/facades"
 
 
 def examples() -> list[str]:

@@ -21,7 +21,7 @@ from vico.worldgen.indoor.floorplans import OUTSIDE, sketch_of
 from vico.worldgen.indoor.furnished_plans import plan_of, rooms_of_plan, uses
 from vico.worldgen.indoor.stage import furnish
 
-SMALL = set(read_models(PACKAGED / "models" / "indoor" / "small_things.toml"))
+SMALL = set(read_models(PACKAGED / "assets" / "models" / "indoor" / "small_things.toml"))
 
 
 def test_every_place_in_a_building_has_rooms(helsinki: World) -> None:

@@ -23,9 +23,9 @@ USE = "[use.x]\nsizes = [[6, 8]]\nplan = "
 @pytest.fixture
 def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's folder of data about rooms."""
-    (tmp_path / "indoor").mkdir()
+    (tmp_path / "worldgen/indoor").mkdir(parents=True)
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
-    return tmp_path / "indoor"
+    return tmp_path / "worldgen/indoor"
 
 
 def test_a_use_of_ones_own_is_furnished_as_its_page_says(own_data: Path) -> None:

@@ -92,11 +92,11 @@ def test_signs_are_told_apart_by_their_codes(code: str, name: str | None) -> Non
 
 def own(folder: Path, monkeypatch: pytest.MonkeyPatch, **files: str) -> Path:
     """Give a user's folder of data about objects."""
-    (folder / "objects").mkdir()
+    (folder / "worldgen/objects").mkdir(parents=True)
     for name, text in files.items():
-        (folder / "objects" / f"{name}.toml").write_text(text)
+        (folder / "worldgen/objects" / f"{name}.toml").write_text(text)
     monkeypatch.setenv("VICO_DATA", str(folder))
-    return folder / "objects"
+    return folder / "worldgen/objects"
 
 
 def test_a_users_kinds_go_before_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +136,7 @@ def test_the_page_s_examples_are_read(tmp_path: Path, monkeypatch: pytest.Monkey
     page = (Path(__file__).parents[2] / "docs" / "adding_an_object.md").read_text("utf-8")
     kinds, finer, standing, signs, trees = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     own(tmp_path, monkeypatch, kinds=kinds, finer=finer, standing=standing, signs=signs, trees=trees)
-    models = tmp_path / "models" / "outdoor"
+    models = tmp_path / "assets/models" / "outdoor"
     models.mkdir(parents=True)
     part = 'parts = [{ shape = "box", size = [0.7, 1.5, 1.3], at = [0, 0, 0.65], colour = [40, 30, 24] }]'
     models.joinpath("pianos.toml").write_text(

@@ -18,7 +18,7 @@ LAT, LON = 48.1374, 11.5755
 _DEGREES_EAST, _DEGREES_NORTH = 1 / 74_400, 1 / 111_200  # of a metre, near enough for a few houses
 
 FILES = {
-    "models/outdoor/klaviere.toml": """
+    "assets/models/outdoor/klaviere.toml": """
         group = "amenity"
         [model.strassenklavier]
         kind = "klavier"
@@ -27,7 +27,7 @@ FILES = {
           { shape = "box", size = [0.3, 1.3, 0.1], at = [0.45, 0, 0.75], colour = [240, 240, 232] },
         ]
         """,
-    "models/indoor/werkstatt.toml": """
+    "assets/models/indoor/werkstatt.toml": """
         group = "indoor"
         [model.montagestaender]
         parts = [
@@ -35,23 +35,23 @@ FILES = {
           { shape = "box", size = [0.5, 0.5, 0.05], at = [0, 0, 0.03], colour = [60, 62, 66] },
         ]
         """,
-    "objects/kinds_klaviere.toml": '[tags.amenity]\npiano = "strassenklavier"\n',
-    "objects/standing_klaviere.toml": 'facing_path = ["strassenklavier"]\n',
-    "places/categories_werkstatt.toml": '[tags.amenity]\nstore = ["fahrradselbsthilfe"]\n',
-    "places/names_deutsch.toml": """
+    "worldgen/objects/kinds_klaviere.toml": '[tags.amenity]\npiano = "strassenklavier"\n',
+    "worldgen/objects/standing_klaviere.toml": 'facing_path = ["strassenklavier"]\n',
+    "worldgen/places/categories_werkstatt.toml": '[tags.amenity]\nstore = ["fahrradselbsthilfe"]\n',
+    "worldgen/places/names_deutsch.toml": """
         home = "Wohnungen"
         on_street = "{what} in der {street}"
         building = "{what} {id}"
         [what]
         residential = "Wohnhaus"
         """,
-    "indoor/uses_werkstatt.toml": """
+    "worldgen/indoor/uses_werkstatt.toml": """
         [use.fahrradwerkstatt]
         kinds = ["fahrradselbsthilfe"]
         plan = { front = "schrauberraum", backs = [["storage", 1.0]], depth = 2.6 }
         sizes = [[7.0, 8.6]]
         """,
-    "indoor/rooms_werkstatt.toml": """
+    "worldgen/indoor/rooms_werkstatt.toml": """
         [room.schrauberraum]
         floor = "concrete"
         shop_window = true
@@ -138,13 +138,13 @@ def test_the_world_is_sound_without_the_folder(world: World) -> None:
     ("name", "text", "message"),
     [
         (
-            "objects/kinds_x.toml",
+            "worldgen/objects/kinds_x.toml",
             '[tags.amenity]\npiano = "piano"',
             "kinds_x.toml: tags.amenity.piano: no model 'piano'",
         ),
-        ("indoor/rooms_x.toml", "[room.x]\nflor = 1", "rooms_x.toml: room.x.flor"),
+        ("worldgen/indoor/rooms_x.toml", "[room.x]\nflor = 1", "rooms_x.toml: room.x.flor"),
         (
-            "models/outdoor/x.toml",
+            "assets/models/outdoor/x.toml",
             'group = "amenity"\n[model.x]\nparts = [{ shape = "box", size = [1, 1, 1], colour = "oak" }]',
             "x.toml: model.x: no colour is called 'oak'",
         ),

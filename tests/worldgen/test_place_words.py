@@ -19,9 +19,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "adding_a_place.md"
 @pytest.fixture
 def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's folder of data about places."""
-    (tmp_path / "places").mkdir()
+    (tmp_path / "worldgen/places").mkdir(parents=True)
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
-    return tmp_path / "places"
+    return tmp_path / "worldgen/places"
 
 
 def test_the_page_s_examples_add_a_kind_of_place_with_german_names(own_data: Path) -> None:

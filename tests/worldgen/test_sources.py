@@ -249,7 +249,7 @@ def rotated_plane(plane: tuple[float, float, float], turn: float) -> tuple[float
 def test_an_order_that_is_none_is_refused(
     old: str, new: str, error: type[Exception], says: str, tmp_path: Path
 ) -> None:
-    text = (PACKAGED / "sources" / "precedence.toml").read_text()
+    text = (PACKAGED / "worldgen" / "sources" / "precedence.toml").read_text()
     assert old in text
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new))

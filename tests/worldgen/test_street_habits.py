@@ -226,8 +226,8 @@ def test_hydrants_signals_and_lamps_are_those_of_the_country() -> None:
 
 
 def test_a_users_habits_replace_ours_and_wrong_ones_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "streets"
-    folder.mkdir()
+    folder = tmp_path / "worldgen/streets"
+    folder.mkdir(parents=True)
     ring = "[[139.0, 35.0], [141.0, 35.0], [141.0, 36.5], [139.0, 36.5]]"
     text = f'[[habits]]\nname = "jp"\ncountries = ["JP"]\noutlines = [{ring}]\n[habits.markings]\ndash = 5.0\n'
     (folder / "habits_japan.toml").write_text(text)

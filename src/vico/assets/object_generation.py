@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.assets.mesh_cleaning import Along, RawMesh, object_surface
+from vico.assets.models.library import OUTDOOR
 from vico.assets.models.schema import ModelFile
 from vico.errors import EmptyInputError, InputError, MissingExtraError, OutputExistsError
 from vico.io.arrays import read_npz
@@ -213,7 +214,7 @@ def _srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 GUIDE = "docs/generating_objects.md"
-_ROOM = "generation"
+_ROOM = "assets/generation"
 _FORMAT = 1  # raise when what is kept changes
 _LONGEST_PROMPT = 500
 
@@ -529,13 +530,13 @@ def object_name(prompt: str) -> str:
 
 def entry_files(entry: ObjectEntry, folder: Path) -> list[Path]:
     """Where `write_entry` writes: the mesh, the model, the record, the picture, and the tags."""
-    stem, models = f"{_PREFIX}{entry.name}", folder / "models" / "outdoor"
+    stem, models = f"{_PREFIX}{entry.name}", folder / OUTDOOR
     return [
         models / f"{stem}.glb",
         models / f"{stem}.toml",
         folder / "generated" / f"{entry.name}.json",
         folder / "generated" / f"{entry.name}.png",
-        folder / "objects" / f"kinds_{stem}.toml",
+        folder / "worldgen" / "objects" / f"kinds_{stem}.toml",
     ]
 
 

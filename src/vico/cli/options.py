@@ -50,7 +50,7 @@ class WorldBuildOptions:
         Buildings of other sources: CityJSON (.json, .jsonl), CityGML (.gml), Overture's GeoParquet; one or several. A
         model that does not say its reference system is followed by it: city.json@EPSG:7415.
     precedence
-        Which source decides what, a .toml file like the packaged vico/data/sources/precedence.toml.
+        Which source decides what, a .toml file like the packaged vico/data/worldgen/sources/precedence.toml.
     tiles
         Photogrammetry: path or address of a tileset.json. Ground, heights and walls are taken from it.
     photos

@@ -3,7 +3,7 @@
 City models are read member by member or object by object, so that only the window is in memory. CityGML 1.0, 2.0 and
 3.0: https://www.ogc.org/standards/citygml; document types and entities are refused. CityJSON and CityJSONSeq 1.0 to
 2.0: https://www.cityjson.org/specs/2.0.1/. Everything in a file is untrusted. What their attributes mean in
-OpenStreetMap's words is data: ``data/sources/attributes.toml``.
+OpenStreetMap's words is data: ``data/geo/sources/attributes.toml``.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def attribute_names() -> AttributeNames:
     SchemaError
         If a file is not as its schema says.
     """
-    records = [read_record(path, AttributeNames, guide=_GUIDE) for path in data_files("sources", "attributes")][::-1]
+    records = [read_record(path, AttributeNames, guide=_GUIDE) for path in data_files("geo/sources", "attributes")][
+        ::-1
+    ]
     shapes: dict[str, str] = {}
     kinds: dict[str, str] = {}
     for record in reversed(records):

@@ -1,7 +1,7 @@
 """Data that anybody may add to: TOML files of this package, and of a folder of one's own.
 
-A room's data lie in a folder of its name, such as ``community`` or ``models/indoor``. A kind of data is the files there
-whose name begins with the kind's, such as ``trades.toml`` and ``trades_harbour.toml``: first those in
+A room's data lie in a folder of its name, such as ``community`` or ``assets/models/indoor``. A kind of data is the
+files there whose name begins with the kind's, such as ``trades.toml`` and ``trades_harbour.toml``: first those in
 ``vico/data/<room>``, then those in ``$VICO_DATA/<room>``. Each file is read into a record that names every field it may
 have; anything else is an error that says in which file and where. docs/adding_data.md tells users of it.
 """
@@ -25,6 +25,24 @@ PACKAGED = Path(__file__).parents[1] / "data"
 VARIABLE = "VICO_DATA"
 _MOST_BYTES = 4 << 20
 
+# Folders of a user's own data that were named without their room: by its old name, what it is called now.
+_RENAMED = {
+    "assistant": "agents/assistant",
+    "environment": "sim/environment",
+    "facades": "worldgen/facades",
+    "generation": "assets/generation",
+    "indoor": "worldgen/indoor",
+    "influence": "agents/influence (lines) and challenges/influence (lexicons)",
+    "models": "assets/models",
+    "objects": "worldgen/objects",
+    "places": "worldgen/places",
+    "prompts": "llm/prompts",
+    "sources": "geo/sources",
+    "streets": "worldgen/streets",
+    "talk": "agents/talk",
+    "worlds": "worldgen/worlds",
+}
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -44,11 +62,14 @@ def own_folder() -> Path | None:
     Raises
     ------
     InputError
-        If the variable names a folder that is not there.
+        If the variable names a folder that is not there, or it holds a folder by the name it had in version 0.1.
     """
     own = os.environ.get(VARIABLE, "")
     if own and not Path(own).is_dir():
         raise InputError(f"{VARIABLE}: {own} is no folder; make it, or unset the variable")
+    for old, new in _RENAMED.items() if own else ():
+        if (Path(own) / old).is_dir():
+            raise InputError(f"{VARIABLE}: {Path(own) / old}: folders bear their room's name; move it to {new} there")
     return Path(own) if own else None
 
 

@@ -1,8 +1,8 @@
 """Prompts as data: a TOML file a prompt, with its inputs named and the record that has to come back beside it.
 
-The package's prompts lie in ``vico/data/prompts/<room>``; a file of the same name in ``$VICO_DATA/prompts/<room>``
-takes the place of ours. ``docs/prompts.md`` says how they are written. They become messages: plain records of the chat
-protocol, text and pictures.
+The package's prompts lie in ``vico/data/llm/prompts/<room>``; a file of the same name in
+``$VICO_DATA/llm/prompts/<room>`` takes the place of ours. ``docs/prompts.md`` says how they are written. They become
+messages: plain records of the chat protocol, text and pictures.
 
 What comes from maps, files or people is *data*: it is put in as JSON between marks that nothing in it can imitate, and
 the model is told that such text is never an instruction. That makes it harder to talk a model into something, not
@@ -102,7 +102,7 @@ def tokens_of(messages: Sequence[Message]) -> int:
 
 
 GUIDE = "docs/prompts.md"
-FOLDER = "prompts"
+FOLDER = "llm/prompts"
 
 _PLACEHOLDER = re.compile(r"\{\{\s*(.*?)\s*\}\}")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")

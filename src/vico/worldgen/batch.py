@@ -1,8 +1,8 @@
 """Many worlds side by side: tables and lists of places, and a build task for each place.
 
 A table is a file as people and spreadsheets write it. A list comes with the package (``NAME.toml`` in
-``vico/data/worlds``), or lies in the folder ``worlds`` of ``$VICO_DATA``. Tasks are done by processes of this machine
-or by a Ray cluster.
+``vico/data/worldgen/worlds``), or in the folder ``worldgen/worlds`` of ``$VICO_DATA``. Tasks are done by processes of
+this machine or by a Ray cluster.
 """
 
 from __future__ import annotations
@@ -277,7 +277,7 @@ def _beside(text: str, table: Path) -> str:
     return ";".join(part if "://" in part or part in SERVICES else str(table.parent / part) for part in parts)
 
 
-_ROOM = "worlds"
+_ROOM = "worldgen/worlds"
 _GUIDE = "docs/places35.md"
 
 

@@ -64,8 +64,8 @@ def test_no_greeting_and_no_reply_is_taken_for_a_question() -> None:
 
 
 def test_forms_of_ones_own_are_added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "talk").mkdir()
-    file = tmp_path / "talk" / "questions_more.toml"
+    (tmp_path / "agents/talk").mkdir(parents=True)
+    file = tmp_path / "agents/talk" / "questions_more.toml"
     file.write_text('[[question]]\nkind = "where"\nabout = "Finnish."\nforms = ["missä on {what}"]\n', encoding="utf-8")
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
     assert read_grammar().question_in("Missä on Hat Shop?") == Question("where", "Hat Shop")
@@ -75,8 +75,8 @@ def test_forms_of_ones_own_are_added(tmp_path: Path, monkeypatch: pytest.MonkeyP
     "form", ["where is", "Where is {what}", "{what} {what}", "where is {name}", "where (is|are) {what}"]
 )
 def test_a_damaged_form_is_refused_with_its_file(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "talk").mkdir()
-    (tmp_path / "talk" / "questions_mine.toml").write_text(
+    (tmp_path / "agents/talk").mkdir(parents=True)
+    (tmp_path / "agents/talk" / "questions_mine.toml").write_text(
         f'[[question]]\nkind = "where"\nabout = "Mine."\nforms = ["{form}"]\n'
     )
     monkeypatch.setenv("VICO_DATA", str(tmp_path))

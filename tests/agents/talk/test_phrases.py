@@ -144,12 +144,12 @@ def test_an_occupation_has_its_article(occupation: str, said: str) -> None:
 
 def test_verbs_of_ones_own_are_added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert activity_of("Yodel at dawn").doing == "here for yodel at dawn"
-    (tmp_path / "talk").mkdir()
-    (tmp_path / "talk" / "verbs_mine.toml").write_text('verbs = ["yodel"]\n')
+    (tmp_path / "agents/talk").mkdir(parents=True)
+    (tmp_path / "agents/talk" / "verbs_mine.toml").write_text('verbs = ["yodel"]\n')
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
     assert "yodel" in read_verbs().verbs
     assert activity_of("Yodel at dawn").doing == "yodeling at dawn"
-    (tmp_path / "talk" / "verbs_bad.toml").write_text('verbs = ["Yodel"]\n')
+    (tmp_path / "agents/talk" / "verbs_bad.toml").write_text('verbs = ["Yodel"]\n')
     monkeypatch.setenv("VICO_DATA", f"{tmp_path}/")
     with pytest.raises(SchemaError, match=r"verbs_bad.toml: verbs.0.*docs/talk.md"):
         read_verbs()

@@ -90,10 +90,10 @@ def test_answers_are_no_questions() -> None:
 def test_a_damaged_file_is_refused(
     old: str, new: str, fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "talk").mkdir()
-    text = (PACKAGED / "talk" / "answers.toml").read_text()
+    (tmp_path / "agents/talk").mkdir(parents=True)
+    text = (PACKAGED / "agents" / "talk" / "answers.toml").read_text()
     assert old in text
-    (tmp_path / "talk" / "answers.toml").write_text(text.replace(old, new))
+    (tmp_path / "agents/talk" / "answers.toml").write_text(text.replace(old, new))
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
     with pytest.raises(SchemaError, match=f"answers.toml: sentence.*({fault})"):
         read_sentences()

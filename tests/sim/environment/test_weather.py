@@ -48,11 +48,13 @@ def test_numbers_out_of_range_are_refused(field: dict[str, float]) -> None:
 
 
 def test_kinds_of_ones_own_are_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "environment").mkdir()
-    (tmp_path / "environment" / "weather_mine.toml").write_text("[weather.sandstorm]\nvisibility = 60.0\nwind = 15.0\n")
+    (tmp_path / "sim/environment").mkdir(parents=True)
+    (tmp_path / "sim/environment" / "weather_mine.toml").write_text(
+        "[weather.sandstorm]\nvisibility = 60.0\nwind = 15.0\n"
+    )
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
     assert forecast_of("sandstorm", HELSINKI, 0).at(0.0)[3] == 60.0
-    (tmp_path / "environment" / "weather_mine.toml").write_text("[weather.sandstorm]\nsand = 1.0\n")
+    (tmp_path / "sim/environment" / "weather_mine.toml").write_text("[weather.sandstorm]\nsand = 1.0\n")
     monkeypatch.setenv("VICO_DATA", str(tmp_path) + "/")
     with pytest.raises(SchemaError, match=r"weather_mine\.toml.*sand"):
         weather_kinds()

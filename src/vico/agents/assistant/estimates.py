@@ -133,7 +133,7 @@ def read_habits() -> Habits:
     SchemaError
         If the file is not as it should be.
     """
-    path = data_files("assistant", "habits")[-1]
+    path = data_files("agents/assistant", "habits")[-1]
     habits = read_record(path, Habits, guide=GUIDE)
     missing = {OTHER, OUTDOORS} - set(habits.places)
     if missing:

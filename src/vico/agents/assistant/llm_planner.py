@@ -10,7 +10,7 @@
   on with its work. What is heard is data for the model, whoever says it.
 - **Execution**: the same errands as all planners have.
 
-Prompts are data (``data/prompts/assistant``). A reply can do nothing but choose one of the available actions, and a
+Prompts are data (``data/llm/prompts/assistant``). A reply can do nothing but choose one of the available actions, and a
 line is only said. Where the model gives nothing of use the planner takes the nearest open choice, its own share of the
 tasks first, and notes a fault of the kind ``model``.
 """

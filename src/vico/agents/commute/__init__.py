@@ -14,7 +14,7 @@ from vico.errors import InputError
 from vico.io.data_files import PACKAGED
 from vico.world.public import PublicMap
 
-_POLICIES = PACKAGED / "commute"
+_POLICIES = PACKAGED / "agents" / "commute"
 
 Instructions = list[dict[str, Any]]
 

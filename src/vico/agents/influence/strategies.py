@@ -2,7 +2,7 @@
 
 A strategy has a target choice and a dialogue; ``ours/nearest`` takes one from ours, the other from nearest. All offline
 choices know the same: profiles, days, one's own conversations. All offline dialogues draw on the same lines, read from
-``vico/data/influence/lines*.toml``; they differ in which they choose for whom.
+``vico/data/agents/influence/lines*.toml``; they differ in which they choose for whom.
 
 A language model that cannot be reached, refuses, or answers with garbage never ends a run: what it should have decided
 is decided by the offline part that was named for it, and that is counted and told.
@@ -227,7 +227,7 @@ def read_lines() -> Lines:
     EmptyInputError
         If nothing is there to open a conversation with.
     """
-    files = [read_record(path, Lines, guide=GUIDE) for path in data_files("influence", "lines")]
+    files = [read_record(path, Lines, guide=GUIDE) for path in data_files("agents/influence", "lines")]
     found = Lines(
         openings=tuple(line for file in files for line in file.openings),
         value=tuple(value for file in files for value in file.value),

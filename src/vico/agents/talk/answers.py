@@ -1,7 +1,7 @@
 """What a resident can tell at a moment, answers to questions, and the talker that gives them.
 
 A resident tells from sight, from acquaintance, from what it heard, and of its own day, in the sentences of
-``vico/data/talk/answers.toml``. `Talker` listens, decides whether a message is meant for it, and answers: from
+``vico/data/agents/talk/answers.toml``. `Talker` listens, decides whether a message is meant for it, and answers: from
 templates, or as a `Talk` says.
 """
 

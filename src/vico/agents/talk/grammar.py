@@ -1,8 +1,8 @@
 """Questions that a message holds, and activities and occupations as one says them of oneself.
 
-The forms of questions are data, ``vico/data/talk/questions.toml``. Schedules say an activity as in a diary: "Have
-dinner", "Chess table: play chess", "Wash, dress and brush teeth"; residents say "I'm having dinner", "to have dinner",
-"I am an engineer". The verbs are data, ``vico/data/talk/verbs.toml``.
+The forms of questions are data, ``vico/data/agents/talk/questions.toml``. Schedules say an activity as in a diary:
+"Have dinner", "Chess table: play chess", "Wash, dress and brush teeth"; residents say "I'm having dinner", "to have
+dinner", "I am an engineer". The verbs are data, ``vico/data/agents/talk/verbs.toml``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
     "vocation_of",
 ]
 GUIDE = "docs/talk.md"
-DATA_FOLDER = "talk"
+DATA_FOLDER = "agents/talk"
 
 Kind = Literal["seen", "way", "where", "doing", "did", "plans", "who"]
 
@@ -153,7 +153,7 @@ class Grammar:
 
 @cached_data
 def read_grammar() -> Grammar:
-    """Read all forms: the package's, then those of a user's own ``$VICO_DATA/talk/questions*.toml``.
+    """Read all forms: the package's, then those of a user's own ``$VICO_DATA/agents/talk/questions*.toml``.
 
     Raises
     ------
@@ -262,7 +262,7 @@ class Verbs:
 
 @cached_data
 def read_verbs() -> Verbs:
-    """Read the verbs: the package's, then those of a user's own ``$VICO_DATA/talk/verbs*.toml``.
+    """Read the verbs: the package's, then those of a user's own ``$VICO_DATA/agents/talk/verbs*.toml``.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 """The sentences of answers: saying them, reading them back, and directions in words.
 
-Sentences are data, ``vico/data/talk/answers.toml``; they are said by filling them in, and read by their words: who was
-where and when, and how far a place is. Whoever asked reads them by the same file, so that a planner need not know its
-words. What a language model says in words of its own is not read. Directions tell a way from the public map alone:
-along which streets, how far, and where to turn.
+Sentences are data, ``vico/data/agents/talk/answers.toml``; they are said by filling them in, and read by their words:
+who was where and when, and how far a place is. Whoever asked reads them by the same file, so that a planner need not
+know its words. What a language model says in words of its own is not read. Directions tell a way from the public map
+alone: along which streets, how far, and where to turn.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def _sentence_pattern(text: str) -> re.Pattern[str]:
 
 @cached_data
 def read_sentences() -> Sentences:
-    """Read the sentences: a user's own ``$VICO_DATA/talk/answers.toml`` if there is one, else the package's.
+    """Read the sentences: a user's own ``$VICO_DATA/agents/talk/answers.toml`` if there is one, else the package's.
 
     Raises
     ------

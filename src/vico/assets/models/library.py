@@ -1,11 +1,11 @@
 """The library of models: files are read strictly and only parsed once; shapes are made when they are first asked for.
 
-All of it is data, and the files of a user's own (docs/adding_a_model.md): ``data/models/indoor/*.toml`` holds furniture
-and the small things that lie on it, ``data/models/outdoor/*.toml`` what stands outdoors, at life size, and
-``data/models/in_hand/*.toml`` what people hold while they eat, drink, march or keep dry. The origin of a model in hand
-is where the fist holds it, not the middle of its foot. Plants grow by rule and chance: a list of their leaves would be
-longer than the rule and say less. They stay code. So do the lenses of traffic signals, lit and unlit, in the frame of
-the model `traffic_signals`.
+All of it is data, and the files of a user's own (docs/adding_a_model.md): ``data/assets/models/indoor/*.toml`` holds
+furniture and the small things that lie on it, ``data/assets/models/outdoor/*.toml`` what stands outdoors, at life size,
+and ``data/assets/models/in_hand/*.toml`` what people hold while they eat, drink, march or keep dry. The origin of a
+model in hand is where the fist holds it, not the middle of its foot. Plants grow by rule and chance: a list of their
+leaves would be longer than the rule and say less. They stay code. So do the lenses of traffic signals, lit and unlit,
+in the frame of the model `traffic_signals`.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class _Builder:
             raise SchemaError(f"{self._here}: {error}; see {GUIDE}") from None
 
 
-INDOOR = "models/indoor"
+INDOOR = "assets/models/indoor"
 _INDOOR_ORDER = ("furniture", "homes", "shops", "public", "small_things")
 
 
@@ -133,7 +133,7 @@ def furniture_models() -> dict[str, Model]:
     return read_all(data_files(INDOOR, first=_INDOOR_ORDER))
 
 
-IN_HAND = "models/in_hand"
+IN_HAND = "assets/models/in_hand"
 
 
 @cached_data
@@ -154,7 +154,7 @@ def umbrellas() -> list[str]:
     return [name for name, model in in_hand_models().items() if model.kind == "umbrella"]
 
 
-OUTDOOR = "models/outdoor"
+OUTDOOR = "assets/models/outdoor"
 _OUTDOOR_ORDER = ("street", "squares", "traffic", "playgrounds", "barriers")
 
 

@@ -62,7 +62,7 @@ class _Painted:
 
 @cached_data
 def _files() -> list[tuple[Path, MovableFile]]:
-    return [(path, read_record(path, MovableFile, guide=GUIDE)) for path in data_files("models", "movable")]
+    return [(path, read_record(path, MovableFile, guide=GUIDE)) for path in data_files("assets/models", "movable")]
 
 
 @cached_data

@@ -445,7 +445,7 @@ def h1_mjcf() -> str:
 @cache
 def _network() -> tuple[tuple[NDArray[np.float32], ...], tuple[NDArray[np.float32], ...]]:
     """Weights, shape ``(inputs, outputs)``, and biases of the layers that `scripts/train_h1.py` made."""
-    arrays = read_npz((files("vico") / "data" / "h1_policy.npz").read_bytes())
+    arrays = read_npz((files("vico") / "data" / "assets" / "robots" / "h1_policy.npz").read_bytes())
     count = sum(name.startswith("weights") for name in arrays)
     return tuple(arrays[f"weights_{k}"] for k in range(count)), tuple(arrays[f"biases_{k}"] for k in range(count))
 

@@ -1,7 +1,7 @@
 """One day of talk, ready to be played: two courtships, a ledger, and the community they happen in.
 
 The ledger holds what was said to whom, what of it counts, and what members answered. Without a language model members
-answer by lines from ``vico/data/influence/replies.toml``.
+answer by lines from ``vico/data/challenges/influence/replies.toml``.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def reply_lines() -> ReplyLines:
     SchemaError
         If the file is not as it should be.
     """
-    return read_record(PACKAGED / "influence" / "replies.toml", ReplyLines, guide=GUIDE)
+    return read_record(PACKAGED / "challenges" / "influence" / "replies.toml", ReplyLines, guide=GUIDE)
 
 
 def reply(kind: str, listener: Profile, speaker: Profile, rival: Profile, chance: np.random.Generator) -> str:

@@ -205,4 +205,4 @@ def lexicon_files() -> tuple[LexiconFile, ...]:
     SchemaError
         If a file is not as it should be.
     """
-    return tuple(read_record(path, LexiconFile, guide=GUIDE) for path in data_files("influence", "lexicon"))
+    return tuple(read_record(path, LexiconFile, guide=GUIDE) for path in data_files("challenges/influence", "lexicon"))

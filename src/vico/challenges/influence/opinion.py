@@ -1,6 +1,6 @@
 """The opinion model: how members take a message, and what they think of the main agents over a day.
 
-Its numbers are read from ``vico/data/influence/opinion.toml``; docs/influence.md explains each.
+Its numbers are read from ``vico/data/challenges/influence/opinion.toml``; docs/influence.md explains each.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 NotPositive = Annotated[float, Field(le=0.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
-_CONSTANTS_FILE = PACKAGED / "influence" / "opinion.toml"
+_CONSTANTS_FILE = PACKAGED / "challenges" / "influence" / "opinion.toml"
 
 
 class PriorConstants(DataRecord):

@@ -27,7 +27,7 @@ _Hour = Annotated[float, Field(ge=0, le=24)]
 
 
 class EventKind(DataRecord):
-    """What events of a kind do; `data/environment/events.toml` tells each field.
+    """What events of a kind do; `data/sim/environment/events.toml` tells each field.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def event_kinds() -> dict[str, EventKind]:
         If a data file is not as docs/events.md says.
     """
     found: dict[str, EventKind] = {}
-    for path in data_files("environment", "events"):
+    for path in data_files("sim/environment", "events"):
         found |= read_record(path, _Kinds, guide=_GUIDE).event
     return found
 

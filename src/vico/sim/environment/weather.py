@@ -147,7 +147,7 @@ def weather_kinds() -> dict[str, WeatherKind]:
         If a data file is not as docs/weather.md says.
     """
     found: dict[str, WeatherKind] = {}
-    for path in data_files("environment", "weather"):
+    for path in data_files("sim/environment", "weather"):
         found |= read_record(path, _Kinds, guide=_GUIDE).weather
     return found
 

@@ -209,6 +209,6 @@ def shape_of(model: str) -> tuple[list[Surface], tuple[float, float, float]]:
         return vehicles[model], vehicle_size(model)[:3]
     found = street_models().get(model)
     if found is None:
-        raise InputError(f"events: no model is called {model!r}; take one of data/models/outdoor, or a car's")
+        raise InputError(f"events: no model is called {model!r}; take one of data/assets/models/outdoor, or a car's")
     length, width = found.foot or found.size[:2]
     return found.surfaces, (length, width, found.size[2])

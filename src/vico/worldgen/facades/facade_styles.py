@@ -1,6 +1,6 @@
 """Facade styles: what facades can look like by region, age and use, and which of them a building gets.
 
-`styles` is all that the files of ``vico/data/facades`` say, read once; `records` describes their fields, and
+`styles` is all that the files of ``vico/data/worldgen/facades`` say, read once; `records` describes their fields, and
 docs/adding_a_facade.md how to add to them. `family_of` asks the rules of `RULES` in their order which family a building
 belongs to: by what the map says, else by use, height, age and region; the first rule that knows decides. The style has
 materials and colours: by the map's tags, else by the family and a draw of the building's own.
@@ -77,7 +77,7 @@ class FacadeStyles:
 
 @cached_data
 def styles() -> FacadeStyles:
-    """Return what facades can look like: the package's data and the user's (``$VICO_DATA/facades``).
+    """Return what facades can look like: the package's data and the user's (``$VICO_DATA/worldgen/facades``).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Records of the files in ``vico/data/facades``: every field that they may have."""
+"""Records of the files in ``vico/data/worldgen/facades``: every field that they may have."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import Field
 from vico.io.data_files import DataRecord
 from vico.world.model import Category
 
-ROOM = "facades"  # folder of the files
+ROOM = "worldgen/facades"  # folder of the files
 LONGEST_NAME = 24  # characters of a material
 
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]

@@ -3,7 +3,7 @@
 Buildings are matched by their outlines. The map's building keeps its id, its function, its address and whatever else it
 is tagged with; of other sources come outline, height, roof and name where they go first. What the map lacks is added.
 What comes out is a map again, which all stages read as before, and beside it the surfaces of measured roofs and where
-every fact is from. The order is a small file that a person can read and change (data/sources/precedence.toml).
+every fact is from. The order is a small file that a person can read and change (data/worldgen/sources/precedence.toml).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Precedence(DataRecord):
-    """Order of sources by what they tell; see data/sources/precedence.toml.
+    """Order of sources by what they tell; see data/worldgen/sources/precedence.toml.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def read_precedence(path: Path | None, files: Sequence[str]) -> Precedence:
     InputError
         If it names a source that there is not.
     """
-    where = path or PACKAGED / "sources" / "precedence.toml"
+    where = path or PACKAGED / "worldgen" / "sources" / "precedence.toml"
     precedence = read_record(where, Precedence, guide=_GUIDE)
     for fact in ("footprint", "height", "roof", "name", "added"):
         order: tuple[str, ...] = getattr(precedence, fact)

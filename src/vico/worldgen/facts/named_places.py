@@ -1,6 +1,6 @@
 """Named places: their tags and categories, what words of other sources mean, and names of the nameless.
 
-Data of ``vico/data/places`` and of a user's own, read once; docs/adding_a_place.md describes the files.
+Data of ``vico/data/worldgen/places`` and of a user's own, read once; docs/adding_a_place.md describes the files.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Category
 from vico.worldgen.facts.fault_isolation import drop_on_failure
 
-ROOM = "places"
+ROOM = "worldgen/places"
 GUIDE = "docs/adding_a_place.md"
 Words = tuple[str, ...]
 Meaning = tuple[Category, str]

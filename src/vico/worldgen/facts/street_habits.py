@@ -1,7 +1,7 @@
 """Habits of streets by country: the driving side, how streets are painted and paved, what plates look like.
 
 The driving side follows from the country that addresses name, else from where the place lies. The rest is data of
-``vico/data/streets``, read once; docs/adding_street_habits.md describes the files.
+``vico/data/worldgen/streets``, read once; docs/adding_street_habits.md describes the files.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def keeps_left(osm: OsmData) -> bool:
     return drives_left(osm.frame.lat, osm.frame.lon) if country is None else country in LEFT_COUNTRIES
 
 
-ROOM = "streets"
+ROOM = "worldgen/streets"
 GUIDE = "docs/adding_street_habits.md"
 Rgb = tuple[int, int, int]
 Ring = tuple[tuple[float, float], ...]

@@ -1,4 +1,4 @@
-"""Kinds of rooms and uses of places: data of ``vico/data/indoor`` and of a user's own, read once.
+"""Kinds of rooms and uses of places: data of ``vico/data/worldgen/indoor`` and of a user's own, read once.
 
 docs/adding_a_room.md describes the files, `records` their fields.
 """
@@ -35,7 +35,7 @@ from vico.worldgen.indoor.records import (
     Use,
 )
 
-ROOM = "indoor"
+ROOM = "worldgen/indoor"
 GUIDE = "docs/adding_a_room.md"
 #: Rooms that plans make themselves; nobody furnishes them.
 UNFURNISHED = ("stairs", "lift")

@@ -1,7 +1,7 @@
-"""Furnishing a room by its kind: by the steps of the kind's entry in ``data/indoor``, or composed in Python.
+"""Furnishing a room by its kind: by the steps of the kind's entry in ``data/worldgen/indoor``, or composed in Python.
 
 What a list of steps can't say, since it follows from the room's shape, is one function a kind; an entry of
-``data/indoor`` names one of these as ``composed``.
+``data/worldgen/indoor`` names one of these as ``composed``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the files of ``data/indoor`` may hold: kinds of rooms with their furniture, and uses of places with their plans.
+"""Records of the files in ``data/worldgen/indoor``: kinds of rooms with their furniture, uses of places with plans.
 
 docs/adding_a_room.md says how to write one. Metres and degrees; the frames are those of `furnishing.RoomDraft` and
 `floorplans.Sketch`.

@@ -1,4 +1,4 @@
-"""Which models the things of maps have: data of ``vico/data/objects`` and of a user's own, read once.
+"""Which models the things of maps have: data of ``vico/data/worldgen/objects`` and of a user's own, read once.
 
 docs/adding_an_object.md describes the files.
 """
@@ -18,7 +18,7 @@ from vico.geo.osm import Tags
 from vico.geo.quantities import metres
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 
-ROOM = "objects"
+ROOM = "worldgen/objects"
 GUIDE = "docs/adding_an_object.md"
 ANY = "*"
 Names = tuple[str, ...]

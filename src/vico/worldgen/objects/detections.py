@@ -30,7 +30,7 @@ from vico.worldgen.objects.mapped_objects import mapped_placements, thing_of
 from vico.worldgen.objects.placement import Placement
 
 GUIDE = "docs/detections.md"
-_ROOM, _KIND = "objects", "detections"
+_ROOM, _KIND = "worldgen/objects", "detections"
 
 Length = Annotated[float, Field(gt=0.0, le=500.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

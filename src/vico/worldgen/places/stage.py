@@ -6,7 +6,7 @@ decided here, no name (one is made from the building's address), and no position
 
 The words of other sources are Google's place types (tables A and B of the new API, and the legacy ones) and
 Overture's categories of both taxonomies. Overture has some two thousand: those that differ from their group are
-listed in ``data/places/words.toml``, the rest follow from their wider words, their endings, or are offices.
+listed in ``data/worldgen/places/words.toml``, the rest follow from their wider words, their endings, or are offices.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from vico.worldgen.texture_canvas import Canvas, Colour
 
 
 def window_style(name: str, **changes: Any) -> WindowStyle:
-    """Return a window of ``vico/data/facades/windows.toml``, with other values for some of its fields.
+    """Return a window of ``vico/data/worldgen/facades/windows.toml``, with other values for some of its fields.
 
     Raises
     ------
