@@ -179,16 +179,7 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
             for day, residents in zip(days[1:], riding[1:], strict=True)
         ],
     )
-    return _with_descriptions(community, planned, meetings, stream)
-
-
-def _with_descriptions(
-    community: Community,
-    planned: DayDrafts,
-    meetings: Sequence[Meeting],
-    stream: Callable[[str], np.random.Generator],
-) -> Community:
-    """Put what is said of people into words, now that their days are known."""
+    # What is said of people has to agree with their days.
     measures = day_measures(community)
     biographer = Biographer(stream("biographies"), planned.index)
     joined = meetings_by_member(meetings)

@@ -504,7 +504,11 @@ def _of_day(resident: Resident, items: Sequence[ScheduleItem], homes: Collection
     return {
         "out": sum(_hours(i) for i in away if i.tag not in _NOT_LEISURE),
         "work": sum(_hours(i) for i in items if i.tag in (ActivityTag.WORK, ActivityTag.STUDY)),
-        "exercise": sum(_hours(i) for i in items if i.tag is ActivityTag.EXERCISE or _on_own_legs(i)),
+        "exercise": sum(
+            _hours(i)
+            for i in items
+            if i.tag is ActivityTag.EXERCISE or (i.type is ItemType.COMMUTE and i.mode in (None, Mode.WALK, Mode.BIKE))
+        ),
         "meals_out": sum(i.place != resident.home for i in meals),
         "dinners_out": sum(i.place != resident.home and i.start >= _DINNER for i in meals),
         "meals_home": sum(i.place == resident.home for i in meals),
@@ -518,10 +522,6 @@ def _of_day(resident: Resident, items: Sequence[ScheduleItem], homes: Collection
 def _retires(sleep: Sequence[ScheduleItem]) -> float:
     last = max((item for item in sleep if item.start > "12:00:00"), key=lambda item: item.start, default=None)
     return 24.0 if last is None else seconds_of_day(last.start) / 3600
-
-
-def _on_own_legs(item: ScheduleItem) -> bool:
-    return item.type is ItemType.COMMUTE and item.mode in (None, Mode.WALK, Mode.BIKE)
 
 
 def _hours(item: ScheduleItem) -> float:

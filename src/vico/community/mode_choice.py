@@ -149,22 +149,19 @@ def with_rides(
     if not index.rides.any:
         return list(residents)
     meetings: set[tuple[str | None, str, str]] = {(group.place, group.start, group.end) for group in groups}
-    means = _Means(index, _Racks(index), meetings, _ways_with_children(residents))
-    return [
-        resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
-        for resident in residents
-    ]
-
-
-def _ways_with_children(residents: Sequence[Resident]) -> set[tuple[str | None, str, str | None]]:
-    """Return the ways of small children: household, start, and where they go. They and who comes along walk."""
-    return {
+    # Small children and who comes along walk.
+    ways_with_children = {
         (child.household, way.start, then.place)
         for child in residents
         if child.age < ALONE_FROM
         for way, then in pairwise(child.schedule)
         if way.type is ItemType.COMMUTE
     }
+    means = _Means(index, _Racks(index), meetings, ways_with_children)
+    return [
+        resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
+        for resident in residents
+    ]
 
 
 @dataclass(frozen=True)
@@ -212,7 +209,8 @@ class _Means:
             stay = items.pop()
             set_out = clock_of(ride.set_out) if stays else item.start
             items += self._longer(stay, set_out)
-            words = _words(ride.mode, ends[1], home=ends[1].id == resident.home)
+            how = "Cycle" if ride.mode is Mode.BIKE else f"Take the {ride.mode}"
+            words = f"{how} home" if ends[1].id == resident.home else f"{how} to {ends[1].name}"
             items.append(item.model_copy(update={"start": set_out, "mode": ride.mode, "activity": words}))
         return items
 
@@ -279,8 +277,3 @@ class _Means:
             return [item.model_copy(update={"end": until})]
         chat = {"type": ItemType.MAIN, "start": item.end, "end": until, "activity": "Chat a little longer"}
         return [item, item.model_copy(update=chat | {"tag": ActivityTag.GROUP})]
-
-
-def _words(mode: Mode, goal: Place, *, home: bool) -> str:
-    how = "Cycle" if mode is Mode.BIKE else f"Take the {mode}"
-    return f"{how} home" if home else f"{how} to {goal.name}"

@@ -560,11 +560,7 @@ def tag_of(item: ScheduleItem, resident: Resident, groups: Sequence[Group], plac
         return ActivityTag.WORK
     if item.place == resident.home or item.place is None or item.place not in places:
         return ActivityTag.LEISURE
-    return _tag_of_place(places[item.place])
-
-
-def _tag_of_place(place: Place) -> ActivityTag:
-    """Return what people who neither live nor work at a place come there for."""
+    place = places[item.place]
     if place.kind in _EXERCISE:
         return ActivityTag.EXERCISE
     if place.kind in _STUDY:

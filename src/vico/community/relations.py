@@ -195,7 +195,10 @@ def draw_relations(
     for household in households:
         _tie_household(rng, network, household)
     for group in groups:
-        _tie_group(rng, network, group)
+        note = f"both in the {group.circle.name.lower()}, a child and a grown-up"
+        for a, b in combinations(group.members, 2):
+            if a.child != b.child and a.household != b.household:
+                network.tie(a, b, (RelationKind.NEIGHBOUR, note), rng.uniform(0.15, 0.5), rng.exponential(2))
     house, street = _neighbours(rng, index, people)
     colleagues = _colleagues(rng, people)
     same_class, same_school = _pupils(people)
@@ -208,7 +211,10 @@ def draw_relations(
     ]
     _tie_friends(rng, network, people, groups, acquaintances)
     _tie_colleagues(rng, network, people, colleagues)
-    _tie_neighbours(rng, network, people, house, street)
+    for pairs, where, (low, high) in ((house, "same house", (0.2, 0.55)), (street, "next door", (0.15, 0.45))):
+        for i, j in pairs:
+            bond = RelationKind.NEIGHBOUR, where
+            network.tie(people[i], people[j], bond, rng.uniform(low, high), rng.exponential(5))
     return network.relations()
 
 
@@ -263,21 +269,17 @@ def _tie_household(rng: np.random.Generator, network: _Network, household: House
         elif household.kind == "parent":
             network.tie(a, b, (RelationKind.FAMILY, "parent and child"), rng.uniform(0.8, 1.0), youngest)
         elif household.kind == "family":
-            _tie_family(rng, network, a, b)
+            if a.child and b.child:
+                note, strength, years = "siblings", rng.uniform(0.6, 0.95), youngest
+            elif a.child or b.child:
+                note, strength, years = "parent and child", rng.uniform(0.85, 1.0), youngest
+            else:
+                note, strength, years = "partners", rng.uniform(0.8, 1.0), youngest - 17
+            network.tie(a, b, (RelationKind.FAMILY, note), strength, years)
         elif household.kind == "siblings":
             network.tie(a, b, (RelationKind.FAMILY, "siblings"), rng.uniform(0.75, 0.95), youngest)
         else:
             network.tie(a, b, (RelationKind.FRIEND, "flatmates"), rng.uniform(0.6, 0.85), rng.uniform(0, 4))
-
-
-def _tie_family(rng: np.random.Generator, network: _Network, a: ResidentDraft, b: ResidentDraft) -> None:
-    if a.child and b.child:
-        bond, strength, years = "siblings", rng.uniform(0.6, 0.95), min(a.age, b.age)
-    elif a.child or b.child:
-        bond, strength, years = "parent and child", rng.uniform(0.85, 1.0), min(a.age, b.age)
-    else:
-        bond, strength, years = "partners", rng.uniform(0.8, 1.0), min(a.age, b.age) - 17
-    network.tie(a, b, (RelationKind.FAMILY, bond), strength, years)
 
 
 def _tie_friends(
@@ -294,14 +296,6 @@ def _tie_friends(
         strength += 0.2 * (a.character.agreeableness + b.character.agreeableness - 1)
         bond = RelationKind.FRIEND, friendship.note
         network.tie(a, b, bond, float(np.clip(strength, 0.15, 0.95)), rng.exponential(3.5))
-
-
-def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> None:
-    """Let children and grown-ups of a group know each other."""
-    note = f"both in the {group.circle.name.lower()}, a child and a grown-up"
-    for a, b in combinations(group.members, 2):
-        if a.child != b.child and a.household != b.household:
-            network.tie(a, b, (RelationKind.NEIGHBOUR, note), rng.uniform(0.15, 0.5), rng.exponential(2))
 
 
 def _circle(rng: np.random.Generator, members: Sequence[int]) -> list[tuple[int, int]]:
@@ -399,19 +393,6 @@ def _neighbours(
         if not strangers(i, j) and rng.random() < min(_NEXT_DOOR_KNOWN, _KNOWN_NEXT_DOOR / max(beside[i], beside[j]))
     ]
     return house, street
-
-
-def _tie_neighbours(
-    rng: np.random.Generator,
-    network: _Network,
-    people: Sequence[ResidentDraft],
-    house: Sequence[tuple[int, int]],
-    street: Sequence[tuple[int, int]],
-) -> None:
-    for pairs, note, (low, high) in ((house, "same house", (0.2, 0.55)), (street, "next door", (0.15, 0.45))):
-        for i, j in pairs:
-            bond = RelationKind.NEIGHBOUR, note
-            network.tie(people[i], people[j], bond, rng.uniform(low, high), rng.exponential(5))
 
 
 def describe_household(household: Household, draft: ResidentDraft, relations: Mapping[str, str]) -> str:

@@ -450,7 +450,7 @@ class _Check:
             if math.isinf(needed):
                 self.say(where, f"no {item.mode} goes {names}", "walk, or choose a place that can be reached so")
                 return
-        given = _item_seconds(item)
+        given = seconds_of_day(item.end) + (1 if item.end == LAST else 0) - seconds_of_day(item.start)
         taking = f"{given} s for the {what} {names}, which takes {needed:.0f} s"
         if given < needed:
             self.say(where, taking, f"allow {math.ceil(needed)} s or more")
@@ -557,10 +557,6 @@ class _Check:
 def is_employed(r: Resident) -> bool:
     """Whether somebody's workplace is where they work, and not where they learn."""
     return r.age >= GROWN_UP and not r.occupation.lower().startswith("student")
-
-
-def _item_seconds(item: ScheduleItem) -> int:
-    return seconds_of_day(item.end) + (1 if item.end == LAST else 0) - seconds_of_day(item.start)
 
 
 def _works_without_place(occupation: str) -> bool:

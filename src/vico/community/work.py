@@ -215,12 +215,12 @@ def workdays(spans: Sequence[Span]) -> list[list[Span]]:
 
 def study_places(index: PlaceIndex) -> list[Place]:
     """Places where students study, open on the day."""
-    found = [p for p in index.places() if kind_of(p) in STUDY_KINDS and _long_enough(index.hours(p))]
+    found = [
+        p
+        for p in index.places()
+        if kind_of(p) in STUDY_KINDS and any(start <= 11 * 60 and end >= 16 * 60 for start, end in index.hours(p))
+    ]
     return [p for p in found if kind_of(p) != "library"] or found
-
-
-def _long_enough(spans: Sequence[Span]) -> bool:
-    return any(start <= 11 * 60 and end >= 16 * 60 for start, end in spans)
 
 
 def assign_work(

@@ -110,7 +110,12 @@ def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = 
     """
     if not path.is_file():
         raise MissingFileError(f"{path}: no such elevation file; give a point cloud, or leave it out for flat ground")
-    laspy = _library(path)
+    try:
+        import laspy
+    except ImportError:
+        raise MissingExtraError(f"{path}: point clouds need laspy; install it with: {_COMMAND}") from None
+    if path.name.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
+        raise MissingExtraError(f"{path}: packed point clouds need lazrs; install it with: {_COMMAND}")
     side = int(np.ceil(reach / FINEST))
     total, count = np.zeros((2 * side) ** 2), np.zeros((2 * side) ** 2, np.int64)
     inside = 0
@@ -144,17 +149,12 @@ def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = 
         )
     with np.errstate(invalid="ignore"):
         heights = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(2 * side, 2 * side)
-    return _crop_to_ground(heights, frame, side)
-
-
-def _library(path: Path) -> Any:
-    try:
-        import laspy
-    except ImportError:
-        raise MissingExtraError(f"{path}: point clouds need laspy; install it with: {_COMMAND}") from None
-    if path.name.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
-        raise MissingExtraError(f"{path}: packed point clouds need lazrs; install it with: {_COMMAND}")
-    return laspy
+    # Beyond the part of the grid in which there is ground the file does not reach.
+    rows, columns = np.flatnonzero(np.isfinite(heights).any(axis=1)), np.flatnonzero(np.isfinite(heights).any(axis=0))
+    if not len(rows):
+        return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
+    part = heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return _raster(part, frame, (columns[0] - side + 0.5) * FINEST, (side - rows[0] - 0.5) * FINEST)
 
 
 def _system(header: Any, path: Path) -> CRS:
@@ -195,15 +195,6 @@ def _chunks(reader: Any) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_
     for points in reader.chunk_iterator(_CHUNK):
         xyz = np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
         yield xyz, np.asarray(points.classification) == GROUND
-
-
-def _crop_to_ground(heights: NDArray[np.float64], frame: LocalFrame, side: int) -> Raster:
-    """Return the part of the grid in which there is ground: beyond it the file does not reach."""
-    rows, columns = np.flatnonzero(np.isfinite(heights).any(axis=1)), np.flatnonzero(np.isfinite(heights).any(axis=0))
-    if not len(rows):
-        return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
-    part = heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return _raster(part, frame, (columns[0] - side + 0.5) * FINEST, (side - rows[0] - 0.5) * FINEST)
 
 
 def _raster(heights: NDArray[np.float64], frame: LocalFrame, west: float, north: float) -> Raster:

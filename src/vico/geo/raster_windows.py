@@ -60,7 +60,8 @@ def without_outliers(
             # What is left out may have hidden another beside it.
             for _ in range(_MOST_ROUNDS):
                 part = heights[tile]
-                if not _largest_step(part) >= least:
+                steps = [np.abs(np.diff(part, axis=axis)) for axis in (0, 1)]
+                if not any(np.max(step, initial=0.0, where=np.isfinite(step)) >= least for step in steps):
                     break
                 ends = (top == 0, top + len(part) == rows, left == 0, left + part.shape[1] == columns)
                 bad = _outlying(part, spacing, ends)
@@ -71,12 +72,6 @@ def without_outliers(
                 heights = heights.copy()
                 heights[tile][bad] = np.nan
     return heights, found
-
-
-def _largest_step(heights: NDArray[np.float64]) -> float:
-    """Return the largest difference of pixels side by side, metres."""
-    steps = [np.abs(np.diff(heights, axis=axis)) for axis in (0, 1)]
-    return max(float(np.max(step, initial=0.0, where=np.isfinite(step))) for step in steps)
 
 
 def _outlying(heights: NDArray[np.float64], spacing: float, ends: tuple[bool, ...]) -> NDArray[np.bool_]:

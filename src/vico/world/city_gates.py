@@ -307,7 +307,10 @@ def tile_gates(
     walks: list[tuple[int, int, int, float, int]] = []
     steps: list[NDArray[np.uint8]] = []
     for (rows, columns), (up, aside) in sides:
-        there = tuple(_shift_slice(part, by) for part, by in ((rows, up), (columns, aside)))
+        there = tuple(
+            slice(part.start + by, part.stop + by) if isinstance(part, slice) else part + by
+            for part, by in ((rows, up), (columns, aside))
+        )
         if not all(_within(part, size) for part, size in zip(there, (height, width), strict=True)):
             continue
         mine, theirs = cost[rows, columns], cost[there]
@@ -336,10 +339,6 @@ def tile_gates(
     start, end, far = ends.T
     count = np.array([len(one) for one in steps], np.int64)
     return Gates(cells, start, end, far, metres, corners, count, np.concatenate([_NO_STEP, *steps]))
-
-
-def _shift_slice(part: slice | int, by: int) -> slice | int:
-    return slice(part.start + by, part.stop + by) if isinstance(part, slice) else part + by
 
 
 def _within(part: slice | int, size: int) -> bool:

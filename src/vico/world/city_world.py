@@ -172,7 +172,7 @@ class CityRooms(Sequence[Room]):
     def __init__(self, files: Sequence[tuple[Path, TileShift]]) -> None:
         self._files = list(files)
         self._maps = [_map_file(path) for path, _ in files]
-        self._ends = [_line_ends(content) for content in self._maps]
+        self._ends = [np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n")) for content in self._maps]
         self._first = np.cumsum([0, *map(_rows, self._ends)])
         self._kept = lru_cache(maxsize=_ROOMS_KEPT)(self._read)
 
@@ -281,11 +281,6 @@ def _map_file(path: Path) -> bytes | mmap.mmap:
 def _rows(ends: np.ndarray) -> int:
     """Return how many rooms a file has: a line each between its brackets, and an empty one where there is none."""
     return 0 if len(ends) < 3 or ends[1] - ends[0] == 1 else len(ends) - 2
-
-
-def _line_ends(content: bytes | mmap.mmap) -> np.ndarray:
-    """Return where lines end."""
-    return np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
 
 
 T = TypeVar("T")

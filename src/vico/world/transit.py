@@ -183,7 +183,9 @@ class Track:
         self.xy = self.at(s)
         reach = TRAM_SECTION / 2
         before, here, after = self.at(s - reach), self.xy, self.at(s + reach)
-        turn = _angle(here - before, after - here)
+        into, out_of = here - before, after - here
+        cross = into[:, 0] * out_of[:, 1] - into[:, 1] * out_of[:, 0]
+        turn = each(math.atan2, cross, (into * out_of).sum(axis=1))
         bend = np.abs(turn) / reach
         self.half_width = TRAM_WIDTH / 2 + _AIR + np.minimum(TRAM_SECTION**2 / 8 * bend, 1.0)
         way = np.gradient(self.xy, axis=0) if len(self.xy) > 1 else np.ones((1, 2))
@@ -268,10 +270,6 @@ def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Poin
     x, y = x + math.cos(yaw) * TRAM_DOORS[which], y + math.sin(yaw) * TRAM_DOORS[which]
     aside = side * TRAM_WIDTH / 2
     return (float(x + math.sin(yaw) * aside), float(y - math.cos(yaw) * aside)), (float(x), float(y))
-
-
-def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return each(math.atan2, a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
 
 
 def departure(line: Line, number: int) -> int:

@@ -116,26 +116,6 @@ def ways_through(free: Gaps, good: Gaps, room: float, bend: float, depth: Floats
     return [(a, aside[part[part >= 0]]) for a, part in parts if (part >= 0).any()]
 
 
-def sides_along(free: Gaps, good: Gaps, along: Floats, aside: Floats, begin: int, room: float) -> Floats:
-    """Return the room to the left and to the right of a piece of a line, and the same in need, metres.
-
-    Parameters
-    ----------
-    free, good
-        As for `ways_through`, `good` within the line's own room.
-    along, aside
-        Metres along and to the left of the line at its places.
-    begin
-        Place of the line that is the piece's first.
-
-    Returns
-    -------
-    ndarray
-        From each of its places to the next, float64, shape ``(places, 4)``.
-    """
-    return np.asarray(_sides_along(free, good, along, aside, begin, room), np.float64)
-
-
 @compiled
 def _above_edges(free, depth, columns, room):  # type: ignore[no-untyped-def]
     places, count = depth.shape
@@ -536,7 +516,7 @@ def _courses(line: _Line, free: list[list[Interval]], bend: float, depth: Floats
     found: list[ClearCourse] = []
     for begin, aside in ways_through(gaps, good, room, bend, depth):
         here = slice(begin, begin + len(aside))
-        sides = sides_along(gaps, sides_good, along, aside, begin, room)
+        sides = np.asarray(_sides_along(gaps, sides_good, along, aside, begin, room), np.float64)
         moved = line.points[here] + aside[:, None] * line.normals[here]
         kept = _needed_points(aside, sides, line.normals[here])
         is_whole = len(aside) == len(along)

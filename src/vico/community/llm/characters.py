@@ -310,7 +310,17 @@ class _DayJudge:
             for one in plan
             if one.place is not None
         ]  # fmt: skip
-        findings = _lacks(stays, person)
+        # Too little sleep, or too few hours at the place of work.
+        findings = []
+        asleep = sum(stay.minutes for stay in stays if stay.type is ItemType.SLEEP)
+        least = _SLEEP_OF_CHILDREN if person.age < GROWN_UP else _SLEEP
+        if asleep < least:
+            findings.append(f"schedule: {asleep / 60:.1f} h of sleep: plan {least / 60:g} h or more")
+        working = sum(stay.minutes for stay in stays if stay.place == person.workplace)
+        if person.workplace is not None and person.age >= GROWN_UP and working < _AT_WORK:
+            findings.append(
+                f"schedule: {working} min at {person.occupation}'s place of work: plan the hours such work takes there"
+            )
         if findings:
             return findings
         day = self._lives.day(person, stays, self._groups.get(draft.item, ()), others=self._lives.lessons(draft.item))
@@ -344,19 +354,4 @@ def _plan_faults(plan: Sequence[ActivityReply]) -> list[str]:
         findings.append(f"schedule[{len(plan) - 1}]: the day ends at {plan[-1].end_time}, not at {LAST}")
     if "commute" in (plan[0].type, plan[-1].type):
         findings.append("schedule: the day begins and ends at a place, not on the way")
-    return findings
-
-
-def _lacks(stays: Sequence[Stay], person: Resident) -> list[str]:
-    """Say what a day of such a person lacks."""
-    findings = []
-    asleep = sum(stay.minutes for stay in stays if stay.type is ItemType.SLEEP)
-    least = _SLEEP_OF_CHILDREN if person.age < GROWN_UP else _SLEEP
-    if asleep < least:
-        findings.append(f"schedule: {asleep / 60:.1f} h of sleep: plan {least / 60:g} h or more")
-    working = sum(stay.minutes for stay in stays if stay.place == person.workplace)
-    if person.workplace is not None and person.age >= GROWN_UP and working < _AT_WORK:
-        findings.append(
-            f"schedule: {working} min at {person.occupation}'s place of work: plan the hours such work takes there"
-        )
     return findings

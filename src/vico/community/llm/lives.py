@@ -431,7 +431,11 @@ def stays_with_work(index: PlaceIndex, before: Resident, now: Resident, renamed:
 def _work(index: PlaceIndex, person: Resident) -> list[Stay]:
     """Return working hours at a new workplace, with a break."""
     assert person.workplace is not None
-    start, end = working_hours(index, person.workplace)
+    # Eight hours at most of the longest stretch in which the place is open.
+    spans = [(max(a, _EARLIEST), min(b, MIDNIGHT)) for a, b in index.hours(index.place_by_id[person.workplace])]
+    opens, closes = max(spans, key=lambda span: (span[1] - span[0], -span[0]), default=(_USUAL_START, 17 * 60))
+    start = min(max(opens, _USUAL_START), max(opens, closes - _WORKING_DAY))
+    end = min(closes, start + _WORKING_DAY)
     place = index.place_by_id[person.workplace]
     student = person.occupation.startswith("student")
     tag = ActivityTag.STUDY if student else ActivityTag.WORK
@@ -444,11 +448,3 @@ def _work(index: PlaceIndex, person: Resident) -> list[Stay]:
         Stay(noon, noon + _BREAK, ItemType.MEAL, "Have a lunch break", place.id, ActivityTag.MEAL_OUT),
         Stay(noon + _BREAK, end, ItemType.MAIN, words, place.id, tag),
     ]
-
-
-def working_hours(index: PlaceIndex, place: str) -> tuple[int, int]:
-    """Return from when until when somebody may work at a place, minutes of the day: eight hours at most."""
-    spans = [(max(a, _EARLIEST), min(b, MIDNIGHT)) for a, b in index.hours(index.place_by_id[place])]
-    start, end = max(spans, key=lambda span: (span[1] - span[0], -span[0]), default=(_USUAL_START, 17 * 60))
-    begin = min(max(start, _USUAL_START), max(start, end - _WORKING_DAY))
-    return begin, min(end, begin + _WORKING_DAY)

@@ -118,7 +118,16 @@ def coplanar_overlaps(
     away = np.abs(np.einsum("nki,ni->nk", points[second], plane[first]) - offset[first, None]).max(axis=1)
     close = (away < _PLANE) & (np.abs(plane[first] - plane[second]).max(axis=1) < _TURN)
     first, second = first[close], second[close]
-    area = _common(points, plane, first, second, least)
+    # The area that two triangles of a plane share; 0 where it is certainly not more than `least`.
+    across, up = _axes(plane[first])
+    one, two = (
+        np.stack([np.einsum("nki,ni->nk", points[which], across), np.einsum("nki,ni->nk", points[which], up)], axis=-1)
+        for which in (first, second)
+    )
+    area = np.zeros(len(first))
+    near = np.flatnonzero((_most_common(one, two) > least) & (_most_common(two, one) > least))
+    shapes = (shapely.polygons(flat[near]) for flat in (one, two))
+    area[near] = np.asarray(overlay.common_area(*shapes), np.float64)
     real = area > least
     first, second, area = first[real], second[real], area[real]
     return CoplanarPairs(kept[first], kept[second], area, sign[first] == sign[second])
@@ -186,26 +195,6 @@ def _overlapping_boxes(
                 count += 1
             j += 1
     return first[:count], second[:count]
-
-
-def _common(
-    points: NDArray[np.float64],
-    plane: NDArray[np.float64],
-    first: NDArray[np.int64],
-    second: NDArray[np.int64],
-    least: float,
-) -> NDArray[np.float64]:
-    """Area two triangles of a plane share; 0 where it is certainly not more than `least`."""
-    across, up = _axes(plane[first])
-    one, two = (
-        np.stack([np.einsum("nki,ni->nk", points[which], across), np.einsum("nki,ni->nk", points[which], up)], axis=-1)
-        for which in (first, second)
-    )
-    area = np.zeros(len(first))
-    near = np.flatnonzero((_most_common(one, two) > least) & (_most_common(two, one) > least))
-    shapes = (shapely.polygons(flat[near]) for flat in (one, two))
-    area[near] = np.asarray(overlay.common_area(*shapes), np.float64)
-    return area
 
 
 def _most_common(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:

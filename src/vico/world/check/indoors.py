@@ -129,15 +129,12 @@ def _doorways(room: Room, known: dict[str, Room]) -> list[WorldFinding]:
             continue
         other = known.get(door.to)
         back = _door_to(other, room.id) if other is not None else None
+        is_ride = other is not None and room.kind == other.kind == "lift"
         if back is None:
             found.append(WorldFinding("door one-sided", room.id, f"its door to {door.to} does not lead back"))
-        elif not _ride(room, other) and math.dist(door.position, back.position) > _SAME_DOOR:
+        elif not is_ride and math.dist(door.position, back.position) > _SAME_DOOR:
             found.append(WorldFinding("door apart", room.id, f"the two sides of its door to {door.to} do not meet"))
     return found
-
-
-def _ride(room: Room, other: Room | None) -> bool:
-    return room.kind == "lift" and other is not None and other.kind == "lift"
 
 
 def _door_to(room: Room, name: str) -> Doorway | None:
