@@ -162,7 +162,15 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
     days = write_days(planned, first, meetings, relations, dates, stream)
     groups = _groups(meetings)
     people = _residents(planned, days, meetings, stream)
-    riding = [_schedules_with_rides(people, groups, day, stream) for day in days]
+    riding = [
+        with_rides(
+            [resident.model_copy(update={"schedule": day.items[resident.id]}) for resident in people],
+            groups,
+            day.index,
+            lambda name: stream(f"rides/{name}"),
+        )
+        for day in days
+    ]
     community = Community(
         producer=f"vico {__version__}",
         author=_PROCEDURAL,
@@ -240,8 +248,14 @@ def _residents(
     people = []
     for draft, spawn in zip(drafts, spawns, strict=True):
         chance = stream(f"details/{draft.id}")
-        mine = joined.get(draft.id, [])
-        frequented = [place for day in days for place in day.frequented[draft.id]]
+        # Where they go, where they meet, where their hobbies could take them, and what they pass on their own street.
+        known = [draft.home, *([draft.workplace] if draft.workplace else [])]
+        known += [place for day in days for place in day.frequented[draft.id]]
+        known += [meeting.place.id for meeting in joined.get(draft.id, [])]
+        passed = (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT)
+        known += index.nearest(
+            draft.home, *((hobby.kinds, 2) for hobby in draft.hobbies), *((category, 3) for category in passed)
+        )
         people.append(
             Resident(
                 id=draft.id,
@@ -259,20 +273,12 @@ def _residents(
                 household=f"household_{draft.household}",
                 home=draft.home,
                 workplace=draft.workplace,
-                known_places=_known_places(index, draft, frequented, mine),
+                known_places=list(dict.fromkeys(known)),
                 spawn=spawn,
                 schedule=days[0].items[draft.id],
             )
         )
     return people
-
-
-def _schedules_with_rides(
-    people: Sequence[Resident], groups: Sequence[Group], day: DaySchedules, stream: Callable[[str], np.random.Generator]
-) -> list[Resident]:
-    """Return everybody with the schedule of a day, rides put in."""
-    there = [resident.model_copy(update={"schedule": day.items[resident.id]}) for resident in people]
-    return with_rides(there, groups, day.index, lambda name: stream(f"rides/{name}"))
 
 
 def _absent(meetings: Sequence[Meeting], groups: Sequence[Group], day: DaySchedules) -> dict[str, list[str]]:
@@ -313,36 +319,8 @@ def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
     return int(np.clip(round(float(chance.normal(level, 90))), 100, 1000))
 
 
-def _known_places(
-    index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]
-) -> list[str]:
-    """Where they go, where they meet, where their hobbies could take them, and what they pass on their own street."""
-    known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
-    passed = (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT)
-    known += index.nearest(
-        draft.home, *((hobby.kinds, 2) for hobby in draft.hobbies), *((category, 3) for category in passed)
-    )
-    return list(dict.fromkeys(known))
-
-
 def _groups(meetings: Sequence[Meeting]) -> list[Group]:
-    return [
-        Group(
-            id=f"group_{k}",
-            name=name,
-            description=m.circle.description,
-            activity=m.circle.activity,
-            place=m.place.id,
-            members=[s.id for s in m.members],
-            start=clock_of(m.start * 60),
-            end=clock_of(m.end * 60),
-        )
-        for k, (m, name) in enumerate(zip(meetings, _group_names(meetings), strict=True))
-    ]
-
-
-def _group_names(meetings: Sequence[Meeting]) -> list[str]:
-    """Name groups after their circle, with as much of place and time as tells them apart; chains share names."""
+    """Return meetings as groups, named after their circle with as much of place and time as tells them apart."""
     forms = [
         [
             m.circle.name,
@@ -353,4 +331,16 @@ def _group_names(meetings: Sequence[Meeting]) -> list[str]:
         for m in meetings
     ]
     counts = [Counter(names) for names in zip(*forms, strict=True)]
-    return [next(name for name, count in zip(mine, counts, strict=True) if count[name] == 1) for mine in forms]
+    return [
+        Group(
+            id=f"group_{k}",
+            name=next(name for name, count in zip(forms[k], counts, strict=True) if count[name] == 1),
+            description=m.circle.description,
+            activity=m.circle.activity,
+            place=m.place.id,
+            members=[s.id for s in m.members],
+            start=clock_of(m.start * 60),
+            end=clock_of(m.end * 60),
+        )
+        for k, m in enumerate(meetings)
+    ]

@@ -59,11 +59,6 @@ COMMUNITY_FOLDER = FolderKind(
 )
 
 
-def _rows(records: Sequence[Record]) -> bytes:
-    rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, indent=1) for r in records]
-    return ("[\n" + ",\n".join(rows) + "\n]\n").encode()
-
-
 def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
     """Return the bytes of the parts, and of the manifest."""
     lists: tuple[Sequence[Record], ...] = (
@@ -72,7 +67,10 @@ def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
         community.relations,
         community.further_days,
     )
-    parts = {name: _rows(records) for name, records in zip(_PARTS, lists, strict=True)}
+    parts: dict[str, bytes] = {}
+    for name, records in zip(_PARTS, lists, strict=True):
+        rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, indent=1) for r in records]
+        parts[name] = ("[\n" + ",\n".join(rows) + "\n]\n").encode()
     if community.authorship is not None:
         parts[_AUTHORSHIP] = (
             json.dumps(community.authorship.model_dump(mode="json"), ensure_ascii=False, indent=1) + "\n"

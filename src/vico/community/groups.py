@@ -452,34 +452,37 @@ def form_playmates(rng: np.random.Generator, index: PlaceIndex, cares: Sequence[
     found: list[Meeting] = []
     for care in cares:
         people = [care.carer, *care.small]
-        meeting = _join_meeting(index, found, care, people)
-        if meeting is not None:
-            _set_out_together(index, care, meeting)
-            continue
         meeting = next(
             (
                 m
-                for k in rng.permutation(len(kinds))
-                for m in _playtime_options(rng, index, care, kinds[int(k)], places[int(k)])
+                for m in found
+                if len(m.members) + len(people) <= _MOST
+                and index.metres(care.carer.home, m.place.id) <= _NEAR
+                and _suits(index, care, m.place, m.start, m.end)
             ),
             None,
         )
-        meeting = meeting or _at_home(index, care)
-        other = _same(found, meeting)
-        if other is None:
-            found.append(meeting)
-        meeting = other or meeting
+        if meeting is None:
+            meeting = next(
+                (
+                    m
+                    for k in rng.permutation(len(kinds))
+                    for m in _playtime_options(rng, index, care, kinds[int(k)], places[int(k)])
+                ),
+                None,
+            )
+            meeting = meeting or _at_home(index, care)
+            # A full group of the same kind at the same place and time grows.
+            what = meeting.circle.name, meeting.place.id, meeting.start
+            same = next((m for m in found if (m.circle.name, m.place.id, m.start) == what), None)
+            if same is None:
+                found.append(meeting)
+            meeting = same or meeting
         meeting.members += people
         _set_out_together(index, care, meeting)
     for meeting in found:
         meeting.members.sort(key=lambda member: int(member.id.removeprefix("resident_")))
     return found
-
-
-def _same(found: Sequence[Meeting], wanted: Meeting) -> Meeting | None:
-    """Return the meeting of the same kind at the same place and time, if there is one."""
-    what = wanted.circle.name, wanted.place.id, wanted.start
-    return next((m for m in found if (m.circle.name, m.place.id, m.start) == what), None)
 
 
 def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
@@ -492,21 +495,6 @@ def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
     care.carer.out_until = 0
     for child in care.small:
         child.duties = [Duty(leave - _READY, leave, childhood().escort.dress, care.carer.home)]
-
-
-def _join_meeting(
-    index: PlaceIndex, found: Sequence[Meeting], care: Care, people: Sequence[ResidentDraft]
-) -> Meeting | None:
-    """Let a family come to a meeting that there is, if one is near enough and suits."""
-    for meeting in found:
-        if (
-            len(meeting.members) + len(people) <= _MOST
-            and index.metres(care.carer.home, meeting.place.id) <= _NEAR
-            and _suits(index, care, meeting.place, meeting.start, meeting.end)
-        ):
-            meeting.members += people
-            return meeting
-    return None
 
 
 def come_to_play(index: PlaceIndex, cares: Sequence[Care], usual: Meeting, meeting: Meeting) -> None:

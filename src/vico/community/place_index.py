@@ -26,7 +26,7 @@ from vico.geometry import distances
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.io.memory import LruCache
 from vico.rules import BED_WIDTH, WALK_SPEED
-from vico.world.model import Category, Place, Point2, Room
+from vico.world.model import Category, Place, Point2
 from vico.world.opening_hours import DAYS, MINUTES, Coordinates, Span, customary_weekday, open_spans, weekly_hours
 from vico.world.walk_lengths import IndoorWays
 from vico.world.walkable import CROSSING, ROADWAY
@@ -58,17 +58,14 @@ class PlaceRooms:
         for k, place in enumerate(places):
             self.inside[k] = ways.seconds(place.rooms)
             rooms = [by_id[name] for name in place.rooms]
-            self.beds[k] = sum(map(_beds, rooms))
+            beds = (top for room in rooms for top in room.containers if top.kind == "bed")
+            self.beds[k] = sum(max(1, int(bed.size[1] / BED_WIDTH + 1e-9)) for bed in beds)
             self.area[k] = sum(room.size[0] * room.size[1] for room in rooms if room.kind not in _WAYS)
 
     @classmethod
     def of(cls, world: World) -> PlaceRooms:
         """Return those of a world, counted once."""
         return world.shared(cls, lambda: cls(world))
-
-
-def _beds(room: Room) -> int:
-    return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in room.containers if top.kind == "bed")
 
 
 #: Staff are at their place so long before it opens and after it closes, at most, minutes.
@@ -351,13 +348,13 @@ class PlaceIndex:
     def metres_to(self, a: str, places: Sequence[Place]) -> NDArray[np.float64]:
         """Metres from a place to others as the crow flies, shape ``(len(places),)``."""
         spots = [self.spot[place.id] for place in places]
-        return np.asarray(np.hypot(*(self._positions[spots] - self._positions[self.spot[a]]).T), np.float64)
+        return distances(self._positions[spots], self._positions[self.spot[a]])
 
     def by_nearness(self, a: str) -> list[Place]:
         """Reachable places, the nearest to a place first."""
         x, y = self.place_by_id[a].position[:2]
         reachable, numbers = self._all_reachable
-        far = np.round(np.hypot(*(self._positions[numbers] - (x, y)).T), 3)
+        far = np.round(distances(self._positions[numbers], (x, y)), 3)
         return [reachable[k] for k in np.lexsort((self._names[numbers], far)).tolist()]
 
     def nearest(self, a: str, *wanted: tuple[Category | Collection[str], int]) -> list[str]:
@@ -367,8 +364,7 @@ class PlaceIndex:
         found: list[str] = []
         for what, count in wanted:
             among = self._among(what if isinstance(what, Category) else frozenset(what))
-            metres = np.hypot(*(self._positions[numbers[among]] - (x, y)).T)
-            far = np.asarray(np.round(metres, 3), np.float64)
+            far = np.round(distances(self._positions[numbers[among]], (x, y)), 3)
             if len(far) > count:
                 near = np.flatnonzero(far <= np.partition(far, count - 1)[count - 1])
                 among, far = among[near], far[near]

@@ -439,7 +439,8 @@ class Wardrobe:
         if family:
             # A child of two takes after both.
             ancestry = tuple(np.mean([one["ancestry"] for one in family], axis=0).round(3).tolist())
-            skin = self._colour([_mean([one["skin"] for one in family])], 3.0)
+            red, green, blue = np.mean([one["skin"] for one in family], axis=0).astype(int).tolist()
+            skin = self._colour([(red, green, blue)], 3.0)
             hair_colour = self._colour([self._one(family)["hair_colour"]], 4.0)
             if min(hair_colour) > 130 and age < 55:  # a parent's is grey already
                 hair_colour = self._colour(_HAIR["light" if ancestry[2] > 0.8 else "dark"], 5.0)
@@ -536,8 +537,3 @@ class Wardrobe:
             if options := trade.colours(f"{field}_colour"):
                 found[f"{field}_colour"] = self._colour(options, 4.0)
         return found
-
-
-def _mean(colours: Sequence[Colour]) -> Colour:
-    red, green, blue = np.mean(colours, axis=0).astype(int).tolist()
-    return red, green, blue

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vico.clock import DAY
 from vico.community.model import Mode
+from vico.geometry import distances
 from vico.rules import BIKE_RATE, BIKE_SPEED, BUS_FARE, WALK_SPEED
 from vico.world.model import Point2
 from vico.world.transit import LineTimes, Stop, TramStop, TramTimes, Transit
@@ -125,8 +126,7 @@ class _Ends:
     def seconds(self, door: Point2) -> NDArray[np.float64]:
         """Seconds on foot between a door and each end; bounds of those not measured yet."""
         if door not in self._from:
-            bee_line = np.hypot(*(self._xy - np.array(door)).T)
-            bounds = np.maximum(bee_line - _SNAP, 0.0) / WALK_SPEED
+            bounds = np.maximum(distances(self._xy, door) - _SNAP, 0.0) / WALK_SPEED
             self._from[door] = bounds, np.zeros(len(bounds), np.bool_)
         return self._from[door][0]
 

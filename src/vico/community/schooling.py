@@ -136,17 +136,13 @@ def care_on(index: PlaceIndex, household: Household, carer: ResidentDraft) -> Ca
         for child in care.small:
             if child.workplace == care.stops[-1]:
                 child.lessons = child.shift = None
-    carer.shift = _beside(index, care)
+    if carer.shift is None or carer.workplace is None or not care.stops:
+        carer.shift = None  # with children at home nobody goes to work
+    else:
+        carer.shift = hours_between_school_runs(index, care, carer.workplace, carer.shift)
     carer.out_until = 0
     settle_care(index, care)
     return care
-
-
-def _beside(index: PlaceIndex, care: Care) -> tuple[int, int] | None:
-    carer = care.carer
-    if carer.shift is None or carer.workplace is None or not care.stops:
-        return None  # with children at home nobody goes to work
-    return hours_between_school_runs(index, care, carer.workplace, carer.shift)
 
 
 def hours_between_school_runs(

@@ -285,14 +285,11 @@ class LlmCommunityAuthor:
                 break
             for resident in off:
                 del kept[resident]
-                items = _mark_ungrounded(items, f"{resident}.schedule", bad[resident])
+                name_of_day = f"{resident}.schedule"
+                items = [_ungrounded_item(one, bad[resident]) if one.item == name_of_day else one for one in items]
         # Nothing of the model's can be named as the cause: the procedural author's whole community stands.
         items = [_ungrounded_item(one, findings[0]) for one in items]
         return lives.cast.base, _by_resident(lives, items), drafts
-
-
-def _mark_ungrounded(items: Sequence[AuthoredItem], name: str, finding: CommunityFinding) -> list[AuthoredItem]:
-    return [_ungrounded_item(one, finding) if one.item == name else one for one in items]
 
 
 def _ungrounded_item(item: AuthoredItem, finding: CommunityFinding) -> AuthoredItem:

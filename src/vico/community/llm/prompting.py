@@ -491,11 +491,12 @@ class Cast:
             With the minutes on foot from this place.
         """
         found = self.index.place_by_id[place]
+        spans = [f"{clock_of(a * 60)[:5]}-{clock_of(min(b, _LATE) * 60)[:5]}" for a, b in self.index.hours(found)]
         facts: dict[str, Any] = {
             "name": self.labels[place],
             "building": found.building,
             "function": function_of(found),
-            "open": _hours_in_words(self.index, found),
+            "open": "always" if found.category is Category.ACCOMMODATION else ", ".join(spans) or "closed",
         }
         if jobs:
             facts["employs"] = self.trades(place)
@@ -569,13 +570,6 @@ def _ways(resident: Resident) -> list[tuple[str, str, str | None]]:
 def function_of(place: Place) -> str:
     """Return what a place is for, in words: ``cafe (food)``."""
     return f"{label_text(kind_of(place).replace('_', ' '))} ({place.category.value})"
-
-
-def _hours_in_words(index: PlaceIndex, place: Place) -> str:
-    if place.category is Category.ACCOMMODATION:
-        return "always"
-    spans = [f"{clock_of(a * 60)[:5]}-{clock_of(min(b, _LATE) * 60)[:5]}" for a, b in index.hours(place)]
-    return ", ".join(spans) or "closed"
 
 
 def looks_in_words(resident: Resident) -> str:
