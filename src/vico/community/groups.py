@@ -299,7 +299,7 @@ class _Forming:
         """Form the groups that most people like most, until there are `wanted` more or none is left."""
         ranking, wanted = _Ranking(self, options, weights), len(self.groups) + wanted
         while len(self.groups) < wanted and (k := ranking.best()) is not None:
-            self._found(ranking, k, self._size)
+            self._form_group(ranking, k, self._size)
 
     def admit_lonely(self) -> None:
         """Let those who are in no group join the one they like best among those they can come to."""
@@ -336,7 +336,7 @@ class _Forming:
                     f"community: world {self._index.world.manifest.name!r} has no place where {who} could meet "
                     "others outside working hours; build a world with a larger --radius, or ask for other --residents"
                 )
-            self._found(ranking, k, max(self._size, 3))
+            self._form_group(ranking, k, max(self._size, 3))
 
     def attendance(self, options: Sequence[Meeting]) -> _Attendance:
         """Return who likes some meetings and is free for them beside the groups they are in."""
@@ -362,7 +362,7 @@ class _Forming:
         gain *= 0.7 ** self._slots[meeting.slot]
         return gain
 
-    def _found(self, ranking: _Ranking, k: int, limit: int) -> None:
+    def _form_group(self, ranking: _Ranking, k: int, limit: int) -> None:
         """Bring people together, unless in truth too few can come. Either way the place has had this circle."""
         meeting = ranking.options[k]
         self._tried.add((meeting.circle.name, meeting.place.id))

@@ -519,7 +519,7 @@ def with_tags(community: Community, places: Sequence[Place] = ()) -> Community:
         for member in group.members:
             groups.setdefault(member, []).append(group)
 
-    def tagged(resident: Resident, items: Sequence[ScheduleItem]) -> list[ScheduleItem]:
+    def items_with_tags(resident: Resident, items: Sequence[ScheduleItem]) -> list[ScheduleItem]:
         mine = groups.get(resident.id, [])
         return [
             item if item.tag is not None else item.model_copy(update={"tag": tag_of(item, resident, mine, by_id)})
@@ -529,9 +529,13 @@ def with_tags(community: Community, places: Sequence[Place] = ()) -> Community:
     people = community.resident_by_id
     return community.model_copy(
         update={
-            "residents": [r.model_copy(update={"schedule": tagged(r, r.schedule)}) for r in community.residents],
+            "residents": [
+                r.model_copy(update={"schedule": items_with_tags(r, r.schedule)}) for r in community.residents
+            ],
             "further_days": [
-                day.model_copy(update={"schedules": {i: tagged(people[i], s) for i, s in day.schedules.items()}})
+                day.model_copy(
+                    update={"schedules": {i: items_with_tags(people[i], s) for i, s in day.schedules.items()}}
+                )
                 for day in community.further_days
             ],
         }

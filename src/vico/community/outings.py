@@ -140,7 +140,7 @@ class Outings:
         if draft.day_off or (weekend and draft.status == "freelancer"):
             self._day_off(draft, day, wake)
         else:
-            ways = {"retired": self._retired, "freelancer": self._freelancer, "guest": self._guest}
+            ways = {"retired": self._plan_retired_day, "freelancer": self._freelancer, "guest": self._guest}
             ways.get(draft.status, self._after_work)(draft, day, wake, done)
         self._incline(draft, day, (wake + 60, 21 * 60 + 30))
 
@@ -248,7 +248,7 @@ class Outings:
                 (17 * 60 + 15, 20 * 60 + 30),
             )
 
-    def _retired(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
+    def _plan_retired_day(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
         rng = self._rng
         if rng.random() < 0.75:
             early = max(wake + 50, 7 * 60 + 50)

@@ -476,7 +476,7 @@ class Wardrobe:
         else:
             styles, weights = ["bald", "crop", "short", "curly", "bun", "bob"], [0.3, 1.5, 3, 1, 0.2, 0]
             if age > 50:
-                weights[0], weights[4] = 1.6, 0
+                weights = [1.6, 1.5, 3, 1, 0, 0]
             elif age < 18:
                 weights = [0, 1.2, 3, 1.2, 0, 0.3]
         return self._pick(styles, weights)

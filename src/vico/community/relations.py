@@ -25,9 +25,9 @@ from vico.community.model import Community, Relation, RelationKind
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex
 
-# Friends of an adult of middling extraversion where there are many to choose from, and the shape of their gamma
-# distribution; among few, this share of all others.
-_MANY, _SHAPE, _OF_FEW = 7.0, 2.6, 0.33
+_MANY = 7.0  # friends of an adult of middling extraversion where there are many to choose from
+_SHAPE = 2.6  # of the gamma distribution of how many friends adults have
+_OF_FEW = 0.33  # share of all others who are friends where there are few to choose from
 # Children have friends of their age, to within so many years; adults' friends thin out with the years between, scale.
 _CHILD_AGE_GAP, _YEARS_BETWEEN = 2, 9.0
 # Chance that a place in somebody's circle is filled by a friend of a friend.
@@ -176,10 +176,12 @@ _NEXT_DOOR = 40.0
 _RANK = list(RelationKind)
 # Children have friends from this age, years; friends are of one age, to within so many years.
 _FRIENDS_FROM, _SAME_AGE_YEARS = 3, 2
-# Of many at one workplace one knows so many to either side, this share of them across; pupils know so many teachers.
-_TEAM, _ACROSS, _TEACHERS = 3, 0.15, 2
-# How many one knows in a house, and next door; and the largest chance to know somebody next door.
-_KNOWN_IN_HOUSE, _KNOWN_NEXT_DOOR, _NEXT_DOOR_KNOWN = 5.0, 2.5, 0.5
+_TEAM = 3  # of many at one workplace one knows so many to either side
+_ACROSS = 0.15  # share of them that are rewired across
+_TEACHERS = 2  # that a pupil knows
+_KNOWN_IN_HOUSE = 5.0  # people one knows in a house
+_KNOWN_NEXT_DOOR = 2.5  # people one knows next door
+_NEXT_DOOR_KNOWN = 0.5  # the largest chance to know somebody next door
 
 
 def draw_relations(

@@ -306,7 +306,7 @@ class _Check:
     def day(self) -> None:
         """Check all that another day may have wrong."""
         for resident in self.community.residents:
-            self.known(resident)
+            self.known_places(resident)
             self.schedule(resident)
         self.found += households_of(self.community, self.index)
         self.groups()
@@ -355,7 +355,7 @@ class _Check:
                 "use the resident's age; gender 0 for female, 1 for male",
             )
 
-    def known(self, r: Resident) -> None:
+    def known_places(self, r: Resident) -> None:
         """Everywhere that somebody is, lives, works or meets is known to them."""
         used = {r.home, *([r.workplace] if r.workplace else []), *(i.place for i in r.schedule if i.place)}
         used |= {g.place for g in self.groups_of.get(r.id, ())}
@@ -425,7 +425,7 @@ class _Check:
             else:
                 self.stay(r, item, where)
                 if k and items[k - 1].type is not ItemType.COMMUTE:
-                    self.joined(items[k - 1], item, where)
+                    self.way_between(items[k - 1], item, where)
 
     def commute(self, r: Resident, k: int, where: str) -> None:
         items, item = r.schedule, r.schedule[k]
@@ -457,7 +457,7 @@ class _Check:
         elif given > SLACK * needed + SPARE:
             self.say(where, taking, "leave later or arrive earlier")
 
-    def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
+    def way_between(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
         places = self.index.place_by_id
         a, b = before.place, item.place
         if a in places and b in places and a is not None and b is not None and a != b:

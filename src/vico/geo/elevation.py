@@ -9,7 +9,7 @@ ground is flat, without a step where the files end.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -126,7 +126,9 @@ def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = 
             transformer = Transformer.from_crs(system, frame.proj4, always_xy=True)
             if not _reaches(reader.header, transformer, reach):
                 return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
-            for xyz, ground in _chunks(reader):
+            for points in reader.chunk_iterator(_CHUNK):
+                xyz = np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
+                ground = np.asarray(points.classification) == GROUND
                 x, y = transformer.transform(xyz[:, 0], xyz[:, 1])
                 column, row = np.floor(x / FINEST) + side, np.floor(-y / FINEST) + side
                 near = (column >= 0) & (column < 2 * side) & (row >= 0) & (row < 2 * side)
@@ -188,13 +190,6 @@ def _reaches(header: Any, transformer: Transformer, reach: float) -> bool:
     if not np.isfinite(there).all():
         return True  # the points will tell
     return bool((there.min(axis=0) < reach).all() and (there.max(axis=0) > -reach).all())
-
-
-def _chunks(reader: Any) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
-    """Coordinates of points, and which are ground."""
-    for points in reader.chunk_iterator(_CHUNK):
-        xyz = np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
-        yield xyz, np.asarray(points.classification) == GROUND
 
 
 def _raster(heights: NDArray[np.float64], frame: LocalFrame, west: float, north: float) -> Raster:
@@ -302,7 +297,11 @@ def read_elevation(
         cuts.sort(key=lambda cut: round(math.log(cut.spacing) / 0.02))
     covered = _coverage(cuts, frame, half)
     if not cuts or covered <= 0.0:
-        _refuse(given, rasters, frame, half)
+        raise EmptyInputError(
+            f"{given[0] if len(given) == 1 else 'elevation'}: nothing of the {2 * half:.0f} m square around "
+            f"{frame.lat}, {frame.lon} is there ({_extents(given, rasters)}); give files of this place, or leave "
+            "elevation out for flat ground"
+        )
     points, filled, counts = _merge_cuts(cuts, frame, half)
     beyond = ""
     if covered < 1.0:
@@ -351,15 +350,6 @@ def _coverage(cuts: Sequence[RasterCut], frame: LocalFrame, half: float) -> floa
         # One pixel beyond the outermost centres: there the fit still stands on something.
         covered |= (pixels > -1.0).all(axis=1) & (pixels < np.array([columns, rows])).all(axis=1)
     return float(covered.mean())
-
-
-def _refuse(paths: Sequence[Path], rasters: Sequence[Raster], frame: LocalFrame, half: float) -> None:
-    """Say what the files cover, since nothing of the window is among it."""
-    raise EmptyInputError(
-        f"{paths[0] if len(paths) == 1 else 'elevation'}: nothing of the {2 * half:.0f} m square around {frame.lat}, "
-        f"{frame.lon} is there ({_extents(paths, rasters)}); give files of this place, or leave elevation out for flat "
-        "ground"
-    )
 
 
 def _extents(paths: Sequence[Path], rasters: Sequence[Raster]) -> str:

@@ -31,8 +31,8 @@ _MOST_REPEATS = 2_000  # departures that one row of frequencies.txt may stand fo
 _MOST_DAYS = 3_660
 _MOST_BROKEN = 200
 _WEEK = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
-_TIME = re.compile(r"\s*(\d{1,3}):([0-5]?\d)(?::([0-5]?\d)(?:\.\d*)?)?\s*([ap])?\.?(?:m\.?)?\s*", re.IGNORECASE)
-_DATE = re.compile(r"(\d{4})(-?)(\d\d)\2(\d\d)")
+_TIME = re.compile(r"\s*(\d{1,3}):([0-5]?\d)(?::([0-5]?\d)(?:\.\d*)?)?\s*(?P<half>[ap])?\.?(?:m\.?)?\s*", re.IGNORECASE)
+_DATE = re.compile(r"(?P<year>\d{4})(?P<dash>-?)(?P<month>\d\d)(?P=dash)(?P<day>\d\d)")
 _COLOUR = re.compile(r"[0-9a-fA-F]{6}")
 _TRAMS = {0, 5, 12, *range(900, 907)}
 _COACHES, _BUSES = range(200, 210), {*range(700, 717), 800}  # extended types
@@ -105,17 +105,17 @@ def seconds_of(text: str) -> int | None:
     if match is None:
         return None
     hours = int(match[1])
-    if match[4] is not None:
+    if match["half"] is not None:
         if not 1 <= hours <= 12:
             return None
-        hours = hours % 12 + (12 if match[4] in "pP" else 0)
+        hours = hours % 12 + (12 if match["half"] in "pP" else 0)
     return hours * 3600 + int(match[2]) * 60 + int(match[3] or 0)
 
 
 def _date_of(text: str) -> date | None:
     match = _DATE.fullmatch(text)
     try:
-        return None if match is None else date(int(match[1]), int(match[3]), int(match[4]))
+        return None if match is None else date(*(int(match[part]) for part in ("year", "month", "day")))
     except ValueError:
         return None
 

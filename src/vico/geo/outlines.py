@@ -28,6 +28,7 @@ from vico.errors import SchemaError
 from vico.geo import overlay
 from vico.geo.frame import LocalFrame
 from vico.geo.overlay import OverlayError, polygons_of
+from vico.geometry import distances
 
 #: A building with more corners than this is simplified: OpenStreetMap allows 2,000 nodes a way.
 MOST_CORNERS = 1000
@@ -410,7 +411,7 @@ def _gaps(lines: Sequence[LineString]) -> _Rings:
     reach = np.inf if len(loose) <= _MOST_ENDS else GAP
     tree = cKDTree(loose)
     pairs = tree.query_pairs(min(reach, 1e9), output_type="ndarray")
-    widths = np.hypot(*(loose[pairs[:, 0]] - loose[pairs[:, 1]]).T)
+    widths = distances(loose[pairs[:, 0]], loose[pairs[:, 1]])
     paired: set[int] = set()
     for k in np.lexsort((pairs[:, 1], pairs[:, 0], widths)).tolist():
         ends = pairs[k].tolist()

@@ -52,7 +52,7 @@ class Origin(Record):
     north: float = 0.0
 
     @model_serializer(mode="wrap")
-    def _written(self, plain: SerializerFunctionWrapHandler) -> dict[str, float]:
+    def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, float]:
         """Only the tiles of a city are shifted; other worlds say nothing of it."""
         return {key: value for key, value in plain(self).items() if value or key in ("lat", "lon")}
 

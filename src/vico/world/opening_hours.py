@@ -313,10 +313,10 @@ def _within_days(text: str) -> tuple[str, list[int]] | None:
         moments |= {int(hour) * 60 + int(minute) for hour, minute in _ONE_TIME.findall(piece)}
     order = sorted(moments)
 
-    def ranked(found: re.Match[str]) -> str:
+    def rank_as_clock(found: re.Match[str]) -> str:
         return _clock(_NOON + order.index(int(found[1]) * 60 + int(found[2])))
 
-    pieces[::2] = [_ONE_TIME.sub(ranked, piece) for piece in pieces[::2]]
+    pieces[::2] = [_ONE_TIME.sub(rank_as_clock, piece) for piece in pieces[::2]]
     return "".join(pieces), order
 
 

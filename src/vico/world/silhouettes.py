@@ -294,10 +294,10 @@ class CitySilhouettes:
         place = tile.column, tile.row
         if place not in self._known:
             shift = TileShift.of(self._city, place)
-            self._known[place] = [shift.surface(surface) for surface in self._kept(tile)]
+            self._known[place] = [shift.surface(surface) for surface in self._load_or_make(tile)]
         return self._known[place]
 
-    def _kept(self, tile: CityTile) -> list[Surface]:
+    def _load_or_make(self, tile: CityTile) -> list[Surface]:
         """Return a tile's silhouette in its own frame: the kept one, or a new one that is kept."""
         path = cache_folder() / "silhouettes" / f"{tile.digest[:32]}.{_VERSION}.npz"
         known = _read(path)

@@ -137,10 +137,13 @@ STEP = 0.5
 ACROSS_REACH = 0.36
 #: Length of a tram, metres.
 TRAM_LENGTH = TRAM_SECTIONS * TRAM_SECTION
-#: Metres a second at most in a street, and metres a second squared that trams speed up and brake with, and that
-#: who stands in one is to feel at most in a bend.
-TRAM_SPEED, TRAM_ACCELERATION, TRAM_BRAKING = 9.0, 1.0, 1.1
-_SIDEWAYS = 0.9
+#: Speed of trams in a street at most, m/s.
+TRAM_SPEED = 9.0
+#: What trams speed up with, m/s².
+TRAM_ACCELERATION = 1.0
+#: What trams brake with, m/s².
+TRAM_BRAKING = 1.1
+_SIDEWAYS = 0.9  # m/s² that who stands in a tram is to feel at most in a bend
 _SLOWEST = 2.5  # m/s, however tight the bend
 #: Doors on both sides of a section, metres ahead of its middle.
 TRAM_DOORS = (2.3, -2.3)

@@ -34,8 +34,9 @@ _MOVES = np.array([0.0, 0.1, 0.6, 1.5])  # what it costs to move by so many line
 _APART = 0.56  # metres of room that two need to pass each other
 _EACH_WAY = 2.0  # metres before and after a narrow place that are as narrow: walkers look so far ahead
 _LEAST = 0.05
-# What it costs at a place to be too near to an edge or below, by metre, and metres.
-_BELOW, _DEEPER, _DEEPEST = 0.1, 0.4, 0.5
+_BELOW = 0.1  # what it costs at a place to be too near to an edge or below
+_DEEPER = 0.4  # and what it costs more by metre
+_DEEPEST = 0.5  # metres; what is deeper costs no more
 _NEARER = 0.2  # metres that they come nearer to an edge where they have little room
 _ROUND = 0.05  # metres to which room is rounded that a kerb leaves
 
@@ -404,8 +405,15 @@ class _Line:
         return self.depth(self.room) is not None
 
     def depth(self, bend: float) -> Floats | None:
-        """Return by how many metres each place across it is too near to an edge, or below it; None: none is."""
-        return _depth(self.points, self.normals, bend, self.ground)
+        """Return by how many metres each place across it is too near to an edge, or below it; None: none is.
+
+        Shape ``(places, columns)``; the columns are those of `columns_within`.
+        """
+        if self.ground is None or self.ground.steps is None:
+            return None
+        across = self.points[:, None, :] + columns_within(bend)[None, :, None] * self.normals[:, None, :]
+        depth = _OFF_EDGE - self.ground.edge_distance(across)
+        return depth if (depth > 0.0).any() else None
 
 
 def _led_past(line: _Line, free: list[list[Interval]], bend: float, tree: shapely.STRtree) -> list[ClearCourse]:
@@ -489,18 +497,6 @@ def _free(blocked: list[Interval], reach: float) -> list[Interval]:
     if begin < reach:
         free.append((begin, reach))
     return free
-
-
-def _depth(points: Floats, normals: Floats, room: float, ground: HeightField | None) -> Floats | None:
-    """Return by how many metres each place across a line is too near to an edge, or below it; None: none is.
-
-    Shape ``(places, columns)``; the columns are those of `columns_within`.
-    """
-    if ground is None or ground.steps is None:
-        return None
-    across = points[:, None, :] + columns_within(room)[None, :, None] * normals[:, None, :]
-    depth = _OFF_EDGE - ground.edge_distance(across)
-    return depth if (depth > 0.0).any() else None
 
 
 def _courses(line: _Line, free: list[list[Interval]], bend: float, depth: Floats | None) -> list[ClearCourse]:

@@ -168,7 +168,7 @@ class _CharacterJudge:
 
     def _day(self, person: Resident) -> list[str]:
         """Say whether somebody could not live the plain day of such a life."""
-        if person.id in self._lives.cast.coupled:
+        if person.id in self._lives.cast.tied_to_small_children:
             return []
         fitted = self._lives.plain_day(person.id, self._lives.cast.base.groups_of(person.id))
         return [f"{person.id}.workplace: its hours don't go with the rest of a day: {one}" for one in fitted.findings]
@@ -216,7 +216,7 @@ def write_days(
         By id, the days that the model planned; an item a resident, in their order; the questions.
     """
     cast = lives.cast
-    asked = [r.id for r in cast.base.residents if r.id not in cast.coupled and r.id not in unasked]
+    asked = [r.id for r in cast.base.residents if r.id not in cast.tied_to_small_children and r.id not in unasked]
     judge = _DayJudge(lives, groups)
     drafts = [_day_question(prompt, lives, name, groups.get(name, ())) for name in asked]
     desk.settle("days", drafts, judge)
@@ -225,7 +225,11 @@ def write_days(
     for resident in cast.base.residents:
         name, draft = f"{resident.id}.schedule", by_id.get(resident.id)
         if draft is None:
-            why = "goes together with a small child's day" if resident.id in cast.coupled else "named by the validator"
+            why = (
+                "goes together with a small child's day"
+                if resident.id in cast.tied_to_small_children
+                else "named by the validator"
+            )
             items.append(AuthoredItem(item=name, origin=Origin.NOT_ASKED, detail=why))
         else:
             day = judge.days.get(resident.id)

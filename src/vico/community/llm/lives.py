@@ -60,7 +60,7 @@ class Stay:
         return self.end - self.start
 
     @property
-    def moved(self) -> int:
+    def shift_minutes(self) -> int:
         """By how many minutes its start or end was moved."""
         return 0 if self.planned is None else max(abs(self.start - self.planned[0]), abs(self.end - self.planned[1]))
 
@@ -178,7 +178,7 @@ class DayFitter:
             findings += [finding] if finding else []
         if findings:
             return FittedDay([], findings)
-        return FittedDay(self._items(line), [], max(stay.moved for stay in line))
+        return FittedDay(self._items(line), [], max(stay.shift_minutes for stay in line))
 
     def _end(self, line: list[Stay]) -> str:
         """Spend what is left of the day where one is, or at home."""
@@ -390,7 +390,7 @@ class Lives:
         fitted = DayFitter(self.cast.index, person).fit(movable, fixed, drop=drop)
         if fitted.findings:
             return fitted
-        items = [self._tagged(item, person, groups) for item in fitted.items]
+        items = [self._with_tag(item, person, groups) for item in fitted.items]
         known = dict.fromkeys([*person.known_places, *(i.place for i in items if i.place), *(g.place for g in groups)])
         whole = person.model_copy(update={"schedule": items, "known_places": list(known)})
         found = self.findings(whole, "schedule")
@@ -407,7 +407,7 @@ class Lives:
         lessons = self.lessons(resident)
         return self.day(self.people[resident], self.plain_stays(resident), groups, others=lessons, drop=True)
 
-    def _tagged(self, item: ScheduleItem, person: Resident, groups: Sequence[Group]) -> ScheduleItem:
+    def _with_tag(self, item: ScheduleItem, person: Resident, groups: Sequence[Group]) -> ScheduleItem:
         if item.tag is not None:
             return item
         tag = tag_of(item, person, groups, self.cast.index.place_by_id)

@@ -25,8 +25,9 @@ from vico.errors import InputError
 from vico.llm.prompts import Prompt
 from vico.world.model import Category
 
-# People of a question, meeting places in it, people a group.
-_BATCH, _PLACES, _A_GROUP = 20, 24, 4
+_BATCH = 20  # people of a question
+_PLACES = 24  # meeting places in it
+_A_GROUP = 4  # people a group
 _MEETING_PLACES = (Category.OPEN, Category.FOOD, Category.ENTERTAINMENT, Category.OFFICE)
 # Minutes a meeting takes; when the first one of a day may begin, minute of the day.
 _EARLIEST = 6 * 60
@@ -69,7 +70,9 @@ def write_network(
     """
     cast = lives.cast
     people = [
-        r.id for r in cast.base.residents if r.age >= GROWN_UP and r.id not in cast.coupled and r.id not in unasked
+        r.id
+        for r in cast.base.residents
+        if r.age >= GROWN_UP and r.id not in cast.tied_to_small_children and r.id not in unasked
     ]
     # Batches of about the same size, none of one person alone.
     count = -(-len(people) // _BATCH)
@@ -175,14 +178,14 @@ class _NetworkJudge:
 
     def __call__(self, draft: ModelDraft[SocialNetwork]) -> list[str]:
         findings: list[str] = []
-        self._kept(draft, findings)
+        self._keep_holding(draft, findings)
         return findings
 
     def sound(self, draft: ModelDraft[SocialNetwork]) -> Network:
         """Return what is without fault in a draft."""
-        return self._kept(draft, [])
+        return self._keep_holding(draft, [])
 
-    def _kept(self, draft: ModelDraft[SocialNetwork], findings: list[str]) -> Network:
+    def _keep_holding(self, draft: ModelDraft[SocialNetwork], findings: list[str]) -> Network:
         assert draft.value is not None
         kept = Network()
         for k, reply in enumerate(draft.value.groups):

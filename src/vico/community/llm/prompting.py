@@ -159,12 +159,12 @@ class ModelDesk:
     def _ask(self, draft: ModelDraft[T]) -> None:
         """Ask one question and note what came, or why nothing did."""
         if self.over:
-            self._unanswered(draft, self.over)
+            self._mark_unanswered(draft, self.over)
             return
         try:
             reply = self.model.ask(draft.messages, draft.reply, rounds=self.rounds)
         except LlmReplyError as error:
-            self._heard()
+            self._count_answer()
             if draft.origin is not Origin.NOT_GROUNDED:
                 draft.origin = Origin.UNUSABLE
                 draft.detail = (error.findings[0] if error.findings else "")[:_MOST_DETAIL]
@@ -178,17 +178,17 @@ class ModelDesk:
             if hopeless:
                 self._give_up(draft, str(error))
             else:
-                self._unanswered(draft, str(error))
+                self._mark_unanswered(draft, str(error))
         except InputError as error:
             if not self.model.replays:
                 raise
             # What the server did not answer when the calls were recorded is not in the recording.
-            self._unanswered(draft, str(error))
+            self._mark_unanswered(draft, str(error))
         else:
-            self._heard()
+            self._count_answer()
             draft.value, draft.origin, draft.detail, draft.told = reply.value, Origin.WRITTEN, "", ""
 
-    def _heard(self) -> None:
+    def _count_answer(self) -> None:
         with self._lock:
             self._failed = 0
             self.answers += 1
@@ -196,10 +196,10 @@ class ModelDesk:
     def _give_up(self, draft: ModelDraft[Any], why: str) -> None:
         with self._lock:
             self.over = self.over or why
-        self._unanswered(draft, why)
+        self._mark_unanswered(draft, why)
 
     @staticmethod
-    def _unanswered(draft: ModelDraft[Any], why: str) -> None:
+    def _mark_unanswered(draft: ModelDraft[Any], why: str) -> None:
         if draft.origin is not Origin.NOT_GROUNDED:
             draft.origin = Origin.NO_ANSWER
         draft.told = why
@@ -209,7 +209,9 @@ class ModelDesk:
 Percent = Annotated[int, Field(ge=0, le=100)]
 
 # The longest lists that are read: what is longer is no draft but a model that does not end.
-_MOST_ACTIVITIES, _MOST_GROUPS, _MOST_TIES = 48, 40, 120
+_MOST_ACTIVITIES = 48
+_MOST_GROUPS = 40
+_MOST_TIES = 120
 
 
 class _Reply(BaseModel):
@@ -442,7 +444,7 @@ class Cast:
         return list(found.values())
 
     @cached_property
-    def coupled(self) -> frozenset[str]:
+    def tied_to_small_children(self) -> frozenset[str]:
         """Ids of small children and of those who take them: their days go together, minute by minute, and stay."""
         found: set[str] = set()
         for household in self.households:
@@ -531,7 +533,7 @@ class Cast:
 
     def keeps_work(self, resident: Resident) -> bool:
         """Whether somebody's occupation is settled: children's, and that of who takes small ones somewhere."""
-        return resident.age < GROWN_UP or resident.id in self.coupled
+        return resident.age < GROWN_UP or resident.id in self.tied_to_small_children
 
     def home_in_words(self, resident: Resident) -> str:
         """Return where somebody lives."""

@@ -47,7 +47,7 @@ class CoplanarPairs:
     area: NDArray[np.float64]
     same: NDArray[np.bool_]
 
-    def chosen(self, which: NDArray[np.bool_]) -> CoplanarPairs:
+    def where(self, which: NDArray[np.bool_]) -> CoplanarPairs:
         """Return some of the pairs; `which` has shape ``(n,)``."""
         return CoplanarPairs(self.first[which], self.second[which], self.area[which], self.same[which])
 
@@ -400,4 +400,4 @@ def overlapping_faces(
     whose = np.stack([np.minimum(one, other), np.maximum(one, other)], axis=1)
     keys, index = np.unique(whose, axis=0, return_inverse=True)
     seen = np.bincount(index.ravel(), weights=pairs.area, minlength=len(keys)) >= _SEEN
-    return {(int(keys[k, 0]), int(keys[k, 1])): pairs.chosen(index.ravel() == k) for k in np.flatnonzero(seen).tolist()}
+    return {(int(keys[k, 0]), int(keys[k, 1])): pairs.where(index.ravel() == k) for k in np.flatnonzero(seen).tolist()}

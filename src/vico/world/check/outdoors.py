@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
-from vico.geometry import distances
+from vico.geometry import direction, distances
 from vico.rules import BUS_DOOR_REACH, BUS_DOORS_BEHIND_FRONT, BUS_WIDTH, TRAM_SECTIONS
 from vico.world.check.buildings import outline_of
 from vico.world.heights import HeightField
@@ -110,8 +110,7 @@ def entrance_findings(
         yield WorldFinding("entrance blocked", door.id, "its approach can't be reached on foot from the map's edge")
     if abs(float(height(door.position)) - door.position[2]) > 0.05:
         yield WorldFinding("entrance not seated", door.id, "it is not at ground level")
-    out = np.array([[math.cos(door.facing), math.sin(door.facing)]])
-    if bool(faces_into(outline, np.array([door.position[:2]]), out)[0]):
+    if bool(faces_into(outline, np.array([door.position[:2]]), direction(door.facing)[None])[0]):
         yield WorldFinding("entrance turned", door.id, "it faces into the building")
 
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import polyline_length
 from vico.rules import BIKE_SPEED
 from vico.world.model import Point2
 from vico.world.routing import Router
@@ -212,7 +213,7 @@ def find_way(
     path = router.path(start, goal, blocked=blocked, often=often)
     if path is None:
         return NO_WAY
-    return Way(path, round(float(np.hypot(*np.diff(path, axis=0).T).sum()), 3))
+    return Way(path, round(polyline_length(path), 3))
 
 
 class KnownWays:
@@ -312,7 +313,7 @@ class Ways:
         row, known = self._known.arrays()
         return self._ground._replace(row=row, known=known)
 
-    def known(self, a: int, b: int) -> bool:
+    def is_known(self, a: int, b: int) -> bool:
         """Whether the way is known, and not a bound."""
         return self._get(a, b) is not None
 
