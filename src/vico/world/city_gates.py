@@ -236,7 +236,7 @@ class WindowSearch:
         last = self._search(start, goals)
         if last < 0:
             return None
-        cells, costs = self._found(int(self.own(np.array([start]))[0]), last)
+        cells, costs = self._walk_between(int(self.own(np.array([start]))[0]), last)
         side = self._cost.shape[1]
         return (cells // side + self._row) * self._width + cells % side + self._column, costs
 

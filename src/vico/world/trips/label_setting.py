@@ -269,15 +269,15 @@ class _LegOffer(NamedTuple):
         Of the ride: line, first and last stop.
     """
 
-    parent: int
-    node: int
+    parent: int | np.int64
+    node: int | np.int64
     depart: float
     arrive: float
     metres: float
-    price: int
-    line: int
+    price: int | np.int64
+    line: int | np.int64
     first: int
-    last: int
+    last: int | np.int64
 
 
 @compiled
