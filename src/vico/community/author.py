@@ -25,7 +25,7 @@ from vico.community.model import (
     WorldIdentity,
     with_tags,
 )
-from vico.community.people import POCKET_MONEY, Household, ResidentDraft, draw_character, draw_households
+from vico.community.people import POCKET_MONEY, ResidentDraft, draw_character, draw_households
 from vico.community.place_index import PlaceIndex
 from vico.community.profiles import Biographer, Wardrobe, honest_character, lifestyle_of
 from vico.community.relations import draw_relations
@@ -242,7 +242,15 @@ def _residents(
 ) -> list[Resident]:
     """Write everybody down, with the first day on foot, but for what is said of them."""
     index, households, drafts = planned.index, planned.households, planned.people
-    looks = _looks(stream("looks"), households)
+    wardrobe = Wardrobe(stream("looks"))
+    looks: dict[str, ResidentAppearance] = {}
+    for household in households:
+        for k, member in enumerate(household.members):
+            # Children take after their parents, relatives who live together otherwise after the first of them.
+            parents = [looks[adult.id] for adult in household.adults] if member.child else []
+            if household.kind in ("parent", "siblings") and k > 0:
+                parents = [looks[household.members[0].id]]
+            looks[member.id] = wardrobe.look_of(member, parents)
     spawns = index.spawn_points([s.home for s in drafts])
     joined = meetings_by_member(meetings)
     people = []
@@ -290,18 +298,6 @@ def _absent(meetings: Sequence[Meeting], groups: Sequence[Group], day: DaySchedu
         if absent := [member for member in group.members if member not in here]:
             found[group.id] = absent
     return found
-
-
-def _looks(chance: np.random.Generator, households: Sequence[Household]) -> dict[str, ResidentAppearance]:
-    wardrobe = Wardrobe(chance)
-    looks: dict[str, ResidentAppearance] = {}
-    for household in households:
-        for k, draft in enumerate(household.members):
-            parents = [looks[adult.id] for adult in household.adults] if draft.child else []
-            if household.kind in ("parent", "siblings") and k > 0:
-                parents = [looks[household.members[0].id]]
-            looks[draft.id] = wardrobe.look_of(draft, parents)
-    return looks
 
 
 def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:

@@ -177,6 +177,12 @@ def read_community(path: Path, world: World | None = None) -> Community:
             f"{path}: made for world {manifest.world.name!r} ({manifest.world.digest[:12]}), not for "
             f"{world.manifest.name!r} ({world.digest[:12]}); give that world, or build a community for this one"
         )
+    authorship = None
+    if _AUTHORSHIP in manifest.files:
+        try:
+            authorship = Authorship.model_validate_json(_content(path / _AUTHORSHIP, manifest))
+        except ValidationError as error:
+            raise _invalid(path / _AUTHORSHIP, error) from None
     community = Community(
         producer=manifest.producer,
         author=manifest.author,
@@ -186,7 +192,7 @@ def read_community(path: Path, world: World | None = None) -> Community:
         residents=_records(path / "residents.json", Resident, manifest),
         groups=_records(path / "groups.json", Group, manifest),
         relations=_records(path / "relations.json", Relation, manifest),
-        authorship=_authorship(path / _AUTHORSHIP, manifest) if _AUTHORSHIP in manifest.files else None,
+        authorship=authorship,
         further_days=_records(path / "days.json", CommunityDay, manifest) if "days.json" in manifest.files else [],
     )
     # Folders of earlier versions, and days that a language model wrote, may say nothing about what an item is about.
@@ -220,13 +226,6 @@ def world_of(path: Path) -> Path | None:
 def _records(path: Path, kind: type[R], manifest: CommunityManifest) -> list[R]:
     try:
         return TypeAdapter(list[kind]).validate_json(_content(path, manifest))  # type: ignore[valid-type]
-    except ValidationError as error:
-        raise _invalid(path, error) from None
-
-
-def _authorship(path: Path, manifest: CommunityManifest) -> Authorship:
-    try:
-        return Authorship.model_validate_json(_content(path, manifest))
     except ValidationError as error:
         raise _invalid(path, error) from None
 

@@ -215,12 +215,6 @@ def plan_care(rng: np.random.Generator, index: PlaceIndex, households: Sequence[
     return found
 
 
-def _doors(index: PlaceIndex, place: Place) -> list[Span]:
-    """Return when parents find somebody at a school, minutes: as it says, else somewhat longer than is usual."""
-    given = index.given_hours(place)
-    return staffed_spans(index.hours(place)) if given is None else given
-
-
 def _plan_stops(index: PlaceIndex, care: Care) -> bool:
     """Set when the carer comes to which school; False if that can't be done."""
     lessons = [child.lessons for child in care.small if child.lessons is not None and child.lessons.place is not None]
@@ -228,7 +222,13 @@ def _plan_stops(index: PlaceIndex, care: Care) -> bool:
     care.stops = sorted(begin, key=lambda place: (begin[place], place))
     if not care.stops:
         return True
-    hours = [_doors(index, index.place_by_id[stop]) for stop in care.stops]
+    # Parents find somebody at a school when it says, else for somewhat longer than its usual hours.
+    schools = [index.place_by_id[stop] for stop in care.stops]
+    given = [index.given_hours(school) for school in schools]
+    hours = [
+        staffed_spans(index.hours(school)) if spans is None else spans
+        for school, spans in zip(schools, given, strict=True)
+    ]
     walks = [index.minutes(a, b) for a, b in zip(care.stops, care.stops[1:], strict=False)]
     if None in walks:
         return False

@@ -518,13 +518,10 @@ class _Reader:
 
 def _counts_in_words(kinds: Counter[str], names: Mapping[str, str], column: str) -> str:
     """Return counts by kind in words, the most frequent first."""
-    shown = [f"{count:,} of {column} {kind or 'empty'}{_in_words(kind, names)}" for kind, count in kinds.most_common(4)]
+    words = {kind: f" ({name})" for kind, name in names.items()}
+    shown = [f"{count:,} of {column} {kind or 'empty'}{words.get(kind, '')}" for kind, count in kinds.most_common(4)]
     more = [f"{len(kinds) - 4} more kinds"] if len(kinds) > 4 else []
     return ", ".join(shown + more)
-
-
-def _in_words(kind: str, names: Mapping[str, str]) -> str:
-    return f" ({names[kind]})" if kind in names else ""
 
 
 def _interpolate_times(trip: _Trip) -> str | None:

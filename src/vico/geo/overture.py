@@ -200,7 +200,9 @@ def read_overture_buildings(path: Path, frame: LocalFrame, half: float, crs: str
                 parts.setdefault(f"{OVERTURE}:{_word(row['building_id'], 80)}", []).append((shape, tags))
                 continue
             buildings[name] = FoundBuilding(name, OVERTURE, path.name, shape, tags)
-            credits.update(_datasets(row))
+            for source in row.get("sources") or ():
+                if isinstance(source, dict) and (dataset := _word(source.get("dataset"))):
+                    credits.add("© OpenStreetMap contributors" if dataset == "OpenStreetMap" else dataset)
             if len(buildings) > _MOST_BUILDINGS:
                 raise SchemaError(
                     f"{file}: more than {_MOST_BUILDINGS:,} buildings in the window; this is no real place"
@@ -258,13 +260,6 @@ def _tags(row: dict[str, Any]) -> dict[str, str]:
 
 def _word(value: Any, longest: int = 60) -> str:
     return " ".join(value.split())[:longest] if isinstance(value, str) else ""
-
-
-def _datasets(row: dict[str, Any]) -> Iterator[str]:
-    """Names of the data sets that a row was made of."""
-    for source in row.get("sources") or ():
-        if isinstance(source, dict) and (name := _word(source.get("dataset"))):
-            yield "© OpenStreetMap contributors" if name == "OpenStreetMap" else name
 
 
 LEAST_CONFIDENCE = 0.5

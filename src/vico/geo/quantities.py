@@ -185,7 +185,10 @@ def _read(text: str, kind: Kind) -> Reading:
         return Reading(float(sum(map(int, said.split("+")))), "; ".join([*rules, "added up"]))
     if kind is Kind.STOREYS and (summed := _sum_of_storeys(said)) is not None:
         return Reading(summed.value, "; ".join([*rules, summed.rule]))
-    pieces = [piece for piece in _several(said, kind) if piece]
+    if kind is Kind.STOREYS and not re.fullmatch(r"\d+,(?:50?|25|75)", said):
+        # Halves and quarters are all the fractions there are: "1,2" lists two values, "1,5" is one and a half.
+        said = said.replace(",", ";")
+    pieces = [piece for piece in _SEVERAL.split(said.strip(" ,")) if piece]
     readings = [_one(piece, kind) for piece in pieces]
     if not readings or any(one is None for one in readings):
         return Reading(None)
@@ -204,14 +207,6 @@ class _Piece:
     number: float
     unit: str
     rule: str = ""
-
-
-def _several(said: str, kind: Kind) -> list[str]:
-    """Part a list or a range into its values."""
-    if kind is Kind.STOREYS and not re.fullmatch(r"\d+,(?:50?|25|75)", said):
-        # Halves and quarters are all the fractions there are: "1,2" lists two values, "1,5" is one and a half.
-        said = said.replace(",", ";")
-    return _SEVERAL.split(said.strip(" ,"))
 
 
 def _one(piece: str, kind: Kind) -> _Piece | None:

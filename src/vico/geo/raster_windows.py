@@ -210,7 +210,9 @@ def without_voids(heights: NDArray[np.float64], spacing: float) -> tuple[NDArray
             steps = _steps(given[reach], patch, value)
             if steps is None:
                 continue
-            row, column = _middle(patch)
+            places = np.argwhere(patch)
+            middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
+            row, column = places[middle].tolist()
             found = Patch(
                 row + reach[0].start, column + reach[1].start, value, int(sizes[number]), float(np.median(steps))
             )
@@ -262,13 +264,6 @@ def _with_mixed(heights: NDArray[np.float64], patch: NDArray[np.bool_], value: f
     beside = near & ~patch & np.isfinite(heights)
     mixed = beside & (away < _MIXED * ground)
     return near if mixed.sum() > _MANY_MIXED * beside.sum() else patch
-
-
-def _middle(patch: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the row and column of the pixel of a patch that is nearest to its middle."""
-    places = np.argwhere(patch)
-    nearest = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
-    return int(places[nearest, 0]), int(places[nearest, 1])
 
 
 _LOWEST, _HIGHEST = -1000.0, 9000.0  # SRTM's void is -32768, others use -9999; no dry land lies under -430 m
