@@ -64,7 +64,7 @@ def walking_factor(snow_cover: float, ice: float) -> float:
 
 
 class ActionStatus(IntEnum):
-    """How the last action went. Observations give the name in lower case, as ``action_status``."""
+    """Outcome of the last action. Observations give the name in lower case, as ``action_status``."""
 
     OK = 0
     COLLISION = 1

@@ -410,7 +410,7 @@ _NOT_LEISURE = (ActivityTag.WORK, ActivityTag.STUDY, ActivityTag.SLEEP, Activity
 
 @dataclass(frozen=True)
 class DayMeasures:
-    """What somebody's days come to, means over the days.
+    """Measures of somebody's days, means over the days.
 
     Attributes
     ----------

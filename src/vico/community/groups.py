@@ -43,7 +43,7 @@ class Meeting:
 
 
 class _Attendance:
-    """Who likes which of some meetings, and who is free for it, as arrays of all people.
+    """Liking and free time of all people for some meetings, as arrays.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class _Attendance:
                 self._free[k] &= ~children
 
     def likes(self, k: int) -> NDArray[np.float64]:
-        """How much a meeting appeals to everybody, 0 to whom it does not or who is not free; shape ``(people,)``."""
+        """Return how much all like a meeting, 0 for those who do not or are not free; shape ``(people,)``."""
         return np.where(self._free[k], self._likes[self._names[k]], 0.0)
 
     def join(self, person: int, group: Meeting) -> None:
@@ -94,7 +94,7 @@ class _Attendance:
 
 @dataclass(frozen=True)
 class _Timetable:
-    """When people can be where, as arrays of all people.
+    """Free time and places of all people, as arrays.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def can_come(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: 
 
 
 def _liking(draft: ResidentDraft, circle: Circle) -> float:
-    """How much a circle appeals to somebody; 0 if it is not for them."""
+    """Return how much a circle appeals to somebody; 0 if it is not for them."""
     late = draft.shift is not None and draft.shift[0] >= 12 * 60
     off = draft.shift is None and draft.status in ("worker", "student")
     if draft.status not in circle.statuses and not (late or off):
@@ -302,7 +302,7 @@ class _Forming:
             self._form_group(ranking, k, self._size)
 
     def admit_lonely(self) -> None:
-        """Let those who are in no group join the one they like best among those they can come to."""
+        """Add those who are in no group to the one they like best among those they can come to."""
         attendance = _Attendance(self._index, self.groups, self._drafts)
         likes = np.array([attendance.likes(k) for k in range(len(self.groups))]).reshape(-1, len(self._drafts))
         sizes = np.array([len(group.members) for group in self.groups])
@@ -486,7 +486,7 @@ def form_playmates(rng: np.random.Generator, index: PlaceIndex, cares: Sequence[
 
 
 def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
-    """Let a carer whose children were at home all day be there in time, and come back with them."""
+    """Plan that a carer whose children were at home all day is there in time and comes back with them."""
     if care.carer.duties:
         return
     leave = meeting.start - (index.minutes(care.carer.home, meeting.place.id) or 0)
@@ -498,7 +498,7 @@ def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
 
 
 def come_to_play(index: PlaceIndex, cares: Sequence[Care], usual: Meeting, meeting: Meeting) -> None:
-    """Let the families of a group come to its meeting on another day, if that suits them.
+    """Add the families of a group to its meeting on another day, if that suits them.
 
     Parameters
     ----------
@@ -538,7 +538,7 @@ def _playtime_options(
 
 
 def _at_home(index: PlaceIndex, care: Care) -> Meeting:
-    """Let playmates come to somebody's home, as soon as they are fetched."""
+    """Return a meeting of playmates at somebody's home, as soon as they are fetched."""
     circle = playmates_circle()
     home, ready = index.place_by_id[care.carer.home], _ready(care)
     start = next((s for s in sorted(circle.starts) if s >= ready), -(-ready // 5) * 5)

@@ -46,7 +46,7 @@ _ON_FOOT = 1.5
 
 @dataclass(frozen=True)
 class Habits:
-    """What getting about costs somebody, in seconds of their time spent sitting.
+    """Costs of getting about for one person, in seconds of their time spent sitting.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ def with_rides(
     index: PlaceIndex,
     stream: Callable[[str], np.random.Generator],
 ) -> list[Resident]:
-    """Let residents take buses, trams or bicycles on the ways of their day where that costs them less than to walk.
+    """Put rides with buses, trams or bicycles into days where they cost residents less than to walk.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class _Ride:
 
 @dataclass(frozen=True)
 class _Means:
-    """What there is to ride in a world.
+    """Means of transport of a world.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an author and the validator need to know of a world: which places can be reached, how far, and when.
+"""Index of the places of a world for authors and the validator: which can be reached, how far, and when.
 
 Places are open when the map says so, else at the usual hours of their kind. Usual hours are data:
 ``vico/data/community/hours.toml`` and a user's own files. What is indoors at places is kept in numbers: a city has
@@ -127,7 +127,7 @@ def _week(path: Path, where: str, text: str) -> list[list[Span]]:
 
 
 def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
-    """When a place of this kind is usually open on a day, minutes; empty where it is closed.
+    """Return when a place of this kind is usually open on a day, minutes; empty where it is closed.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
 
 
 def stated_hours(place: Place, date: Date, coordinates: Coordinates, *, holidays: bool = True) -> list[Span] | None:
-    """When a place says that it is open on a date, minutes; None if it says nothing that can be read.
+    """Return when a place says that it is open on a date, minutes; None if it says nothing that can be read.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def stated_hours(place: Place, date: Date, coordinates: Coordinates, *, holidays
 
 
 def hours_on(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
-    """When a place is open on a date, minutes: what it says, else what is usual for its kind."""
+    """Return when a place is open on a date, minutes: what it says, else what is usual for its kind."""
     given = stated_hours(place, date, coordinates)
     return usual_spans(place.kind, place.category, customary_weekday(date, coordinates)) if given is None else given
 
@@ -280,7 +280,7 @@ class PlaceIndex:
         )
 
     def beds(self, place: Place) -> int:
-        """How many people can lie in the beds of a place: wide beds are for two."""
+        """Return how many people can lie in the beds of a place: wide beds are for two."""
         return int(self._rooms.beds[self.spot[place.id]])
 
     def floor_area(self, place: Place) -> float:
@@ -387,11 +387,11 @@ class PlaceIndex:
         return reachable, np.array([self.spot[p.id] for p in reachable], np.int64)
 
     def given_hours(self, place: Place) -> list[Span] | None:
-        """When the place says it is open on the day, minutes; None if it doesn't say, or not in a form we read."""
+        """Return the stated opening hours of the day, minutes; None if there are none, or none that can be read."""
         return stated_hours(place, self.date, self.coordinates, holidays=self.holidays)
 
     def hours(self, place: Place) -> list[Span]:
-        """When a place is open on the day, minutes: what it says, else what is usual for its kind."""
+        """Return when a place is open on the day, minutes: what it says, else what is usual for its kind."""
         key = place.id, self.date, self.holidays
         if key not in self._hours:
             given = self.given_hours(place)

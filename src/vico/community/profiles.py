@@ -184,7 +184,7 @@ class Biographer:
 
 
 def address(place: Place) -> str:
-    """Where a home is, as one says it: "at Mikonkatu 3", "in the apartments on Unioninkatu", "at Hotel Torni"."""
+    """Return an address as one says it: "at Mikonkatu 3", "in the apartments on Unioninkatu", "at Hotel Torni"."""
     head, _, rest = place.name.partition(", ")
     if head.lower() == "apartments" and rest:
         return f"at {rest}"
@@ -257,7 +257,7 @@ _GUIDE = "docs/adding_people.md"
 
 
 class TradeClothes(DataRecord):
-    """What is worn at some trades, as the fields of an appearance; of several values one is drawn.
+    """Clothes of some trades, as the fields of an appearance; of several values one is drawn.
 
     Attributes
     ----------

@@ -398,7 +398,7 @@ def _neighbours(
 
 
 def describe_household(household: Household, draft: ResidentDraft, relations: Mapping[str, str]) -> str:
-    """Who somebody lives with, as the end of a sentence; empty for those who live alone."""
+    """Return who somebody lives with, as the end of a sentence; empty for those who live alone."""
     others = [m for m in household.members if m is not draft]
     if not others:
         return ""

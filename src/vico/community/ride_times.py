@@ -110,7 +110,7 @@ class RideTrip:
 
 
 class _Ends:
-    """Where rides of a mode begin and end, and the ways to and from there.
+    """Ends of the rides of a mode, and the ways to and from there.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ class RideTimes:
 
 
 def _seconds(way: Walk, speed: float) -> float:
-    """How long a way takes, with a moment at every corner."""
+    """Return how long a way takes, with a moment at every corner."""
     return way.metres / speed + TURN * way.corners
 
 

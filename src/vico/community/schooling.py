@@ -104,7 +104,7 @@ def _to_school(
 
 
 def learn_at_home(index: PlaceIndex, child: ResidentDraft) -> None:
-    """Let a child learn at home."""
+    """Plan lessons at home."""
     child.occupation, child.workplace, child.shift = childhood().home_school.title, None, None
     child.lessons = Lessons(None, None, *_HOME_LESSONS) if index.weekday in SCHOOL_DAYS else None
 
@@ -159,7 +159,7 @@ def hours_between_school_runs(
 
 @dataclass
 class Care:
-    """What a grown-up does for the small children of a household on a school day.
+    """Care of a grown-up for the small children of a household on a school day.
 
     Attributes
     ----------

@@ -98,7 +98,7 @@ class _Child:
         self.school_day = index.weekday in SCHOOL_DAYS
 
     def findings(self, adults: list[Resident], offered: set[str]) -> Iterator[CommunityFinding]:
-        """Say what is wrong.
+        """Return what is wrong.
 
         Parameters
         ----------

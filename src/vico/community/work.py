@@ -179,7 +179,7 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
 
 
 def check_beds(index: PlaceIndex, people: int) -> None:
-    """See to it that there are beds for some people, where it is known how many there are.
+    """Check that there are beds for some people, where it is known how many there are.
 
     Raises
     ------

@@ -321,7 +321,7 @@ _HEADER = ("type", "version", "transform", "metadata")
 
 @dataclass
 class _Header:
-    """What stands at the top of a file."""
+    """Header of a file."""
 
     said: str = ""  # the reference system, where the caller says it
     members: dict[str, Any] = field(default_factory=dict)

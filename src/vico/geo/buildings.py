@@ -100,7 +100,7 @@ class FoundBuilding:
 
 @dataclass(frozen=True)
 class FoundBuildings:
-    """What a file has in a window.
+    """Buildings of a file in a window.
 
     Attributes
     ----------
@@ -263,7 +263,7 @@ def building_of_surfaces(
 
 
 def _fault(facets: Sequence[RoofFacet], footprint: BaseGeometry) -> str:
-    """Say why a roof can't be built of these surfaces; empty if it can."""
+    """Return why a roof can't be built of these surfaces; empty if it can."""
     if not facets:
         return "no roof surfaces"
     tops = np.concatenate([facet.height(np.asarray(facet.polygon.exterior.coords)[:, :2]) for facet in facets])
@@ -441,5 +441,5 @@ class BuildingPieces:
 
 
 def _worth(detail: float) -> float:
-    """How good a level of detail is: 2 with its refinements, then 3, then blocks, then outlines."""
+    """Return how good a level of detail is: 2 with its refinements, then 3, then blocks, then outlines."""
     return {2: 30.0, 3: 20.0, 1: 10.0}.get(int(detail), 0.0) + detail

@@ -112,7 +112,7 @@ class Located:
 
 @dataclass(frozen=True)
 class Detections:
-    """What a file of detections gives.
+    """Content of a file of detections.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def sightings_of(
 
 
 def _unusable(one: PhotoBox, pose: PhotoPose | None, reach: float) -> str | None:
-    """Say why a box can't be used, if it can't."""
+    """Return why a box can't be used, if it can't."""
     left, top, wide, tall = one.box
     if pose is None:
         return f"photo {one.photo} has no pose"
@@ -272,7 +272,7 @@ class CocoFile(_Foreign):
 
 
 class FeatureProperties(_Foreign):
-    """What a feature of a GeoJSON file says."""
+    """Properties of a feature of a GeoJSON file."""
 
     name: Annotated[str, Field(min_length=1, max_length=200, validation_alias=AliasChoices("class", "object_value"))]
     score: Score = 1.0

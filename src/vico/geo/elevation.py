@@ -353,7 +353,7 @@ def _coverage(cuts: Sequence[RasterCut], frame: LocalFrame, half: float) -> floa
 
 
 def _extents(paths: Sequence[Path], rasters: Sequence[Raster]) -> str:
-    """Say what files cover."""
+    """Return what files cover."""
     extents: list[str] = []
     for path, raster in zip(paths, rasters, strict=True):
         rows, columns = raster.pixels.shape
@@ -413,7 +413,7 @@ def _merge_cuts(
 def _offset(
     xy: NDArray[np.float64], own: NDArray[np.float64], finer: NDArray[np.float64], spacing: float
 ) -> NDArray[np.float64]:
-    """How much a file must be raised where it meets finer ones, so that there is no step; nothing farther away."""
+    """Return how much a file must be raised so that it meets finer ones without a step; nothing farther away."""
     both = np.isfinite(own) & np.isfinite(finer)
     offset = np.zeros(len(xy))
     if not both.any():

@@ -266,7 +266,7 @@ class _Reader:
         return near[inside], xy[inside]
 
     def _tell_of_elsewhere(self, table: NDArray[np.float64]) -> None:
-        """Say where the stops lie, as none is in the window; and whether they would be, the other way round."""
+        """Report where stops lie when none is in the window, and whether they would be with coordinates exchanged."""
         (south, west), (north, east) = table.min(axis=0), table.max(axis=0)
         turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
         count = len(self._in_window(turned)[0]) if len(turned) else 0
@@ -399,7 +399,7 @@ class _Reader:
         return min(weekdays, key=lambda when: (-load[when], when)) if weekdays else None
 
     def _tell_of_calendar(self, chosen: date | None, as_of: date | None) -> None:
-        """Say that the timetable is an old one, where it ended before the map's day or the day the feed was packed."""
+        """Report a timetable that ended before the map's day or the day the feed was packed."""
         if chosen is None:
             return
         ended = max(day for days in self._days.values() for day in days)
@@ -508,7 +508,7 @@ class _Reader:
         return lines
 
     def _attribution(self, agencies: dict[str, str], served: Collection[str]) -> str:
-        """Who made it: the publisher of feed_info.txt and attributions.txt, else the agencies that serve the window."""
+        """Return the publisher of feed_info.txt and attributions.txt, else the agencies that serve the window."""
         named = [name for (name,) in self._rows("feed_info.txt", [], ["feed_publisher_name"])]
         named += [name for (name,) in self._rows("attributions.txt", [], ["organization_name"])]
         named = [name for name in named if name] or sorted(name for name in served if name)

@@ -63,7 +63,7 @@ class Point(BaseModel):
 
 
 class MapillaryImage(BaseModel):
-    """What the API says about one photo; fields that were not asked for are ignored."""
+    """Fields of one photo as the API gives them; those that were not asked for are ignored."""
 
     model_config = ConfigDict(extra="ignore", coerce_numbers_to_str=True)
     id: Annotated[str, Field(min_length=1, max_length=80)]

@@ -104,7 +104,7 @@ class OsmRelation:
 
 @dataclass(frozen=True)
 class OsmData:
-    """What an OSM file holds within a window, in the order of the file.
+    """Content of an OSM file within a window, in the order of the file.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class OsmData:
 
     @property
     def sides(self) -> tuple[float, float]:
-        """How wide and how high that box is, metres."""
+        """Return how wide and how high that box is, metres."""
         west, south, east, north = self.box
         return east - west, north - south
 
@@ -451,7 +451,7 @@ def extract_bounds(path: Path) -> tuple[float, float, float, float]:
 
 
 def _elsewhere(path: Path, frame: LocalFrame) -> str:
-    """Say how to mend a window that lies beside what an extract covers: where that is, or what is exchanged."""
+    """Return how to mend a window that lies beside what an extract covers: where that is, or what is exchanged."""
     south, west, north, east = extract_bounds(path)
     where = f"the extract covers {south:.4f} to {north:.4f} north, {west:.4f} to {east:.4f} east"
     if south <= frame.lat <= north and west <= frame.lon <= east:

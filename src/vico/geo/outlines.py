@@ -299,7 +299,7 @@ def _with_islands(outside: _Rings, holes: _Rings) -> Polygon | MultiPolygon:
 
 
 def _reason(outside: _Rings, missing: int, count: int, cut: bool, frame: LocalFrame) -> str:
-    """Say why members make no area."""
+    """Return why members make no area."""
     if not outside.shape.is_empty:
         return "its holes cover all of it; left out (are the roles outer and inner exchanged?)"
     if missing:

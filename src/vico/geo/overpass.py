@@ -228,7 +228,7 @@ def quarters(box: Box) -> list[Box]:
 
 
 def seconds_to_a_slot(page: str) -> float:
-    """How long to wait, as a server's status page says; 0 where a slot is free, or the page says nothing."""
+    """Return how long to wait, as a server's status page says; 0 where a slot is free, or the page says nothing."""
     if re.search(r"Rate limit: 0\b|\b[1-9]\d* slots? available now", page):
         return 0.0
     waits = [int(found) for found in re.findall(r"Slot available after:[^\n]*?in (-?\d{1,9}) seconds", page)]

@@ -19,7 +19,7 @@ _KMH, _MPH, _KNOT = 1 / 3.6, 0.44704, 0.514444  # metres a second
 
 
 class Kind(Enum):
-    """What a tag's value measures."""
+    """Quantity that a tag's value measures."""
 
     LENGTH = "length"
     """Metres, where no unit is said."""
@@ -34,7 +34,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Reading:
-    """What a value says.
+    """A value as it is read.
 
     Attributes
     ----------

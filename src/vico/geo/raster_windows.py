@@ -243,7 +243,7 @@ def _repeated_values(heights: NDArray[np.float64], spacing: float) -> list[float
 
 
 def _steps(heights: NDArray[np.float64], patch: NDArray[np.bool_], value: float) -> NDArray[np.float64] | None:
-    """How much higher the ring around a patch is, metres; None where too little of it is known."""
+    """Return how much higher the ring around a patch is, metres; None where too little of it is known."""
     outside = ndimage.binary_dilation(patch, _TOUCHING, _RING) & ~ndimage.binary_dilation(patch, _TOUCHING, _RING - 1)
     steps = heights[outside] - value
     steps = steps[np.isfinite(steps)]

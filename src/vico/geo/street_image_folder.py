@@ -119,7 +119,7 @@ class OpenSfmShot(BaseModel):
 
 
 class Reference(BaseModel):
-    """Where an OpenSfM reconstruction's coordinates start."""
+    """Origin of an OpenSfM reconstruction's coordinates."""
 
     model_config = ConfigDict(extra="ignore")
     latitude: Latitude
@@ -346,7 +346,7 @@ class FolderImages:
 
 @dataclass(frozen=True)
 class PhotoPose:
-    """Where a photo was taken and how, before its picture is read.
+    """Pose and camera of a photo, before its picture is read.
 
     Attributes
     ----------

@@ -145,7 +145,7 @@ _READ_EXTENSIONS = {
 
 @dataclass(frozen=True)
 class TileLimits:
-    """What a tileset may ask of us.
+    """Limits on what is read of a tileset.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ class TileLimits:
 
 @dataclass(frozen=True)
 class TileReport:
-    """What became of a tileset.
+    """Report on a tileset that was read.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class _Piece:
 
 @dataclass
 class _Found:
-    """What lies below a tile: pieces, and whether anything of it is missing."""
+    """Content below a tile: pieces, and whether anything of it is missing."""
 
     pieces: list[_Piece] = field(default_factory=list)
     missing: bool = False
@@ -489,7 +489,7 @@ class _TooMuch(InputError):
 
 @dataclass(frozen=True)
 class _Place:
-    """Where in a tileset we are: what a tile takes from those above it."""
+    """A place in a tileset: what a tile takes from those above it."""
 
     base: str
     transform: NDArray[np.float64]
@@ -557,6 +557,6 @@ def _merge_pieces(pieces: list[_Piece], weld: float) -> TileMesh:
 
 
 def credits_of(said: Iterator[str] | list[str]) -> tuple[str, ...]:
-    """Whom to credit: the parts of ``asset.copyright`` between semicolons, the most frequent first."""
+    """Return whom to credit: the parts of ``asset.copyright`` between semicolons, the most frequent first."""
     names = Counter(name for text in said for part in text.split(";") if (name := part.strip()))
     return tuple(sorted(names, key=lambda name: -names[name]))

@@ -92,7 +92,7 @@ class CityEntities(Mapping[int, dict[str, str]]):
         return chain(self._of_all, self._at_stops, *tiles)
 
     def __len__(self) -> int:
-        """How many there are; every tile is read for that."""
+        """Return how many there are; every tile is read for that."""
         return len(self._of_all) + len(self._at_stops) + sum(len(self._of_tile(t).entity) for t in self._places())
 
     def _places(self) -> list[tuple[int, int]]:
@@ -120,7 +120,7 @@ class CityEntities(Mapping[int, dict[str, str]]):
 
 
 class _Named:
-    """What the things of one tile are.
+    """Identifiers and places of the things of one tile in their city.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ class CityWorld(World):
 
     @property
     def edges(self) -> tuple[float, float, float, float] | None:
-        """Where a city ends whose tiles fill no square around its middle, metres."""
+        """Return where a city ends whose tiles fill no square around its middle, metres."""
         known = self.city.manifest
         (west, south), (east, north) = (
             [(k + side) * known.size for k in corner] for corner, side in ((known.first, -0.5), (known.last, 0.5))
@@ -388,7 +388,7 @@ class CityWorld(World):
 
     @cached_property
     def walkable(self) -> WalkableMap:
-        """Where people can walk, read where it is looked at."""
+        """Return where people can walk, read where it is looked at."""
         return whole_walkable(self.city.path / WHOLE, self.half)
 
     @cached_property
@@ -485,7 +485,7 @@ class CityPart(CityWorld):
 
     @cached_property
     def walkable(self) -> WalkableMap:
-        """Where people can walk in the city."""
+        """Return where people can walk in the city."""
         return self.whole.walkable
 
     @cached_property

@@ -214,7 +214,7 @@ def _picture() -> NDArray[np.uint8]:
 
 
 WINDOWS = Material("far windows", _picture(), emission=1.0)
-"""What walls with windows are of."""
+"""Material of walls with windows."""
 
 assert WINDOWS.texture is not None
 WINDOWS_MEAN = LINEAR[WINDOWS.texture[..., :3]].mean(axis=(0, 1))

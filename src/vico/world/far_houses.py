@@ -190,7 +190,7 @@ def _levels(part: FarPart, step: float, more: int) -> Iterator[FarPart]:
 
 
 def _is_high(heights: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
-    """Tell which heights are those of the higher of two roofs; none where one roof explains them."""
+    """Return which heights are those of the higher of two roofs; none where one roof explains them."""
     n = len(heights)
     if n < 8:
         return np.zeros(n, bool)

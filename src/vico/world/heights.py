@@ -247,7 +247,7 @@ class Stairs:
         ground[on] = self.level[found[on]]
 
     def going_at(self, points: Floats) -> Floats:
-        """How deep the treads at points ``(n, 3)`` are, metres, shape ``(n,)``.
+        """Return how deep the treads at points ``(n, 3)`` are, metres, shape ``(n,)``.
 
         0 off stairs, and where treads are so deep that one walks on them as on the ground.
         """
@@ -330,7 +330,7 @@ EDGE_WIDTH = 0.1
 
 @dataclass(frozen=True)
 class Steps:
-    """Where the ground steps down, over the same square as its height field.
+    """Edges where the ground steps down, over the same square as its height field.
 
     Attributes
     ----------
@@ -423,7 +423,7 @@ class HeightField:
         return found
 
     def going_at(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep the treads are that one climbs at points ``(n, 3)``, metres, shape ``(n,)``; 0 off stairs."""
+        """Return how deep the treads are that one climbs at points ``(n, 3)``, metres, shape ``(n,)``; 0 off stairs."""
         return np.zeros(len(xyz)) if self.stairs is None else self.stairs.going_at(xyz)
 
     def smooth(self, xy: ArrayLike) -> NDArray[np.float64]:

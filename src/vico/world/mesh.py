@@ -18,7 +18,7 @@ from vico.exact import apply_matrix
 
 @dataclass(frozen=True)
 class Material:
-    """How a surface looks.
+    """Look of a surface.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What anybody may know of a world: streets, buildings, named places, transit. No rooms, no things.
+"""The public map of a world: streets, buildings, named places, transit. No rooms, no objects.
 
 `StreetIndex` finds streets by name, and the street that a point lies in.
 """

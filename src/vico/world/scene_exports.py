@@ -1,4 +1,4 @@
-"""What can be seen and collided with of a world, as glTF, MuJoCo's MJCF, and OpenUSD.
+"""Looks and collision shapes of a world, as glTF, MuJoCo's MJCF, and OpenUSD.
 
 glTF
     One glTF 2.0 file (GLB) with everything that can be seen; models are stored once and placed by nodes.

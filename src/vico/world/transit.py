@@ -225,7 +225,7 @@ class Track:
         return found.reshape(*front.shape, 3)
 
     def seconds(self, start: float, end: float, *, standing: bool = True) -> float:
-        """How long a tram takes from one distance along the track to another, braking to a stand there if need be."""
+        """Return the seconds of a tram between two distances along the track, braking to a stand there if need be."""
         s = np.arange(start, max(end, start + STEP), STEP)
         limit = np.interp(s, np.arange(len(self.speed)) * STEP, self.speed)
         speed = np.minimum(limit, np.sqrt(0.25 + 2 * TRAM_ACCELERATION * (s - start)))
@@ -259,7 +259,7 @@ def _stand(middles, along, points, first, last, found):  # type: ignore[no-untyp
 
 
 def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Point2, Point2]:
-    """Where a door of a tram that stands with its front at `offset` is, and where its middle line is there.
+    """Return where a door of a tram that stands with its front at `offset` is, and where its middle line is there.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Poin
 
 
 def departure(line: Line, number: int) -> int:
-    """When a line's departure of this number is, seconds from the midnight before the first; each day is alike."""
+    """Return when a departure of a line is, seconds from the midnight before the first; all days are alike."""
     days, of_the_day = divmod(number, len(line.departures))
     return line.departures[of_the_day] + DAY * days
 
@@ -332,16 +332,16 @@ class LineTimes:
         return cls(line, buses, tuple(kept))
 
     def begins(self, number: int) -> float:
-        """When a round leaves the first stop, seconds from the midnight before the first."""
+        """Return when a round leaves the first stop, seconds from the midnight before the first."""
         days, of_the_day = divmod(number, len(self.departures))
         return self.departures[of_the_day] + DAY * days
 
     def arrives(self, number: int, stop: int) -> float:
-        """When the bus of a round comes to a stop of its line; ``len(stops)`` is the first one again, at the end."""
+        """Return when the bus of a round comes to a stop; ``len(stops)`` is the first one again, at the end."""
         return self.begins(number) + self.line.travel[stop]
 
     def leaves(self, number: int, stop: int) -> float:
-        """When the bus of a round leaves a stop of its line; from ``len(stops)`` it goes on with its next round."""
+        """Return when the bus of a round leaves a stop; from ``len(stops)`` it goes on with its next round."""
         if stop == len(self.line.stops):
             return max(self.begins(number + self.buses), self.arrives(number, stop) + BUS_DWELL)
         return self.begins(number) if stop == 0 else self.arrives(number, stop) + BUS_DWELL
@@ -367,16 +367,16 @@ class TramTimes:
     round: ClassVar[bool] = False
 
     def begins(self, number: int) -> float:
-        """When a tram comes in where the track begins, seconds from the midnight before the first."""
+        """Return when a tram comes in where the track begins, seconds from the midnight before the first."""
         days, of_the_day = divmod(number, len(self.line.departures))
         return self.line.departures[of_the_day] + DAY * days
 
     def arrives(self, number: int, stop: int) -> float:
-        """When a tram comes to a stop of its line."""
+        """Return when a tram comes to a stop of its line."""
         return self.begins(number) + self.line.travel[stop]
 
     def leaves(self, number: int, stop: int) -> float:
-        """When a tram leaves a stop of its line."""
+        """Return when a tram leaves a stop of its line."""
         return self.arrives(number, stop) + BUS_DWELL
 
     def next_round(self, stop: int, second: float) -> int:

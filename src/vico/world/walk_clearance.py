@@ -1,4 +1,4 @@
-"""How much room a walkway has beside solids and above the edges of kerbs, and where its line bends to get past.
+"""Room of walkways beside solids and above the edges of kerbs, and bends of their lines to get past.
 
 Lines are led past solids in compiled code: a city has thousands of them. Free intervals come as `Gaps`: those of
 place k are ``low[first[k]:first[k + 1]]`` to ``high[...]``, metres to the left of the line, rising.

@@ -1,4 +1,4 @@
-"""How long walks are, outdoors and indoors.
+"""Lengths of walks, outdoors and indoors.
 
 Thousands of walks outdoors are measured when people are given homes, work and days: `CoarseWalkLengths` does so on
 cells of a metre. `IndoorWays` measures ways from the street through corridors, over stairs and in lifts to the rooms
@@ -20,7 +20,7 @@ from vico.world.routing import Router
 
 
 class Walk(NamedTuple):
-    """What a walk measures.
+    """Measures of a walk.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def lift_seconds(up: float) -> float:
 
 
 class IndoorWays:
-    """How long the ways are from the street to the rooms behind a door.
+    """Lengths of the ways from the street to the rooms behind a door.
 
     Parameters
     ----------

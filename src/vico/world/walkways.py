@@ -94,7 +94,7 @@ class Walkways:
         return self.points[self.first[stretch] : self.first[stretch + 1]]
 
     def room_at(self, stretch: int, offset: float) -> Floats:
-        """How far a walker may be to the left and to the right so many metres along a stretch, shape ``(2,)``."""
+        """Return the room to the left and to the right so many metres along a stretch, metres, shape ``(2,)``."""
         begin, end = int(self.first[stretch]), int(self.first[stretch + 1])
         segment = int(np.searchsorted(self.along[begin:end], offset, side="right")) - 1
         return self.room[begin + min(max(segment, 0), end - begin - 2)]

@@ -162,7 +162,7 @@ _REPLIES: Mapping[str, type[BaseModel]] = {
 
 @dataclass
 class LlmReport:
-    """What came of asking a model, for people; `Community.authorship` says what lasts.
+    """Outcome of asking a model, for people to read; `Community.authorship` holds what lasts.
 
     Attributes
     ----------

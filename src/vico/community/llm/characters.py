@@ -1,4 +1,4 @@
-"""Who people are and what they do on a day, as a model writes them.
+"""Characters and days of people, as a model writes them.
 
 Characters are asked for by household, as what one is called and does stands in the others' lives, too. A day is asked
 for by resident, after the paper's prompt for daily plans; our router says how long ways take.
@@ -156,7 +156,7 @@ class _CharacterJudge:
         return [*self._trade(person), *(f"{one.where}: {one.what}; {one.mend}" for one in settled)]
 
     def _trade(self, person: Resident) -> list[str]:
-        """Say whether somebody's place of work employs no such trade; the validator lets unknown ones pass."""
+        """Return whether somebody's place of work employs no such trade; the validator lets unknown ones pass."""
         cast = self._lives.cast
         if person.workplace is None or cast.keeps_work(person) or job_of(person.occupation) is not None:
             return []
@@ -167,7 +167,7 @@ class _CharacterJudge:
         return [f"{where}: {place} employs no {person.occupation!r}: choose of {', '.join(trades)}"]
 
     def _day(self, person: Resident) -> list[str]:
-        """Say whether somebody could not live the plain day of such a life."""
+        """Return whether somebody could not live the plain day of such a life."""
         if person.id in self._lives.cast.tied_to_small_children:
             return []
         fitted = self._lives.plain_day(person.id, self._lives.cast.base.groups_of(person.id))
@@ -334,7 +334,7 @@ class _DayJudge:
 
 
 def _plan_faults(plan: Sequence[ActivityReply]) -> list[str]:
-    """Say what is wrong with a plan whatever the town."""
+    """Return what is wrong with a plan whatever the town."""
     findings: list[str] = []
     for k, one in enumerate(plan):
         where = f"schedule[{k}]"

@@ -56,7 +56,7 @@ class Stay:
 
     @property
     def minutes(self) -> int:
-        """How long it takes."""
+        """Return how long it takes."""
         return self.end - self.start
 
     @property
@@ -304,7 +304,7 @@ _LONG_DAY, _BREAK = 6 * 60, 30
 
 
 class Lives:
-    """Who everybody is by now.
+    """All residents as they are by now.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ class Lives:
         self._plain: dict[str, list[Stay]] = {}
 
     def accept(self, people: Sequence[Resident]) -> None:
-        """Let these people, of one household, be who they are from now on."""
+        """Replace the people of one household."""
         for person in people:
             self.people[person.id] = person
             self._plain.pop(person.id, None)

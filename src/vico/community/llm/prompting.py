@@ -1,4 +1,4 @@
-"""What a language model is asked for, what it is told, and how its drafts are mended in rounds.
+"""Questions to a language model: the replies it is asked for, its prompts, and rounds in which drafts are repaired.
 
 Many questions are asked at a time; the order of replies changes nothing. The model is told facts of the world and of
 the bodies that it is to give lives, in words and bounded lists. The fields of a day's activities are those of the
@@ -347,7 +347,7 @@ _MOST_LABEL = 90
 
 
 def fault_of(kind: str, text: str) -> str:
-    """Say what is wrong with a text of a kind, or return an empty string."""
+    """Return what is wrong with a text of a kind, or return an empty string."""
     if not text.strip():
         return "is empty: write something"
     if len(text) > MOST[kind]:
@@ -360,13 +360,13 @@ def fault_of(kind: str, text: str) -> str:
 
 
 def faults_of(where: str, kind: str, texts: Sequence[str]) -> list[str]:
-    """Say what is wrong with some texts of a kind, a sentence each."""
+    """Return what is wrong with some texts of a kind, a sentence each."""
     faults = [(k, fault_of(kind, text)) for k, text in enumerate(texts)]
     return [f"{where}: {kind} {k + 1 if len(texts) > 1 else ''}".rstrip() + f" {fault}" for k, fault in faults if fault]
 
 
 def name_fault(name: str) -> str:
-    """Say what is wrong with a person's name, or return an empty string."""
+    """Return what is wrong with a person's name, or return an empty string."""
     if fault := fault_of("name", name):
         return fault
     if not _NAME.fullmatch(name) or len(name.split()) < 2 or len(name.split()[0]) < 2:

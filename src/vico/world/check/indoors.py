@@ -61,7 +61,7 @@ def walkable_inside(rooms: Sequence[Room], objects: Objects, *, body: float = BO
 
 
 def floor_space(room: Room, outlines: NDArray[np.float64], body: float = BODY) -> shapely.Geometry:
-    """Where the middle of a body can be: one part, or several that can't be walked between.
+    """Return where the middle of a body can be: one part, or several that can't be walked between.
 
     Parameters
     ----------

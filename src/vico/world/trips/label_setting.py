@@ -50,7 +50,7 @@ LABEL = np.dtype(
 
 
 class Timetable(NamedTuple):
-    """When lines run, line after line.
+    """Timetable of all lines, one after another.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Timetable(NamedTuple):
 
 
 class GroundWays(NamedTuple):
-    """How far it is between the nodes, the start, and the goal, which is the last; of a way not known, at least.
+    """Lengths of ways between the nodes, the start, and the goal, which is the last; of a way not known, a bound.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class GroundWays(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """What labels have to keep to, and how fast one is.
+    """Limits that labels have to keep to, and speeds.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What trips are made of: stops and stations as a graph of rides, and the ways on the ground between their ends.
+"""Parts of trips: stops and stations as a graph of rides, and the ways on the ground between their ends.
 
 Rides say what can be ridden from each stop or station, when, and at what price. Ways on the ground are bounds at first,
 found when it matters, then kept.
@@ -123,7 +123,7 @@ class TripNetwork:
 
     @cached_property
     def timetable(self) -> Timetable:
-        """When what runs, as arrays."""
+        """Return the timetable as arrays."""
         travel = [times.line.travel[: len(times.line.stops) + times.round] for times in self.lines]
         nodes = [[self._number.get(stop, -1) for stop in times.line.stops] for times in self.lines]
         departures = [
@@ -199,7 +199,7 @@ class Way(NamedTuple):
     metres: float
 
     def seconds(self, speed: float) -> float:
-        """How long it takes at a speed, m/s, with a moment at every corner, in hundredths of a second."""
+        """Return how long it takes at a speed, m/s, with a moment at every corner, in hundredths of a second."""
         return round(self.metres / speed + TURN * max(0, len(self.path) - 2), 2)
 
 
@@ -309,7 +309,7 @@ class Ways:
 
     @property
     def ground(self) -> GroundWays:
-        """What is known of them now."""
+        """The ways as they are known now."""
         row, known = self._known.arrays()
         return self._ground._replace(row=row, known=known)
 

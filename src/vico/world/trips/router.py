@@ -57,7 +57,7 @@ class TripStep(NamedTuple):
 
 @dataclass(frozen=True)
 class TripQuery:
-    """What is asked: all that a search depends on.
+    """A question to the router: all that a search depends on.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def _steps(labels: NDArray[np.void], label: int) -> list[TripStep]:
 
 
 class TripEnd(Protocol):
-    """What trips are planned on: a `World`, or a `PublicMap`."""
+    """A map that trips are planned on: a `World`, or a `PublicMap`."""
 
     @property
     def router(self) -> Router:
