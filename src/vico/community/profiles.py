@@ -34,7 +34,7 @@ from vico.community.model import (
 from vico.community.people import Household, ResidentDraft, childhood, schools
 from vico.community.place_index import GUEST_KINDS, PlaceIndex, kind_of
 from vico.community.relations import describe_household
-from vico.english import with_article
+from vico.english import enumerate_words, with_article
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Place
@@ -83,8 +83,8 @@ class Biographer:
             "Her": draft.her.capitalize(),
             "him": him,
         }
-        traits = join(draft.character.traits)
-        hobbies = join([h.name for h in draft.hobbies])
+        traits = enumerate_words(draft.character.traits)
+        hobbies = enumerate_words([h.name for h in draft.hobbies])
         sentences = [self._work(draft), self._home(draft, household, words)]
         says = self._children_say if draft.child else self._says
         young = childhood().biography
@@ -217,13 +217,13 @@ def lifestyle_of(
         rhythm = "Keeps regular hours"
     if draft.child:
         told = childhood().biography.ways
-        return f"{rhythm}; {join([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
+        return f"{rhythm}; {enumerate_words([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
     options = [way for way in ways() if draft.status in way.statuses and agrees(way.text, measures)]
     first = [way.text for way in options if _is_told_of(way, draft)]
     anybody = [way.text for way in options if not (way.values or way.hobbies or way.trait)]
     spare = [anybody[int(k)] for k in rng.permutation(len(anybody))]
     picked = [first[int(k)] for k in rng.permutation(len(first))][:3]
-    return f"{rhythm}; {join([*picked, *spare[: max(0, 2 - len(picked))]])}."
+    return f"{rhythm}; {enumerate_words([*picked, *spare[: max(0, 2 - len(picked))]])}."
 
 
 def _is_told_of(way: Way, draft: ResidentDraft) -> bool:
@@ -244,11 +244,6 @@ def honest_character(draft: ResidentDraft, measures: DayMeasures) -> Personality
         rest = [one for options in ranked for one in options if not any(set(options) & {t} for t in character.traits)]
         told += [one for one in (word, *kind, *rest) if one not in told and agrees(one, measures)][:1]
     return character.model_copy(update={"traits": told})
-
-
-def join(parts: Sequence[str]) -> str:
-    """Join words with commas and a final "and"."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 Rgb = tuple[int, int, int]

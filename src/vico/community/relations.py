@@ -24,6 +24,7 @@ from vico.community.groups import Meeting
 from vico.community.model import Community, Relation, RelationKind
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex
+from vico.english import enumerate_words
 
 _MANY = 7.0  # friends of an adult of middling extraversion where there are many to choose from
 _SHAPE = 2.6  # of the gamma distribution of how many friends adults have
@@ -435,12 +436,8 @@ def _describe_family(household: Household, draft: ResidentDraft) -> str:
         parts += [f"{draft.her} partner {name}" for name in adults]
         told = [f"{child.first} ({child.age})" for child in children]
         one = "daughter" if children[0].gender == "female" else "son"
-        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {_enumerate_names(told)}")
-    return f"with {_enumerate_names(parts)}"
-
-
-def _enumerate_names(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {enumerate_words(told)}")
+    return f"with {enumerate_words(parts)}"
 
 
 @dataclass(frozen=True)

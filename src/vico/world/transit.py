@@ -275,7 +275,7 @@ def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Poin
     return (float(x + math.sin(yaw) * aside), float(y - math.cos(yaw) * aside)), (float(x), float(y))
 
 
-def departure(line: Line, number: int) -> int:
+def departure(line: Line | TramLine, number: int) -> int:
     """Return when a departure of a line is, seconds from the midnight before the first; all days are alike."""
     days, of_the_day = divmod(number, len(line.departures))
     return line.departures[of_the_day] + DAY * days
@@ -368,8 +368,7 @@ class TramTimes:
 
     def begins(self, number: int) -> float:
         """Return when a tram comes in where the track begins, seconds from the midnight before the first."""
-        days, of_the_day = divmod(number, len(self.line.departures))
-        return self.line.departures[of_the_day] + DAY * days
+        return departure(self.line, number)
 
     def arrives(self, number: int, stop: int) -> float:
         """Return when a tram comes to a stop of its line."""
