@@ -287,11 +287,6 @@ class PlaceIndex:
         """Square metres of a place's rooms, without corridors, stairs and lifts."""
         return float(self._rooms.area[self.spot[place.id]])
 
-    def same_building(self, a: str, b: str) -> bool:
-        """Whether two places are under one roof, or the same."""
-        building = self.place_by_id[a].building
-        return a == b or (building is not None and building == self.place_by_id[b].building)
-
     def seconds(self, a: str, b: str) -> float:
         """Seconds on foot between two places, at 1 m/s; infinite if there is no way.
 

@@ -16,7 +16,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -57,25 +57,6 @@ class FoundPlace:
     kinds: tuple[str, ...] = ()
     open: bool = True
     may_be_kept: bool = True
-
-
-class PlaceSource(Protocol):
-    """Something that knows places.
-
-    Attributes
-    ----------
-    name
-        What it is called in messages and reports.
-    may_be_kept
-        Whether its terms allow to store what it says.
-    """
-
-    name: str
-    may_be_kept: bool
-
-    def near(self, frame: LocalFrame, half: float) -> list[FoundPlace]:
-        """Every place in the square of half side `half` metres around the frame's origin, sorted by id."""
-        ...
 
 
 def one_line(text: str, most: int = 120) -> str:
