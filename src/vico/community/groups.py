@@ -21,8 +21,9 @@ from vico.community.schooling import Care
 from vico.errors import EmptyInputError
 from vico.world.model import Category, Place
 
-# Most groups of somebody reserved, of others, and of the outgoing, by extraversion.
-_RESERVED, _OUTGOING, _MEMBERSHIPS = 0.4, 0.68, (1, 2, 3)
+_RESERVED = 0.4  # extraversion up to which somebody is reserved
+_OUTGOING = 0.68  # extraversion from which on somebody is outgoing
+_MEMBERSHIPS = (1, 2, 3)  # most groups of the reserved, of others, and of the outgoing
 _MAX_LUNCH_WALK = 7
 
 
@@ -438,10 +439,11 @@ class _Ranking:
         return self._forming.gain(self.options[k], self.attendance.likes(k), self._weights[k])
 
 
-# Most children with their carers in a group; how far from home they play, metres; when they are back, minutes.
-_MOST, _NEAR, _BACK = 9, 600.0, 19 * 60 + 20
-# Where no school day ends, nobody comes before; and how long it takes to get small children ready, minutes.
-_AFTERNOON, _READY = 14 * 60 + 45, 10
+_MOST = 9  # children with their carers in a group
+_NEAR = 600.0  # metres from home that small children play
+_BACK = 19 * 60 + 20  # minute of the day when they are back
+_AFTERNOON = 14 * 60 + 45  # minute of the day before which nobody comes where no school day ends
+_READY = 10  # minutes that it takes to get small children ready
 
 
 def form_playmates(rng: np.random.Generator, index: PlaceIndex, cares: Sequence[Care]) -> list[Meeting]:

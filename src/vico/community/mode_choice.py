@@ -30,15 +30,17 @@ SOONER = {Mode.BUS: 60.0, Mode.TRAM: 60.0, Mode.BIKE: 0.0}
 RESERVE = {Mode.BUS: 120.0, Mode.TRAM: 120.0, Mode.BIKE: 60.0}
 # Shorter ways are walked, seconds.
 _SHORT = 6 * 60
-#: A way may be planned with time to spare, but not with an hour of it: so many times what it takes, and seconds more.
-SLACK, SPARE = 2.0, 10 * 60
+#: A way may be planned with time to spare, but not with an hour of it: so many times what it takes ...
+SLACK = 2.0
+#: ... and so many seconds more.
+SPARE = 10 * 60
 _LEAST_PRICE = {Mode.BUS: BUS_FARE, Mode.TRAM: BUS_FARE, Mode.BIKE: BIKE_RATE}
 # Who carries a hundred would spend two minutes to save one; who carries more, less.
 _SECONDS_OF_MONEY = 12_000.0
 # At these ages people cycle.
 _CYCLISTS = (12, 74)
-# Each year beyond so many makes a walk so much longer.
-_TIRED_FROM, _TIRED = 60, 0.015
+_TIRED_FROM = 60  # age in years from which on walks seem longer
+_TIRED = 0.015  # share by which each year beyond makes a walk longer
 _BOTHER = {Mode.BUS: 0.0, Mode.TRAM: 0.0, Mode.BIKE: 270.0}
 # A second on foot counts like so many spent sitting, as people choose.
 _ON_FOOT = 1.5

@@ -343,8 +343,8 @@ Party = tuple[ResidentDraft, Day]
 
 # Between these minutes of the day one goes out with the family on a day off.
 _FAMILY_HOURS = (9 * 60 + 30, 18 * 60)
-# How often friends are asked before one gives up, and how many meet somebody for whom once is enough.
-_ASKED, _PLANS = 4, 3
+_ASKED = 4  # times that friends are asked before one gives up
+_PLANS = 3  # plans that are tried of those that suit
 # Whoever is less outgoing than this meets one friend a day at most, and others two.
 _RESERVED = 0.4
 # People of these ages are helped most.

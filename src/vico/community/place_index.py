@@ -187,8 +187,8 @@ GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment",
 #: Distance that spawn points keep from each other, metres.
 SPAWN_GAP = 2.0
 
-# Places whose estimates to all others are kept, 2 bytes each: a city has tens of thousands.
-_ESTIMATES, _MOST_MINUTES = 1024, 32_000
+_ESTIMATES = 1024  # places whose estimates to all others are kept, 2 bytes each: a city has tens of thousands
+_MOST_MINUTES = 32_000  # of an estimate: it fits into 2 bytes
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
 

@@ -39,8 +39,10 @@ from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Place
 
-# When one rises early, rises late, and goes to bed late, seconds of the day.
-_EARLY_RISE, _LATE_RISE, _LATE_TO_BED = 6 * 3600 + 1800, 8 * 3600, 23 * 3600
+# Seconds of the day.
+_EARLY_RISE = 6 * 3600 + 1800
+_LATE_RISE = 8 * 3600
+_LATE_TO_BED = 23 * 3600
 
 
 class Biographer:
@@ -373,8 +375,8 @@ _SHOE_COLOURS: tuple[Colour, ...] = (
 _YEARS = (5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18)
 _BOYS = (1.10, 1.16, 1.22, 1.275, 1.33, 1.38, 1.43, 1.49, 1.56, 1.635, 1.69, 1.735, 1.76, 1.79)
 _GIRLS = (1.09, 1.15, 1.21, 1.27, 1.33, 1.385, 1.445, 1.51, 1.57, 1.605, 1.625, 1.64, 1.65, 1.655)
-# After this age people grow smaller by so many metres a year.
-_SHRINK_FROM, _SHRINK = 60, 0.0013
+_SHRINK_FROM = 60  # age in years after which people grow smaller
+_SHRINK = 0.0013  # metres a year
 
 
 def stature(age: float, *, female: bool) -> tuple[float, float]:

@@ -29,8 +29,8 @@ from vico.english import enumerate_words
 _MANY = 7.0  # friends of an adult of middling extraversion where there are many to choose from
 _SHAPE = 2.6  # of the gamma distribution of how many friends adults have
 _OF_FEW = 0.33  # share of all others who are friends where there are few to choose from
-# Children have friends of their age, to within so many years; adults' friends thin out with the years between, scale.
-_CHILD_AGE_GAP, _YEARS_BETWEEN = 2, 9.0
+_CHILD_AGE_GAP = 2  # years between children who are friends, at most
+_YEARS_BETWEEN = 9.0  # years over which friendships of adults thin out by a factor of e
 # Chance that a place in somebody's circle is filled by a friend of a friend.
 _CLOSURE = 0.35
 # How likely two are to be friends for what they share, of ties that may be of several kinds.
@@ -175,8 +175,8 @@ class _Draw:
 _NEXT_DOOR = 40.0
 
 _RANK = list(RelationKind)
-# Children have friends from this age, years; friends are of one age, to within so many years.
-_FRIENDS_FROM, _SAME_AGE_YEARS = 3, 2
+_FRIENDS_FROM = 3  # age in years from which on children have friends
+_SAME_AGE_YEARS = 2  # years between pupils of one age, at most
 _TEAM = 3  # of many at one workplace one knows so many to either side
 _ACROSS = 0.15  # share of them that are rewired across
 _TEACHERS = 2  # that a pupil knows

@@ -28,8 +28,8 @@ from vico.world.trips.network import TURN
 from vico.world.walk_lengths import Walk
 from vico.world.world import World
 
-# A point that so many walks began or ended at is worth learning about; so many points are.
-_OFTEN, _MOST_LEARNED = 12, 64
+_OFTEN = 12  # walks that begin or end at a point that is worth learning about
+_MOST_LEARNED = 64  # points
 
 
 class Walks:

@@ -26,8 +26,8 @@ from vico.errors import InputError
 from vico.world.model import Category
 from vico.world.opening_hours import Span
 
-# Places that close for so long, minutes, do so for a midday break; staff go home if they have so long there.
-_CLOSED, _HOME_FOR_LUNCH = 30, 40
+_CLOSED = 30  # minutes of closing that are a midday break
+_HOME_FOR_LUNCH = 40  # minutes at home for which staff go there
 # How much longer one sleeps on a day off, minutes, unless one rises early anyway.
 _LIE_IN = 70
 

@@ -30,16 +30,18 @@ from vico.world.opening_hours import Span
 
 #: Monday to Friday there is school.
 SCHOOL_DAYS = range(5)
-# Lessons last at least so long, and are within these hours of the day, minutes.
-_LEAST, _EARLIEST, _LATEST = 150, 7 * 60 + 30, 17 * 60
+_LEAST = 150  # minutes that lessons last
+_EARLIEST = 7 * 60 + 30  # minute of the day when lessons begin
+_LATEST = 17 * 60  # minute of the day when lessons end
 # How long one stays when one takes a child to school or fetches it, and how long before the lessons that is, minutes.
 _AT_THE_GATE = 5
-# Until when all small children are fetched, and how long one sees them in at home then, minutes.
-_LAST_FETCH, _SEEING_IN = 17 * 60 + 10, 10
+_LAST_FETCH = 17 * 60 + 10  # minute of the day until which all small children are fetched
+_SEEING_IN = 10  # minutes that one sees them in at home then
 # When those who learn at home do, minutes of the day.
 _HOME_LESSONS = (9 * 60, 14 * 60 + 30)
-# Until when children go out alone, and when they are back from meetings, minutes of the day by age.
-_CURFEW_AGES, _OUT, _BACK = (10, 13, 17), (18 * 60, 19 * 60, 21 * 60), (19 * 60 + 15, 20 * 60, 21 * 60 + 30)
+_CURFEW_AGES = (10, 13, 17)  # years
+_OUT = (18 * 60, 19 * 60, 21 * 60)  # minutes of the day until which children go out alone, by age
+_BACK = (19 * 60 + 15, 20 * 60, 21 * 60 + 30)  # ... when they are back from meetings
 # How long work beside children is at least, minutes.
 _PART_TIME = 4 * 60
 # When a parent who is alone with small children is back for the evening.
@@ -288,8 +290,8 @@ def settle_care(index: PlaceIndex, care: Care) -> None:
 _SLEEP_AGES, _SLEEP = (5, 9, 13, 17), (650, 610, 560, 510)
 # When they wake by themselves, minutes of the day, by age.
 _WAKE = (405, 410, 425, 450)
-# Around when lunch is, and how long it takes, minutes.
-_NOON, _LUNCH = 11 * 60 + 50, 30
+_NOON = 11 * 60 + 50  # minute of the day around which lunch is
+_LUNCH = 30  # minutes that it takes
 # Stretches of lessons at home, minutes of the day.
 _HOME_SCHOOL_HOURS = ((9 * 60, 12 * 60), (13 * 60, 16 * 60))
 

@@ -47,8 +47,9 @@ from vico.world.world import World
 
 # Years between a child and at least one adult it lives with.
 _PARENT = (16, 60)
-# Seconds of a school day that are lessons, at school and at home, and of a night that children sleep.
-_AT_SCHOOL, _AT_HOME, _SLEEP = 2 * 3600, 3600, 7.5 * 3600
+_AT_SCHOOL = 2 * 3600  # seconds of lessons of a day at school
+_AT_HOME = 3600  # seconds of lessons of a day at home
+_SLEEP = 7.5 * 3600  # seconds that children sleep a night
 # Children are out between these seconds of the day only.
 _OUT = (6 * 3600, 22 * 3600 + 1800)
 

@@ -114,20 +114,20 @@ def staff_capacity(index: PlaceIndex, place: Place) -> int:
     return max(_LEAST, round(index.floor_area(place) / metres))
 
 
-# From this share of the beds on homes are chosen that leave few free; so many can be filled with households.
-_CROWDED, _FILLED = 0.5, 0.9
+_CROWDED = 0.5  # share of the beds from which on homes are chosen that leave few free
+_FILLED = 0.9  # share of the beds that can be filled with households
 #: Where students study. `workplace` of a student is one of these.
 STUDY_KINDS = frozenset({"university", "college", "research_institute", "library", "music_school"})
 
 # What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
 _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
-# Metres as the crow flies that people go to work or to lectures; minutes at home before midnight.
-_COMMUTE, _LAST = 2000.0, 10
+_COMMUTE = 2000.0  # metres as the crow flies that people go to work or to lectures
+_LAST = 10  # minutes at home before midnight
 # Days of work in a week; trades that work from Monday to Friday only; and the other two days.
 _WORKING_DAYS = 5
-# Trades that one may stay longer at, and how much longer than others the most ambitious of all would, minutes.
-_OPEN_ENDED, _OVERTIME = ("office", "bank", "school", "health", "day"), 200
+_OPEN_ENDED = ("office", "bank", "school", "health", "day")  # patterns of trades that one may stay longer at
+_OVERTIME = 200  # minutes that the most ambitious of all would stay longer than others
 # Share of those who work the first part of a long day.
 _FIRST = 0.55
 _OFFICE_DAYS, _WEEKEND = ("office", "bank", "school"), (5, 6)

@@ -202,8 +202,8 @@ _ABOVE_GROUND = 1.5  # metres above the ground from which on an unnamed level su
 _SPECK = 0.02  # square metres
 _CLOSING = 0.03  # metres of gap between surfaces that are one
 _COVERED = 0.85  # share of the footprint that a roof must cover
-_LEAST_AREA = 2.0
-_LOWEST, _HIGHEST = 1.0, 900.0
+_LEAST_AREA = 2.0  # square metres that a building covers
+_LOWEST, _HIGHEST = 1.0, 900.0  # metres above its ground that the top of a roof may lie
 
 
 @dataclass(frozen=True)

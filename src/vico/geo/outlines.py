@@ -34,7 +34,8 @@ from vico.geometry import distances
 MOST_CORNERS = 1000
 # Mending takes time that grows with the third power of the crossings: 200 random corners take seconds, 2,000 days.
 _MOST_CROSSINGS = 200
-_FREE, _MOST_RATIO = 64 << 20, 60  # real extracts unpack to 3 (pbf) to 20 times (XML) their size
+_FREE = 64 << 20  # bytes that any extract may unpack to
+_MOST_RATIO = 60  # real extracts unpack to 3 (pbf) to 20 times (XML) their size
 
 
 def is_scribble(lines: list[NDArray[np.float64]]) -> bool:

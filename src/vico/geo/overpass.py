@@ -27,7 +27,9 @@ ENDPOINT = "https://overpass-api.de/api/interpreter"
 #: Map data reach this far beyond the window, metres: as far as `read_osm` keeps them, and one for a rounded radius.
 MARGIN = 61.0
 
-_SECONDS, _MEMORY = 180, 512 << 20  # what a query may take on the server; its own defaults
+# Limits of a query on the server; its own defaults.
+_SECONDS = 180
+_MEMORY = 512 << 20  # bytes
 _MOST_HALF = 10_000.0
 _MOST_ANSWER = 512 << 20
 _DEEPEST = 3  # splits: 64 pieces at most

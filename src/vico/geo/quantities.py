@@ -15,7 +15,10 @@ from enum import Enum
 from functools import lru_cache
 
 FOOT, INCH = 0.3048, 0.0254  # metres
-_KMH, _MPH, _KNOT = 1 / 3.6, 0.44704, 0.514444  # metres a second
+# Metres a second.
+_KMH = 1 / 3.6
+_MPH = 0.44704
+_KNOT = 0.514444
 
 
 class Kind(Enum):

@@ -30,8 +30,9 @@ _ABOVE = ((9, 200.0, 4.0), (400, 1000.0, 20.0))
 _BELOW = ((9, 60.0, 3.0), (400, 500.0, 10.0))
 _LEAST_AROUND = 3  # neighbours that are known
 _MOST_ROUNDS = 8
-# Large grids are gone through in overlapping tiles: a group wider than the overlap is none.
-_STRIDE, _OVERLAP = 512, 128
+# Large grids are gone through in overlapping tiles, pixels: a group wider than the overlap is none.
+_STRIDE = 512
+_OVERLAP = 128
 
 
 def without_outliers(
@@ -145,11 +146,14 @@ _RING = 3  # pixels from a patch to the ground that it is held against: resampli
 _LEAST_RING = 8
 _SEA_LEVEL = 2.0  # metres around 0: geoids differ
 _NEARLY_ALL = 0.95
-_MIXED, _MANY_MIXED = 0.8, 0.1  # of the step, below which a pixel beside a void is a mixture; share of these
+_MIXED = 0.8  # share of the step below which a pixel beside a void is a mixture
+_MANY_MIXED = 0.1  # share of the pixels beside a void that are mixtures where all are left out
 # What nearly all of the ring stands above the patch or below it, metres and times the distance between pixels: where
 # the patch is left out, and where it is told of and kept. No lake has walls of 69 degrees along its whole shore. At 0
 # there is the sea, with cliffs of 214 m over kilometres (Moher). Stacks and towers have a flat top on a coarse grid.
-_LAKE, _SEA, _TOP = ((100.0, 8.0), (100.0, 8.0)), ((250.0, 8.0), (30.0, 3.0)), ((300.0, 8.0), (100.0, 8.0))
+_LAKE = (100.0, 8.0), (100.0, 8.0)
+_SEA = (250.0, 8.0), (30.0, 3.0)
+_TOP = (300.0, 8.0), (100.0, 8.0)
 _TOUCHING = np.ones((3, 3), bool)
 
 

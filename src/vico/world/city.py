@@ -243,7 +243,8 @@ def whole_walkable(folder: Path, half: float) -> WalkableMap:
 
 
 #: Entities of the first tile's things begin here: above those of bodies and of what a simulation adds.
-_FIRST, _EACH = 2_000_000, 500_000
+_FIRST = 2_000_000
+_EACH = 500_000  # entities of a tile
 # A city has millions of things: their names take a quarter of the room if each takes only what it needs.
 _TEXT = np.dtypes.StringDType()
 _OF_THE_CITY = ("stop_", "tram_stop_", "bikes_")

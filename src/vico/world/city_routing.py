@@ -28,12 +28,12 @@ from vico.world.routing import SNAP, Router, walking_costs
 from vico.world.walk_lengths import Walk, walk_of
 from vico.world.walkable import WalkableMap
 
-# Cells: walks between ends so near are looked for at once, so far around them.
-_NEAR, _AROUND = 800, 300
+_NEAR = 800  # cells; walks between ends so near are looked for at once
+_AROUND = 300  # cells around both ends in which they are looked for
 # How often a walk is looked for anew where something closed is in the way of the last.
 _TRIES = 40
-# Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks to or from a gate, 8 a cell.
-_ENDS, _LEGS = 8192, 8192
+_ENDS = 8192  # ends whose costs to the gates around them are kept, 8 bytes a gate
+_LEGS = 8192  # walks to or from a gate that are kept, 8 bytes a cell
 # Tiles that are read before the memory that the map is read into is given back: some 4 MB each at 400 m a tile. What is
 # given back has to be mapped again: five minutes of 27 km2 took 16 million page faults with 24, 2.4 million with this.
 _TILES = 96
@@ -341,8 +341,8 @@ class _WalkQuery:
 _NEAR_METRES = 400  # cells of a metre; walks between ends so near are looked for at once
 _AROUND_METRES = 150  # cells of a metre around both ends in which they are looked for
 _OFF = 3  # cells of a metre that gates lie off at most
-# So many ends are remembered with their walks to the gates around them, some 600 bytes each, and so many tiles' cells.
-_LENGTH_ENDS, _LENGTH_TILES = 32_768, 24
+_LENGTH_ENDS = 32_768  # ends that are remembered with their walks to the gates around them, some 600 bytes each
+_LENGTH_TILES = 24  # tiles whose cells are remembered
 
 
 class CityWalkLengths:

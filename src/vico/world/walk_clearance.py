@@ -29,7 +29,8 @@ GRID = 0.1
 WIDER = 0.4
 """Metres beyond its room that a line has on one side for what a kerb takes on the other."""
 
-_ASIDE, _NARROW = 0.01, 0.05  # what it costs to be a metre aside at a place, and to have a metre too little room
+_ASIDE = 0.01  # what it costs to be a metre aside at a place
+_NARROW = 0.05  # ... to have a metre too little room
 _MOVES = np.array([0.0, 0.1, 0.6, 1.5])  # what it costs to move by so many lines from one place to the next
 _APART = 0.56  # metres of room that two need to pass each other
 _EACH_WAY = 2.0  # metres before and after a narrow place that are as narrow: walkers look so far ahead
@@ -302,7 +303,8 @@ BODY = 0.3
 
 _AIR = 0.06  # metres more from lines to solids
 _STEP = 0.5  # metres between the places at which a line is looked at
-_AROUND, _TRIES = 0.6, 4  # metres left out of a line that leads through a solid, and how often that is tried
+_AROUND = 0.6  # metres left out of a line that leads through a solid
+_TRIES = 4  # times that this is done
 _SAME = 0.02
 _OFF_EDGE = 0.3  # metres that walkers' middles stay from the edges of kerbs and quays, above them
 

@@ -78,9 +78,10 @@ def walk_of(router: Router, start: Point2, goal: Point2) -> Walk:
 
 #: Seconds that going through a door takes: an agent acts once a second.
 DOOR = 1.0
-#: Seconds for which a lift's doors close before a ride and open after it, and how fast it goes, metres a second: two
-#: seconds for a floor of 3.2 m.
-LIFT_DOORS, LIFT_SPEED = 4.0, 1.6
+#: Seconds for which a lift's doors close before a ride and open after it.
+LIFT_DOORS = 4.0
+#: Speed of a lift, m/s: two seconds for a floor of 3.2 m.
+LIFT_SPEED = 1.6
 
 
 def lift_seconds(up: float) -> float:

@@ -189,8 +189,9 @@ def _character_faults(reply: CharacterReply, person: Resident) -> list[str]:
 
 # Places that a resident's day is planned with, at most; the nearest of what they know.
 _MOST_PLACES = 24
-# Least sleep of grown-ups, and of children, minutes; least time at work of who has a workplace.
-_SLEEP, _SLEEP_OF_CHILDREN, _AT_WORK = 4 * 60, 7.5 * 60, 60
+_SLEEP = 4 * 60  # least minutes, of grown-ups
+_SLEEP_OF_CHILDREN = 7.5 * 60  # least minutes
+_AT_WORK = 60  # least minutes of who has a workplace
 
 
 def write_days(

@@ -297,10 +297,12 @@ def _at_home(home: str, start: int, end: int) -> Stay:
     return Stay(start, end, ItemType.MAIN, "Spend time at home", home, ActivityTag.LEISURE)
 
 
-# Somebody whose working hours nobody has said works so long, from this time on if the place is open, minutes.
-_WORKING_DAY, _USUAL_START, _EARLIEST = 8 * 60, 9 * 60, 6 * 60
-# A working day of so many minutes has a break of so many.
-_LONG_DAY, _BREAK = 6 * 60, 30
+# Working hours that nobody has said.
+_WORKING_DAY = 8 * 60  # minutes
+_USUAL_START = 9 * 60  # minute of the day, if the place is open
+_EARLIEST = 6 * 60  # minute of the day
+_LONG_DAY = 6 * 60  # minutes of work from which on a day has a break
+_BREAK = 30  # minutes
 
 
 class Lives:

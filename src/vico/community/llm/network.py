@@ -29,10 +29,9 @@ _BATCH = 20  # people of a question
 _PLACES = 24  # meeting places in it
 _A_GROUP = 4  # people a group
 _MEETING_PLACES = (Category.OPEN, Category.FOOD, Category.ENTERTAINMENT, Category.OFFICE)
-# Minutes a meeting takes; when the first one of a day may begin, minute of the day.
-_EARLIEST = 6 * 60
-_SHORTEST, _LONGEST = 20, 240
-_MOST_DETAIL = 240
+_EARLIEST = 6 * 60  # minute of the day when the first meeting may begin
+_SHORTEST, _LONGEST = 20, 240  # minutes a meeting takes
+_MOST_DETAIL = 240  # characters
 _MOST_GROUPS = 2  # of one person
 
 
