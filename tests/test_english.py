@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vico.english import participle, split_name, uncapitalize, with_article
+from vico.english import enumerate_words, participle, split_name, uncapitalize, with_article
 
 
 @pytest.mark.parametrize(
@@ -51,3 +51,7 @@ def test_abbreviations_stay_capitals() -> None:
 )  # fmt: skip
 def test_a_title_is_no_first_name(name: str, parts: tuple[str, str, str]) -> None:
     assert split_name(name) == parts
+
+
+def test_words_are_enumerated_with_a_final_and() -> None:
+    assert [enumerate_words(list("abc")[:k]) for k in (1, 2, 3)] == ["a", "a and b", "a, b and c"]

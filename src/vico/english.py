@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
-__all__ = ["participle", "split_name", "uncapitalize", "with_article"]
+__all__ = ["enumerate_words", "participle", "split_name", "uncapitalize", "with_article"]
 # Vowels that are spoken as consonants, and the other way round, at the beginning of a word.
 _LIKE_YOU = re.compile(r"(?:eu|ewe|one(?!i)|once|u(?:ni(?!n|m)|se|su|ti|ro|k|fo)|ukr)")
 _SILENT_H = re.compile(r"(?:hour|honest|honou?r|heir)")
@@ -38,6 +39,11 @@ def with_article(noun: str) -> str:
         low = first.lower()
         an = bool(_SILENT_H.match(low)) or (low[:1] in "aeiouàáâäåæèéêëìíîïòóôöøùúûü" and not _LIKE_YOU.match(low))
     return f"{'an' if an else 'a'} {noun}"
+
+
+def enumerate_words(words: Sequence[str]) -> str:
+    """Join words, one at least, with commas and a final "and"."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def uncapitalize(text: str) -> str:

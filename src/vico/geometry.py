@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 
 __all__ = [
     "arc_lengths",
+    "direction",
     "distance",
     "distances",
     "points_along",
+    "polyline_length",
     "quaternion_from_matrix",
+    "rotate",
     "rotation_matrix",
+    "wrap_angle",
     "yaw_quaternion",
 ]
 
@@ -31,6 +35,28 @@ def distances(points: NDArray[Any], to: NDArray[Any] | tuple[float, float]) -> N
     """Return how far points are from a point, or from as many others; shapes ``(n, 2)`` and ``(2,)`` or ``(n, 2)``."""
     found: NDArray[np.float64] = np.hypot(*(points - to).T)
     return found
+
+
+def wrap_angle(angle: float) -> float:
+    """Return the same direction as an angle of at least -pi and less than pi, radians."""
+    return float((angle + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+def direction(yaw: float) -> NDArray[np.float64]:
+    """Return the unit vector that points along a yaw, radians counter-clockwise from east; shape ``(2,)``."""
+    return np.array([math.cos(yaw), math.sin(yaw)])
+
+
+def rotate(points: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
+    """Return points, shape ``(..., 2)``, turned about the origin by `yaw`, radians counter-clockwise."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def polyline_length(points: NDArray[np.float64]) -> float:
+    """Return the length of a polyline, metres; its points are east and north, shape ``(n, 2)``."""
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def arc_lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:

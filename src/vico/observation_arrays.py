@@ -18,7 +18,7 @@ from vico.io.compiled import compiled
 
 @dataclass(frozen=True)
 class CrowdObservations:
-    """What all agents observe, as arrays: row ``i`` is that of the agent whose `index` is ``i``.
+    """Observations of all agents as arrays: row ``i`` is that of the agent whose `index` is ``i``.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ _SLOTS = 1024  # of the table of entities at first, a power of 2; at most half o
 
 
 class EntityPixels(NamedTuple):
-    """What a picture shows, by entity, ascending.
+    """Entities that a picture shows, ascending.
 
     Attributes
     ----------

@@ -34,8 +34,10 @@ BUS_DWELL = 30.0
 BUS_LAYOVER = 40.0
 BUS_FARE = 2.0
 BUS_DOOR_REACH = 3.0
-#: How wide a bus is, and how far behind its front the middle of its front door is and of each of them, metres.
-BUS_WIDTH, BUS_DOOR_BEHIND_FRONT = 2.55, 1.35
+#: Width of a bus, metres.
+BUS_WIDTH = 2.55
+#: How far behind its front the middle of its front door is, metres; and of each of its doors.
+BUS_DOOR_BEHIND_FRONT = 1.35
 BUS_DOORS_BEHIND_FRONT = (BUS_DOOR_BEHIND_FRONT, 6.05, 9.55)
 BUS_CAPACITY = 60
 #: Trams: sections coupled to one, their length, and their width, metres; doors and fares are as with buses.
@@ -64,7 +66,7 @@ def walking_factor(snow_cover: float, ice: float) -> float:
 
 
 class ActionStatus(IntEnum):
-    """How the last action went. Observations give the name in lower case, as ``action_status``."""
+    """Outcome of the last action. Observations give the name in lower case, as ``action_status``."""
 
     OK = 0
     COLLISION = 1

@@ -1,4 +1,4 @@
-"""Who lives in a world: residents, groups, schedules, and the validator that keeps them grounded."""
+"""The people of a world: residents, groups, schedules, and the validator that keeps them grounded."""
 
 from vico.community.author import Author, build_community, procedural_author
 from vico.community.folder import digest_of, read_community, read_manifest, read_names, world_of, write_community

@@ -25,7 +25,7 @@ from vico.community.model import (
     WorldIdentity,
     with_tags,
 )
-from vico.community.people import POCKET_MONEY, Household, ResidentDraft, draw_character, draw_households
+from vico.community.people import POCKET_MONEY, ResidentDraft, draw_character, draw_households
 from vico.community.place_index import PlaceIndex
 from vico.community.profiles import Biographer, Wardrobe, honest_character, lifestyle_of
 from vico.community.relations import draw_relations
@@ -162,7 +162,15 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
     days = write_days(planned, first, meetings, relations, dates, stream)
     groups = _groups(meetings)
     people = _residents(planned, days, meetings, stream)
-    riding = [_schedules_with_rides(people, groups, day, stream) for day in days]
+    riding = [
+        with_rides(
+            [resident.model_copy(update={"schedule": day.items[resident.id]}) for resident in people],
+            groups,
+            day.index,
+            lambda name: stream(f"rides/{name}"),
+        )
+        for day in days
+    ]
     community = Community(
         producer=f"vico {__version__}",
         author=_PROCEDURAL,
@@ -179,16 +187,7 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
             for day, residents in zip(days[1:], riding[1:], strict=True)
         ],
     )
-    return _with_descriptions(community, planned, meetings, stream)
-
-
-def _with_descriptions(
-    community: Community,
-    planned: DayDrafts,
-    meetings: Sequence[Meeting],
-    stream: Callable[[str], np.random.Generator],
-) -> Community:
-    """Put what is said of people into words, now that their days are known."""
+    # What is said of people has to agree with their days.
     measures = day_measures(community)
     biographer = Biographer(stream("biographies"), planned.index)
     joined = meetings_by_member(meetings)
@@ -243,14 +242,28 @@ def _residents(
 ) -> list[Resident]:
     """Write everybody down, with the first day on foot, but for what is said of them."""
     index, households, drafts = planned.index, planned.households, planned.people
-    looks = _looks(stream("looks"), households)
+    wardrobe = Wardrobe(stream("looks"))
+    looks: dict[str, ResidentAppearance] = {}
+    for household in households:
+        for k, member in enumerate(household.members):
+            # Children take after their parents, relatives who live together otherwise after the first of them.
+            parents = [looks[adult.id] for adult in household.adults] if member.child else []
+            if household.kind in ("parent", "siblings") and k > 0:
+                parents = [looks[household.members[0].id]]
+            looks[member.id] = wardrobe.look_of(member, parents)
     spawns = index.spawn_points([s.home for s in drafts])
     joined = meetings_by_member(meetings)
     people = []
     for draft, spawn in zip(drafts, spawns, strict=True):
         chance = stream(f"details/{draft.id}")
-        mine = joined.get(draft.id, [])
-        frequented = [place for day in days for place in day.frequented[draft.id]]
+        # Where they go, where they meet, where their hobbies could take them, and what they pass on their own street.
+        known = [draft.home, *([draft.workplace] if draft.workplace else [])]
+        known += [place for day in days for place in day.frequented[draft.id]]
+        known += [meeting.place.id for meeting in joined.get(draft.id, [])]
+        passed = (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT)
+        known += index.nearest(
+            draft.home, *((hobby.kinds, 2) for hobby in draft.hobbies), *((category, 3) for category in passed)
+        )
         people.append(
             Resident(
                 id=draft.id,
@@ -268,20 +281,12 @@ def _residents(
                 household=f"household_{draft.household}",
                 home=draft.home,
                 workplace=draft.workplace,
-                known_places=_known_places(index, draft, frequented, mine),
+                known_places=list(dict.fromkeys(known)),
                 spawn=spawn,
                 schedule=days[0].items[draft.id],
             )
         )
     return people
-
-
-def _schedules_with_rides(
-    people: Sequence[Resident], groups: Sequence[Group], day: DaySchedules, stream: Callable[[str], np.random.Generator]
-) -> list[Resident]:
-    """Return everybody with the schedule of a day, rides put in."""
-    there = [resident.model_copy(update={"schedule": day.items[resident.id]}) for resident in people]
-    return with_rides(there, groups, day.index, lambda name: stream(f"rides/{name}"))
 
 
 def _absent(meetings: Sequence[Meeting], groups: Sequence[Group], day: DaySchedules) -> dict[str, list[str]]:
@@ -293,18 +298,6 @@ def _absent(meetings: Sequence[Meeting], groups: Sequence[Group], day: DaySchedu
         if absent := [member for member in group.members if member not in here]:
             found[group.id] = absent
     return found
-
-
-def _looks(chance: np.random.Generator, households: Sequence[Household]) -> dict[str, ResidentAppearance]:
-    wardrobe = Wardrobe(chance)
-    looks: dict[str, ResidentAppearance] = {}
-    for household in households:
-        for k, draft in enumerate(household.members):
-            parents = [looks[adult.id] for adult in household.adults] if draft.child else []
-            if household.kind in ("parent", "siblings") and k > 0:
-                parents = [looks[household.members[0].id]]
-            looks[draft.id] = wardrobe.look_of(draft, parents)
-    return looks
 
 
 def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
@@ -322,36 +315,8 @@ def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
     return int(np.clip(round(float(chance.normal(level, 90))), 100, 1000))
 
 
-def _known_places(
-    index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]
-) -> list[str]:
-    """Where they go, where they meet, where their hobbies could take them, and what they pass on their own street."""
-    known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
-    passed = (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT)
-    known += index.nearest(
-        draft.home, *((hobby.kinds, 2) for hobby in draft.hobbies), *((category, 3) for category in passed)
-    )
-    return list(dict.fromkeys(known))
-
-
 def _groups(meetings: Sequence[Meeting]) -> list[Group]:
-    return [
-        Group(
-            id=f"group_{k}",
-            name=name,
-            description=m.circle.description,
-            activity=m.circle.activity,
-            place=m.place.id,
-            members=[s.id for s in m.members],
-            start=clock_of(m.start * 60),
-            end=clock_of(m.end * 60),
-        )
-        for k, (m, name) in enumerate(zip(meetings, _group_names(meetings), strict=True))
-    ]
-
-
-def _group_names(meetings: Sequence[Meeting]) -> list[str]:
-    """Name groups after their circle, with as much of place and time as tells them apart; chains share names."""
+    """Return meetings as groups, named after their circle with as much of place and time as tells them apart."""
     forms = [
         [
             m.circle.name,
@@ -362,4 +327,16 @@ def _group_names(meetings: Sequence[Meeting]) -> list[str]:
         for m in meetings
     ]
     counts = [Counter(names) for names in zip(*forms, strict=True)]
-    return [next(name for name, count in zip(mine, counts, strict=True) if count[name] == 1) for mine in forms]
+    return [
+        Group(
+            id=f"group_{k}",
+            name=next(name for name, count in zip(forms[k], counts, strict=True) if count[name] == 1),
+            description=m.circle.description,
+            activity=m.circle.activity,
+            place=m.place.id,
+            members=[s.id for s in m.members],
+            start=clock_of(m.start * 60),
+            end=clock_of(m.end * 60),
+        )
+        for k, m in enumerate(meetings)
+    ]

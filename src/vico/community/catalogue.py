@@ -91,7 +91,7 @@ class Freelancer(DataRecord):
 
 
 class FormerTrade(DataRecord):
-    """What a retired person did: `title` completes "a retired ...", `told` completes "PRONOUN ..."."""
+    """Former trade of a retired person: `title` completes "a retired ...", `told` completes "PRONOUN ..."."""
 
     title: str
     told: str
@@ -106,7 +106,7 @@ class Visitor(DataRecord):
 
 
 class WaysOfLife(DataRecord):
-    """Who lives without a place of work, and what students study."""
+    """People without a place of work, and the subjects of students."""
 
     subjects: tuple[str, ...] = ()
     freelancer: tuple[Freelancer, ...] = ()
@@ -138,7 +138,7 @@ class TraitWords(DataRecord):
 
 
 class Claim(DataRecord):
-    """What words for somebody say of their days: `measure` of `vico.community.day.DayMeasures` in bounds."""
+    """Claim of words for somebody about their days: `measure` of `vico.community.day.DayMeasures` in bounds."""
 
     says: tuple[str, ...]
     measure: Literal[
@@ -174,7 +174,7 @@ class Way(DataRecord):
 
 
 class Character(DataRecord):
-    """What people care for, and the words for what they are like."""
+    """Values of people, and the words for their traits."""
 
     value: tuple[Value, ...] = ()
     claim: tuple[Claim, ...] = ()
@@ -216,7 +216,7 @@ class Hobby(DataRecord):
 
     @property
     def about(self) -> ActivityTag:
-        """What going out for it is about."""
+        """Tag of an outing for it."""
         return self.tag or (ActivityTag.EXERCISE if self.active else ActivityTag.LEISURE)
 
 
@@ -271,7 +271,7 @@ class Circle(DataRecord):
 
     @property
     def starts(self) -> tuple[int, ...]:
-        """When a meeting may start, minutes of the day."""
+        """Return when a meeting may start, minutes of the day."""
         return tuple(int(t[:2]) * 60 + int(t[3:]) for t in self.times)
 
 
@@ -310,7 +310,7 @@ class Pastimes(DataRecord):
 
 
 class GuestMeals(DataRecord):
-    """What guests of a hotel eat in."""
+    """Kinds of places where guests of a hotel eat."""
 
     breakfast: str
     lunch: str
@@ -318,7 +318,7 @@ class GuestMeals(DataRecord):
 
 
 class AtHome(DataRecord):
-    """What people do at home: one of each list is somebody's way; `brief` is what there is time for in minutes."""
+    """Routines at home: one of each list is somebody's way; `brief` is what there is time for in minutes."""
 
     brief: str = "Change and set out again"
 
@@ -341,7 +341,7 @@ class OutingKinds(DataRecord):
 
 
 class Errands(DataRecord):
-    """What one goes to a kind of place for, and the kinds of places of other outings."""
+    """Purposes of going to a kind of place, and the kinds of places of other outings."""
 
     errands: dict[str, str]
     kinds: OutingKinds

@@ -410,7 +410,7 @@ _NOT_LEISURE = (ActivityTag.WORK, ActivityTag.STUDY, ActivityTag.SLEEP, Activity
 
 @dataclass(frozen=True)
 class DayMeasures:
-    """What somebody's days come to, means over the days.
+    """Measures of somebody's days, means over the days.
 
     Attributes
     ----------
@@ -476,7 +476,9 @@ def character_findings(community: Community) -> list[CommunityFinding]:
     measures = day_measures(community)
     found = []
     for resident in community.residents:
-        said = [*resident.personality.traits, *_parts(resident.lifestyle)]
+        # A lifestyle has phrases: "Night owl; stays fit and likes a tidy flat."
+        rhythm, _, ways = resident.lifestyle.rstrip(".").partition("; ")
+        said = [*resident.personality.traits, rhythm, *ways.replace(" and ", ", ").split(", ")]
         for claim in claims():
             for words in said:
                 if words in claim.says and not measures[resident.id].holds(claim):
@@ -491,37 +493,27 @@ def agrees(words: str, measures: DayMeasures) -> bool:
     return all(measures.holds(claim) for claim in claims() if words in claim.says)
 
 
-def _parts(lifestyle: str) -> list[str]:
-    """Return the phrases of a lifestyle: "Night owl; stays fit and likes a tidy flat."."""
-    rhythm, _, ways = lifestyle.rstrip(".").partition("; ")
-    return [rhythm, *ways.replace(" and ", ", ").split(", ")]
-
-
 def _of_day(resident: Resident, items: Sequence[ScheduleItem], homes: Collection[str]) -> dict[str, float]:
     sleep = [item for item in items if item.type is ItemType.SLEEP]
     meals = [item for item in items if item.type is ItemType.MEAL]
     away = [item for item in items if item.place not in (None, resident.home)]
+    last = max((item for item in sleep if item.start > "12:00:00"), key=lambda item: item.start, default=None)
     return {
         "out": sum(_hours(i) for i in away if i.tag not in _NOT_LEISURE),
         "work": sum(_hours(i) for i in items if i.tag in (ActivityTag.WORK, ActivityTag.STUDY)),
-        "exercise": sum(_hours(i) for i in items if i.tag is ActivityTag.EXERCISE or _on_own_legs(i)),
+        "exercise": sum(
+            _hours(i)
+            for i in items
+            if i.tag is ActivityTag.EXERCISE or (i.type is ItemType.COMMUTE and i.mode in (None, Mode.WALK, Mode.BIKE))
+        ),
         "meals_out": sum(i.place != resident.home for i in meals),
         "dinners_out": sum(i.place != resident.home and i.start >= _DINNER for i in meals),
         "meals_home": sum(i.place == resident.home for i in meals),
         "rides": sum(i.mode not in (None, Mode.WALK) for i in items),
         "visiting": sum(_hours(i) for i in away if i.place in homes and i.tag not in _NOT_LEISURE),
         "rises": min(seconds_of_day(i.end) for i in sleep) / 3600 if sleep else 0.0,
-        "retires": _retires(sleep),
+        "retires": 24.0 if last is None else seconds_of_day(last.start) / 3600,
     }
-
-
-def _retires(sleep: Sequence[ScheduleItem]) -> float:
-    last = max((item for item in sleep if item.start > "12:00:00"), key=lambda item: item.start, default=None)
-    return 24.0 if last is None else seconds_of_day(last.start) / 3600
-
-
-def _on_own_legs(item: ScheduleItem) -> bool:
-    return item.type is ItemType.COMMUTE and item.mode in (None, Mode.WALK, Mode.BIKE)
 
 
 def _hours(item: ScheduleItem) -> float:
@@ -538,13 +530,10 @@ def _acquaintances(community: Community) -> tuple[NDArray[np.int64], NDArray[np.
     for members in [*([row[m] for m in group.members] for group in community.groups), *homes.values()]:
         pairs |= {tuple(sorted(pair)) for pair in combinations(members, 2)}
     known = np.array(sorted(pairs), np.int64).reshape(-1, 2)
-    house = np.array(_numbers([r.household or r.id for r in community.residents]), np.int64)
-    return known, house[known[:, 0]] == house[known[:, 1]]
-
-
-def _numbers(names: Sequence[str]) -> list[int]:
     number: dict[str, int] = {}
-    return [number.setdefault(name, len(number)) for name in names]
+    houses = [number.setdefault(r.household or r.id, len(number)) for r in community.residents]
+    house = np.array(houses, np.int64)
+    return known, house[known[:, 0]] == house[known[:, 1]]
 
 
 def _hours_in_company(

@@ -59,11 +59,6 @@ COMMUNITY_FOLDER = FolderKind(
 )
 
 
-def _rows(records: Sequence[Record]) -> bytes:
-    rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, indent=1) for r in records]
-    return ("[\n" + ",\n".join(rows) + "\n]\n").encode()
-
-
 def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
     """Return the bytes of the parts, and of the manifest."""
     lists: tuple[Sequence[Record], ...] = (
@@ -72,7 +67,10 @@ def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
         community.relations,
         community.further_days,
     )
-    parts = {name: _rows(records) for name, records in zip(_PARTS, lists, strict=True)}
+    parts: dict[str, bytes] = {}
+    for name, records in zip(_PARTS, lists, strict=True):
+        rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, indent=1) for r in records]
+        parts[name] = ("[\n" + ",\n".join(rows) + "\n]\n").encode()
     if community.authorship is not None:
         parts[_AUTHORSHIP] = (
             json.dumps(community.authorship.model_dump(mode="json"), ensure_ascii=False, indent=1) + "\n"
@@ -179,6 +177,12 @@ def read_community(path: Path, world: World | None = None) -> Community:
             f"{path}: made for world {manifest.world.name!r} ({manifest.world.digest[:12]}), not for "
             f"{world.manifest.name!r} ({world.digest[:12]}); give that world, or build a community for this one"
         )
+    authorship = None
+    if _AUTHORSHIP in manifest.files:
+        try:
+            authorship = Authorship.model_validate_json(_content(path / _AUTHORSHIP, manifest))
+        except ValidationError as error:
+            raise _invalid(path / _AUTHORSHIP, error) from None
     community = Community(
         producer=manifest.producer,
         author=manifest.author,
@@ -188,7 +192,7 @@ def read_community(path: Path, world: World | None = None) -> Community:
         residents=_records(path / "residents.json", Resident, manifest),
         groups=_records(path / "groups.json", Group, manifest),
         relations=_records(path / "relations.json", Relation, manifest),
-        authorship=_authorship(path / _AUTHORSHIP, manifest) if _AUTHORSHIP in manifest.files else None,
+        authorship=authorship,
         further_days=_records(path / "days.json", CommunityDay, manifest) if "days.json" in manifest.files else [],
     )
     # Folders of earlier versions, and days that a language model wrote, may say nothing about what an item is about.
@@ -222,13 +226,6 @@ def world_of(path: Path) -> Path | None:
 def _records(path: Path, kind: type[R], manifest: CommunityManifest) -> list[R]:
     try:
         return TypeAdapter(list[kind]).validate_json(_content(path, manifest))  # type: ignore[valid-type]
-    except ValidationError as error:
-        raise _invalid(path, error) from None
-
-
-def _authorship(path: Path, manifest: CommunityManifest) -> Authorship:
-    try:
-        return Authorship.model_validate_json(_content(path, manifest))
     except ValidationError as error:
         raise _invalid(path, error) from None
 

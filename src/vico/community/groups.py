@@ -21,8 +21,9 @@ from vico.community.schooling import Care
 from vico.errors import EmptyInputError
 from vico.world.model import Category, Place
 
-# Most groups of somebody reserved, of others, and of the outgoing, by extraversion.
-_RESERVED, _OUTGOING, _MEMBERSHIPS = 0.4, 0.68, (1, 2, 3)
+_RESERVED = 0.4  # extraversion up to which somebody is reserved
+_OUTGOING = 0.68  # extraversion from which on somebody is outgoing
+_MEMBERSHIPS = (1, 2, 3)  # most groups of the reserved, of others, and of the outgoing
 _MAX_LUNCH_WALK = 7
 
 
@@ -43,7 +44,7 @@ class Meeting:
 
 
 class _Attendance:
-    """Who likes which of some meetings, and who is free for it, as arrays of all people.
+    """Liking and free time of all people for some meetings, as arrays.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ class _Attendance:
                 self._free[k] &= ~children
 
     def likes(self, k: int) -> NDArray[np.float64]:
-        """How much a meeting appeals to everybody, 0 to whom it does not or who is not free; shape ``(people,)``."""
+        """Return how much all like a meeting, 0 for those who do not or are not free; shape ``(people,)``."""
         return np.where(self._free[k], self._likes[self._names[k]], 0.0)
 
     def join(self, person: int, group: Meeting) -> None:
@@ -94,7 +95,7 @@ class _Attendance:
 
 @dataclass(frozen=True)
 class _Timetable:
-    """When people can be where, as arrays of all people.
+    """Free time and places of all people, as arrays.
 
     Attributes
     ----------
@@ -180,7 +181,7 @@ def can_come(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: 
 
 
 def _liking(draft: ResidentDraft, circle: Circle) -> float:
-    """How much a circle appeals to somebody; 0 if it is not for them."""
+    """Return how much a circle appeals to somebody; 0 if it is not for them."""
     late = draft.shift is not None and draft.shift[0] >= 12 * 60
     off = draft.shift is None and draft.status in ("worker", "student")
     if draft.status not in circle.statuses and not (late or off):
@@ -299,10 +300,10 @@ class _Forming:
         """Form the groups that most people like most, until there are `wanted` more or none is left."""
         ranking, wanted = _Ranking(self, options, weights), len(self.groups) + wanted
         while len(self.groups) < wanted and (k := ranking.best()) is not None:
-            self._found(ranking, k, self._size)
+            self._form_group(ranking, k, self._size)
 
     def admit_lonely(self) -> None:
-        """Let those who are in no group join the one they like best among those they can come to."""
+        """Add those who are in no group to the one they like best among those they can come to."""
         attendance = _Attendance(self._index, self.groups, self._drafts)
         likes = np.array([attendance.likes(k) for k in range(len(self.groups))]).reshape(-1, len(self._drafts))
         sizes = np.array([len(group.members) for group in self.groups])
@@ -336,7 +337,7 @@ class _Forming:
                     f"community: world {self._index.world.manifest.name!r} has no place where {who} could meet "
                     "others outside working hours; build a world with a larger --radius, or ask for other --residents"
                 )
-            self._found(ranking, k, max(self._size, 3))
+            self._form_group(ranking, k, max(self._size, 3))
 
     def attendance(self, options: Sequence[Meeting]) -> _Attendance:
         """Return who likes some meetings and is free for them beside the groups they are in."""
@@ -362,7 +363,7 @@ class _Forming:
         gain *= 0.7 ** self._slots[meeting.slot]
         return gain
 
-    def _found(self, ranking: _Ranking, k: int, limit: int) -> None:
+    def _form_group(self, ranking: _Ranking, k: int, limit: int) -> None:
         """Bring people together, unless in truth too few can come. Either way the place has had this circle."""
         meeting = ranking.options[k]
         self._tried.add((meeting.circle.name, meeting.place.id))
@@ -438,10 +439,11 @@ class _Ranking:
         return self._forming.gain(self.options[k], self.attendance.likes(k), self._weights[k])
 
 
-# Most children with their carers in a group; how far from home they play, metres; when they are back, minutes.
-_MOST, _NEAR, _BACK = 9, 600.0, 19 * 60 + 20
-# Where no school day ends, nobody comes before; and how long it takes to get small children ready, minutes.
-_AFTERNOON, _READY = 14 * 60 + 45, 10
+_MOST = 9  # children with their carers in a group
+_NEAR = 600.0  # metres from home that small children play
+_BACK = 19 * 60 + 20  # minute of the day when they are back
+_AFTERNOON = 14 * 60 + 45  # minute of the day before which nobody comes where no school day ends
+_READY = 10  # minutes that it takes to get small children ready
 
 
 def form_playmates(rng: np.random.Generator, index: PlaceIndex, cares: Sequence[Care]) -> list[Meeting]:
@@ -452,23 +454,32 @@ def form_playmates(rng: np.random.Generator, index: PlaceIndex, cares: Sequence[
     found: list[Meeting] = []
     for care in cares:
         people = [care.carer, *care.small]
-        meeting = _join_meeting(index, found, care, people)
-        if meeting is not None:
-            _set_out_together(index, care, meeting)
-            continue
         meeting = next(
             (
                 m
-                for k in rng.permutation(len(kinds))
-                for m in _playtime_options(rng, index, care, kinds[int(k)], places[int(k)])
+                for m in found
+                if len(m.members) + len(people) <= _MOST
+                and index.metres(care.carer.home, m.place.id) <= _NEAR
+                and _suits(index, care, m.place, m.start, m.end)
             ),
             None,
         )
-        meeting = meeting or _at_home(index, care)
-        other = _same(found, meeting)
-        if other is None:
-            found.append(meeting)
-        meeting = other or meeting
+        if meeting is None:
+            meeting = next(
+                (
+                    m
+                    for k in rng.permutation(len(kinds))
+                    for m in _playtime_options(rng, index, care, kinds[int(k)], places[int(k)])
+                ),
+                None,
+            )
+            meeting = meeting or _at_home(index, care)
+            # A full group of the same kind at the same place and time grows.
+            what = meeting.circle.name, meeting.place.id, meeting.start
+            same = next((m for m in found if (m.circle.name, m.place.id, m.start) == what), None)
+            if same is None:
+                found.append(meeting)
+            meeting = same or meeting
         meeting.members += people
         _set_out_together(index, care, meeting)
     for meeting in found:
@@ -476,14 +487,8 @@ def form_playmates(rng: np.random.Generator, index: PlaceIndex, cares: Sequence[
     return found
 
 
-def _same(found: Sequence[Meeting], wanted: Meeting) -> Meeting | None:
-    """Return the meeting of the same kind at the same place and time, if there is one."""
-    what = wanted.circle.name, wanted.place.id, wanted.start
-    return next((m for m in found if (m.circle.name, m.place.id, m.start) == what), None)
-
-
 def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
-    """Let a carer whose children were at home all day be there in time, and come back with them."""
+    """Plan that a carer whose children were at home all day is there in time and comes back with them."""
     if care.carer.duties:
         return
     leave = meeting.start - (index.minutes(care.carer.home, meeting.place.id) or 0)
@@ -494,23 +499,8 @@ def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
         child.duties = [Duty(leave - _READY, leave, childhood().escort.dress, care.carer.home)]
 
 
-def _join_meeting(
-    index: PlaceIndex, found: Sequence[Meeting], care: Care, people: Sequence[ResidentDraft]
-) -> Meeting | None:
-    """Let a family come to a meeting that there is, if one is near enough and suits."""
-    for meeting in found:
-        if (
-            len(meeting.members) + len(people) <= _MOST
-            and index.metres(care.carer.home, meeting.place.id) <= _NEAR
-            and _suits(index, care, meeting.place, meeting.start, meeting.end)
-        ):
-            meeting.members += people
-            return meeting
-    return None
-
-
 def come_to_play(index: PlaceIndex, cares: Sequence[Care], usual: Meeting, meeting: Meeting) -> None:
-    """Let the families of a group come to its meeting on another day, if that suits them.
+    """Add the families of a group to its meeting on another day, if that suits them.
 
     Parameters
     ----------
@@ -550,7 +540,7 @@ def _playtime_options(
 
 
 def _at_home(index: PlaceIndex, care: Care) -> Meeting:
-    """Let playmates come to somebody's home, as soon as they are fetched."""
+    """Return a meeting of playmates at somebody's home, as soon as they are fetched."""
     circle = playmates_circle()
     home, ready = index.place_by_id[care.carer.home], _ready(care)
     start = next((s for s in sorted(circle.starts) if s >= ready), -(-ready // 5) * 5)

@@ -30,15 +30,17 @@ SOONER = {Mode.BUS: 60.0, Mode.TRAM: 60.0, Mode.BIKE: 0.0}
 RESERVE = {Mode.BUS: 120.0, Mode.TRAM: 120.0, Mode.BIKE: 60.0}
 # Shorter ways are walked, seconds.
 _SHORT = 6 * 60
-#: A way may be planned with time to spare, but not with an hour of it: so many times what it takes, and seconds more.
-SLACK, SPARE = 2.0, 10 * 60
+#: A way may be planned with time to spare, but not with an hour of it: so many times what it takes ...
+SLACK = 2.0
+#: ... and so many seconds more.
+SPARE = 10 * 60
 _LEAST_PRICE = {Mode.BUS: BUS_FARE, Mode.TRAM: BUS_FARE, Mode.BIKE: BIKE_RATE}
 # Who carries a hundred would spend two minutes to save one; who carries more, less.
 _SECONDS_OF_MONEY = 12_000.0
 # At these ages people cycle.
 _CYCLISTS = (12, 74)
-# Each year beyond so many makes a walk so much longer.
-_TIRED_FROM, _TIRED = 60, 0.015
+_TIRED_FROM = 60  # age in years from which on walks seem longer
+_TIRED = 0.015  # share by which each year beyond makes a walk longer
 _BOTHER = {Mode.BUS: 0.0, Mode.TRAM: 0.0, Mode.BIKE: 270.0}
 # A second on foot counts like so many spent sitting, as people choose.
 _ON_FOOT = 1.5
@@ -46,7 +48,7 @@ _ON_FOOT = 1.5
 
 @dataclass(frozen=True)
 class Habits:
-    """What getting about costs somebody, in seconds of their time spent sitting.
+    """Costs of getting about for one person, in seconds of their time spent sitting.
 
     Attributes
     ----------
@@ -133,7 +135,7 @@ def with_rides(
     index: PlaceIndex,
     stream: Callable[[str], np.random.Generator],
 ) -> list[Resident]:
-    """Let residents take buses, trams or bicycles on the ways of their day where that costs them less than to walk.
+    """Put rides with buses, trams or bicycles into days where they cost residents less than to walk.
 
     Parameters
     ----------
@@ -149,22 +151,19 @@ def with_rides(
     if not index.rides.any:
         return list(residents)
     meetings: set[tuple[str | None, str, str]] = {(group.place, group.start, group.end) for group in groups}
-    means = _Means(index, _Racks(index), meetings, _ways_with_children(residents))
-    return [
-        resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
-        for resident in residents
-    ]
-
-
-def _ways_with_children(residents: Sequence[Resident]) -> set[tuple[str | None, str, str | None]]:
-    """Return the ways of small children: household, start, and where they go. They and who comes along walk."""
-    return {
+    # Small children and who comes along walk.
+    ways_with_children = {
         (child.household, way.start, then.place)
         for child in residents
         if child.age < ALONE_FROM
         for way, then in pairwise(child.schedule)
         if way.type is ItemType.COMMUTE
     }
+    means = _Means(index, _Racks(index), meetings, ways_with_children)
+    return [
+        resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
+        for resident in residents
+    ]
 
 
 @dataclass(frozen=True)
@@ -179,7 +178,7 @@ class _Ride:
 
 @dataclass(frozen=True)
 class _Means:
-    """What there is to ride in a world.
+    """Means of transport of a world.
 
     Attributes
     ----------
@@ -212,7 +211,8 @@ class _Means:
             stay = items.pop()
             set_out = clock_of(ride.set_out) if stays else item.start
             items += self._longer(stay, set_out)
-            words = _words(ride.mode, ends[1], home=ends[1].id == resident.home)
+            how = "Cycle" if ride.mode is Mode.BIKE else f"Take the {ride.mode}"
+            words = f"{how} home" if ends[1].id == resident.home else f"{how} to {ends[1].name}"
             items.append(item.model_copy(update={"start": set_out, "mode": ride.mode, "activity": words}))
         return items
 
@@ -279,8 +279,3 @@ class _Means:
             return [item.model_copy(update={"end": until})]
         chat = {"type": ItemType.MAIN, "start": item.end, "end": until, "activity": "Chat a little longer"}
         return [item, item.model_copy(update=chat | {"tag": ActivityTag.GROUP})]
-
-
-def _words(mode: Mode, goal: Place, *, home: bool) -> str:
-    how = "Cycle" if mode is Mode.BIKE else f"Take the {mode}"
-    return f"{how} home" if home else f"{how} to {goal.name}"

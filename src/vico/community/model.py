@@ -1,4 +1,4 @@
-"""What a community is, as records: residents, groups, relations, and the schedules of one or several days.
+"""Records of a community: residents, groups, relations, and the schedules of one or several days.
 
 `Authorship` says who wrote what where a language model had a part: item by item, and why where the model did not.
 `CommunityFinding` is what the validator finds: where, what, and how to mend it. `with_tags` says what schedule items
@@ -57,7 +57,7 @@ class AuthoredItem(Record):
 
 
 class Authorship(Record):
-    """Who wrote what.
+    """Authors of the items of a community.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Authorship(Record):
 
     @property
     def counts(self) -> Mapping[str, Mapping[Origin, int]]:
-        """How many items of each kind (character, groups, schedule, relations) have which origin."""
+        """Return how many items of each kind (character, groups, schedule, relations) have which origin."""
         found: dict[str, Counter[Origin]] = {}
         for one in self.items:
             found.setdefault(one.item.rpartition(".")[2], Counter())[one.origin] += 1
@@ -81,7 +81,7 @@ class Authorship(Record):
 
     @property
     def written(self) -> int:
-        """How many items are the model's."""
+        """Return how many items are the model's."""
         return sum(one.origin is Origin.WRITTEN for one in self.items)
 
     @property
@@ -112,7 +112,7 @@ Colour = tuple[Channel, Channel, Channel]
 
 
 class ItemType(StrEnum):
-    """What kind of thing a schedule item is."""
+    """Kind of a schedule item."""
 
     SLEEP = "sleep"
     MEAL = "meal"
@@ -121,7 +121,7 @@ class ItemType(StrEnum):
 
 
 class ActivityTag(StrEnum):
-    """What a schedule item is about, for programs; the activity says it in words for people."""
+    """Purpose of a schedule item, for programs; its activity says it in words for people."""
 
     SLEEP = "sleep"
     MEAL_HOME = "meal_home"
@@ -137,7 +137,7 @@ class ActivityTag(StrEnum):
 
 
 class Mode(StrEnum):
-    """How a resident means to get from one place to another."""
+    """Means of transport of a resident between two places."""
 
     WALK = "walk"
     BUS = "bus"
@@ -181,7 +181,7 @@ Bag = Literal["none", "backpack", "shoulder bag"]
 
 @with_config(ConfigDict(extra="forbid"))
 class ResidentAppearance(TypedDict):
-    """How a resident looks: the fields of `vico.assets.people.Appearance`, which makes a body of them.
+    """Appearance of a resident: the fields of `vico.assets.people.Appearance`, which makes a body of them.
 
     A plain dictionary with checked keys, so that it can be handed to `Appearance.from_dict` as it is. Who wears no hat,
     nothing over their clothes and no bag may leave those out.
@@ -263,7 +263,7 @@ class Resident(Record):
 
     @property
     def first_name(self) -> str:
-        """What friends call them."""
+        """The first of their names."""
         return split_name(self.name)[1]
 
     def item_at(self, seconds: int) -> ScheduleItem:
@@ -300,7 +300,7 @@ class Group(Record):
 
 
 class RelationKind(StrEnum):
-    """What ties two residents; of several ties the first in this order counts."""
+    """Kind of a tie between two residents; of several ties the first in this order counts."""
 
     FAMILY = "family"
     FRIEND = "friend"
@@ -519,7 +519,7 @@ def with_tags(community: Community, places: Sequence[Place] = ()) -> Community:
         for member in group.members:
             groups.setdefault(member, []).append(group)
 
-    def tagged(resident: Resident, items: Sequence[ScheduleItem]) -> list[ScheduleItem]:
+    def items_with_tags(resident: Resident, items: Sequence[ScheduleItem]) -> list[ScheduleItem]:
         mine = groups.get(resident.id, [])
         return [
             item if item.tag is not None else item.model_copy(update={"tag": tag_of(item, resident, mine, by_id)})
@@ -529,9 +529,13 @@ def with_tags(community: Community, places: Sequence[Place] = ()) -> Community:
     people = community.resident_by_id
     return community.model_copy(
         update={
-            "residents": [r.model_copy(update={"schedule": tagged(r, r.schedule)}) for r in community.residents],
+            "residents": [
+                r.model_copy(update={"schedule": items_with_tags(r, r.schedule)}) for r in community.residents
+            ],
             "further_days": [
-                day.model_copy(update={"schedules": {i: tagged(people[i], s) for i, s in day.schedules.items()}})
+                day.model_copy(
+                    update={"schedules": {i: items_with_tags(people[i], s) for i, s in day.schedules.items()}}
+                )
                 for day in community.further_days
             ],
         }
@@ -560,11 +564,7 @@ def tag_of(item: ScheduleItem, resident: Resident, groups: Sequence[Group], plac
         return ActivityTag.WORK
     if item.place == resident.home or item.place is None or item.place not in places:
         return ActivityTag.LEISURE
-    return _tag_of_place(places[item.place])
-
-
-def _tag_of_place(place: Place) -> ActivityTag:
-    """Return what people who neither live nor work at a place come there for."""
+    place = places[item.place]
     if place.kind in _EXERCISE:
         return ActivityTag.EXERCISE
     if place.kind in _STUDY:

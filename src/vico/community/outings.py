@@ -1,4 +1,4 @@
-"""What people go out for: alone where it fits into their days, and together with those at home and with friends.
+"""Outings: alone where they fit into a day, and together with those at home and with friends.
 
 Groups are apart (`vico.community.groups`); helping somebody at their home is here.
 """
@@ -117,7 +117,7 @@ class Outings:
         return False
 
     def plan_alone(self, draft: ResidentDraft, day: Day) -> None:
-        """Let somebody go out before, beside and after what is fixed in their day, as suits their way of life."""
+        """Plan outings before, beside and after what is fixed in a day, as suits somebody's way of life."""
         rng = self._rng
         if draft.child:
             self._pupil(draft, day)
@@ -140,12 +140,12 @@ class Outings:
         if draft.day_off or (weekend and draft.status == "freelancer"):
             self._day_off(draft, day, wake)
         else:
-            ways = {"retired": self._retired, "freelancer": self._freelancer, "guest": self._guest}
+            ways = {"retired": self._plan_retired_day, "freelancer": self._freelancer, "guest": self._guest}
             ways.get(draft.status, self._after_work)(draft, day, wake, done)
         self._incline(draft, day, (wake + 60, 21 * 60 + 30))
 
     def _before_the_day(self, day: Day, window: tuple[int, int]) -> None:
-        """Let those who have an hour in the morning go out for bread or air."""
+        """Plan a way for bread or air where there is an hour in the morning."""
         if self._rng.random() < 0.5 and self.go(
             day,
             Outing(
@@ -169,7 +169,7 @@ class Outings:
         return False
 
     def _incline(self, draft: ResidentDraft, day: Day, window: tuple[int, int]) -> None:
-        """Let somebody go out for the sake of what matters to them, the first value most."""
+        """Plan an outing for one of somebody's values, the first value most."""
         for value, often in zip(draft.values, _OFTEN, strict=False):
             ways = [one for one in inclinations().inclination if one.value == value and one.kinds]
             ways = [one for one in ways if one.ages[0] <= draft.age <= one.ages[1]]
@@ -180,7 +180,7 @@ class Outings:
             self.go(day, Outing(way.activity, way.kinds, way.minutes, tag=ActivityTag.LEISURE), hours)
 
     def _day_off(self, draft: ResidentDraft, day: Day, wake: int) -> None:
-        """Let somebody spend a day off: shopping, hobbies, air, sights, a meal out."""
+        """Plan a day off: shopping, hobbies, air, sights, a meal out."""
         rng, mind = self._rng, draft.character
         if rng.random() < 0.6:
             shopping = Outing("Do the week's shopping", self._outings_to.groceries, (25, 50), tag=ActivityTag.SHOP)
@@ -213,7 +213,7 @@ class Outings:
         )
 
     def _pupil(self, draft: ResidentDraft, day: Day) -> None:
-        """Let children who may go out alone do so after school."""
+        """Plan outings after school of children who may go out alone."""
         free = draft.lessons is None
         done = draft.shift[1] if draft.shift else 10 * 60 if free else 15 * 60
         if self._rng.random() < (0.85 if free else 0.3 + 0.5 * draft.character.extraversion):
@@ -248,7 +248,7 @@ class Outings:
                 (17 * 60 + 15, 20 * 60 + 30),
             )
 
-    def _retired(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
+    def _plan_retired_day(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
         rng = self._rng
         if rng.random() < 0.75:
             early = max(wake + 50, 7 * 60 + 50)
@@ -343,8 +343,8 @@ Party = tuple[ResidentDraft, Day]
 
 # Between these minutes of the day one goes out with the family on a day off.
 _FAMILY_HOURS = (9 * 60 + 30, 18 * 60)
-# How often friends are asked before one gives up, and how many meet somebody for whom once is enough.
-_ASKED, _PLANS = 4, 3
+_ASKED = 4  # times that friends are asked before one gives up
+_PLANS = 3  # plans that are tried of those that suit
 # Whoever is less outgoing than this meets one friend a day at most, and others two.
 _RESERVED = 0.4
 # People of these ages are helped most.
@@ -379,7 +379,7 @@ class Company:
         self._rng, self._index, self._outings = rng, index, outings
 
     def household(self, members: Sequence[Party], kind: str) -> None:
-        """Let those who share a home do something together, if their days allow."""
+        """Plan something together for those who share a home, if their days allow."""
         if len(members) < 2 or kind == "guest":
             return
         if kind == "family":
@@ -409,7 +409,7 @@ class Company:
         return plans
 
     def _family(self, members: Sequence[Party]) -> None:
-        """Let parents go out with their children on a day off, or when the small ones have no other company."""
+        """Plan outings of parents with children on a day off, or when the small ones have no other company."""
         small = [party for party in members if party[0].age < ALONE_FROM]
         off = all(draft.lessons is None for draft, _ in members if draft.child)
         busy = any(block.role == "group" for _, day in small for block in day.blocks)
@@ -427,7 +427,7 @@ class Company:
                 return
 
     def friends(self, people: Mapping[str, Party], relations: Sequence[Relation]) -> None:
-        """Let friends meet: the outgoing more often.
+        """Plan meetings of friends: the outgoing meet more often.
 
         Parameters
         ----------
@@ -477,7 +477,7 @@ class Company:
         return [*shared[:1], *other][:_PLANS]
 
     def help(self, people: Mapping[str, Party], relations: Sequence[Relation]) -> None:
-        """Let people who care for others help somebody they know, at that one's home."""
+        """Plan help of people who care for others for somebody they know, at that one's home."""
         rng, ways = self._rng, inclinations().help
         known: dict[str, list[str]] = {}
         for relation in relations:

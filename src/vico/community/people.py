@@ -66,12 +66,12 @@ class School(DataRecord):
 
     @property
     def starts(self) -> tuple[int, ...]:
-        """When lessons may begin, minutes of the day."""
+        """Return when lessons may begin, minutes of the day."""
         return tuple(int(t[:2]) * 60 + int(t[3:]) for t in self.begins)
 
 
 class HomeSchool(DataRecord):
-    """How those learn who have no school within reach."""
+    """Lessons of those who have no school within reach."""
 
     title: str
     morning: str
@@ -86,7 +86,7 @@ class DayOff(DataRecord):
 
 
 class Escorts(DataRecord):
-    """What it is called to take small children to school, and to fetch them; {names} are theirs.
+    """Words for taking small children to school and fetching them; {names} are theirs.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class Escorts(DataRecord):
 
 
 class ChildrenAtHome(DataRecord):
-    """What children do at home; `at_school` is lunch there."""
+    """Pastimes of children at home; `at_school` is lunch there."""
 
     morning: tuple[str, ...]
     breakfast: tuple[str, ...]
@@ -279,7 +279,7 @@ class ResidentDraft:
 
     @property
     def drive(self) -> float:
-        """How much they work beyond what others do, about -0.6 to 0.7, 0 for most."""
+        """Return how much they work beyond what others do, about -0.6 to 0.7, 0 for most."""
         ambition = 0.3 * ("achievement" in self.values) + 0.1 * ("power" in self.values)
         return self.character.conscientiousness - 0.6 + ambition
 
@@ -291,7 +291,7 @@ class ResidentDraft:
 
     @property
     def pace(self) -> float:
-        """How fast they walk, m/s."""
+        """Return how fast they walk, m/s."""
         return walk_speed(self.age)
 
     @property

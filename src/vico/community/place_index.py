@@ -1,4 +1,4 @@
-"""What an author and the validator need to know of a world: which places can be reached, how far, and when.
+"""Index of the places of a world for authors and the validator: which can be reached, how far, and when.
 
 Places are open when the map says so, else at the usual hours of their kind. Usual hours are data:
 ``vico/data/community/hours.toml`` and a user's own files. What is indoors at places is kept in numbers: a city has
@@ -26,7 +26,7 @@ from vico.geometry import distances
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.io.memory import LruCache
 from vico.rules import BED_WIDTH, WALK_SPEED
-from vico.world.model import Category, Place, Point2, Room
+from vico.world.model import Category, Place, Point2
 from vico.world.opening_hours import DAYS, MINUTES, Coordinates, Span, customary_weekday, open_spans, weekly_hours
 from vico.world.walk_lengths import IndoorWays
 from vico.world.walkable import CROSSING, ROADWAY
@@ -58,17 +58,14 @@ class PlaceRooms:
         for k, place in enumerate(places):
             self.inside[k] = ways.seconds(place.rooms)
             rooms = [by_id[name] for name in place.rooms]
-            self.beds[k] = sum(map(_beds, rooms))
+            beds = (top for room in rooms for top in room.containers if top.kind == "bed")
+            self.beds[k] = sum(max(1, int(bed.size[1] / BED_WIDTH + 1e-9)) for bed in beds)
             self.area[k] = sum(room.size[0] * room.size[1] for room in rooms if room.kind not in _WAYS)
 
     @classmethod
     def of(cls, world: World) -> PlaceRooms:
         """Return those of a world, counted once."""
         return world.shared(cls, lambda: cls(world))
-
-
-def _beds(room: Room) -> int:
-    return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in room.containers if top.kind == "bed")
 
 
 #: Staff are at their place so long before it opens and after it closes, at most, minutes.
@@ -130,7 +127,7 @@ def _week(path: Path, where: str, text: str) -> list[list[Span]]:
 
 
 def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
-    """When a place of this kind is usually open on a day, minutes; empty where it is closed.
+    """Return when a place of this kind is usually open on a day, minutes; empty where it is closed.
 
     Parameters
     ----------
@@ -143,7 +140,7 @@ def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
 
 
 def stated_hours(place: Place, date: Date, coordinates: Coordinates, *, holidays: bool = True) -> list[Span] | None:
-    """When a place says that it is open on a date, minutes; None if it says nothing that can be read.
+    """Return when a place says that it is open on a date, minutes; None if it says nothing that can be read.
 
     Parameters
     ----------
@@ -157,7 +154,7 @@ def stated_hours(place: Place, date: Date, coordinates: Coordinates, *, holidays
 
 
 def hours_on(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
-    """When a place is open on a date, minutes: what it says, else what is usual for its kind."""
+    """Return when a place is open on a date, minutes: what it says, else what is usual for its kind."""
     given = stated_hours(place, date, coordinates)
     return usual_spans(place.kind, place.category, customary_weekday(date, coordinates)) if given is None else given
 
@@ -190,8 +187,8 @@ GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment",
 #: Distance that spawn points keep from each other, metres.
 SPAWN_GAP = 2.0
 
-# Places whose estimates to all others are kept, 2 bytes each: a city has tens of thousands.
-_ESTIMATES, _MOST_MINUTES = 1024, 32_000
+_ESTIMATES = 1024  # places whose estimates to all others are kept, 2 bytes each: a city has tens of thousands
+_MOST_MINUTES = 32_000  # of an estimate: it fits into 2 bytes
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
 
@@ -283,17 +280,12 @@ class PlaceIndex:
         )
 
     def beds(self, place: Place) -> int:
-        """How many people can lie in the beds of a place: wide beds are for two."""
+        """Return how many people can lie in the beds of a place: wide beds are for two."""
         return int(self._rooms.beds[self.spot[place.id]])
 
     def floor_area(self, place: Place) -> float:
         """Square metres of a place's rooms, without corridors, stairs and lifts."""
         return float(self._rooms.area[self.spot[place.id]])
-
-    def same_building(self, a: str, b: str) -> bool:
-        """Whether two places are under one roof, or the same."""
-        building = self.place_by_id[a].building
-        return a == b or (building is not None and building == self.place_by_id[b].building)
 
     def seconds(self, a: str, b: str) -> float:
         """Seconds on foot between two places, at 1 m/s; infinite if there is no way.
@@ -351,13 +343,13 @@ class PlaceIndex:
     def metres_to(self, a: str, places: Sequence[Place]) -> NDArray[np.float64]:
         """Metres from a place to others as the crow flies, shape ``(len(places),)``."""
         spots = [self.spot[place.id] for place in places]
-        return np.asarray(np.hypot(*(self._positions[spots] - self._positions[self.spot[a]]).T), np.float64)
+        return distances(self._positions[spots], self._positions[self.spot[a]])
 
     def by_nearness(self, a: str) -> list[Place]:
         """Reachable places, the nearest to a place first."""
         x, y = self.place_by_id[a].position[:2]
         reachable, numbers = self._all_reachable
-        far = np.round(np.hypot(*(self._positions[numbers] - (x, y)).T), 3)
+        far = np.round(distances(self._positions[numbers], (x, y)), 3)
         return [reachable[k] for k in np.lexsort((self._names[numbers], far)).tolist()]
 
     def nearest(self, a: str, *wanted: tuple[Category | Collection[str], int]) -> list[str]:
@@ -367,8 +359,7 @@ class PlaceIndex:
         found: list[str] = []
         for what, count in wanted:
             among = self._among(what if isinstance(what, Category) else frozenset(what))
-            metres = np.hypot(*(self._positions[numbers[among]] - (x, y)).T)
-            far = np.asarray(np.round(metres, 3), np.float64)
+            far = np.round(distances(self._positions[numbers[among]], (x, y)), 3)
             if len(far) > count:
                 near = np.flatnonzero(far <= np.partition(far, count - 1)[count - 1])
                 among, far = among[near], far[near]
@@ -391,11 +382,11 @@ class PlaceIndex:
         return reachable, np.array([self.spot[p.id] for p in reachable], np.int64)
 
     def given_hours(self, place: Place) -> list[Span] | None:
-        """When the place says it is open on the day, minutes; None if it doesn't say, or not in a form we read."""
+        """Return the stated opening hours of the day, minutes; None if there are none, or none that can be read."""
         return stated_hours(place, self.date, self.coordinates, holidays=self.holidays)
 
     def hours(self, place: Place) -> list[Span]:
-        """When a place is open on the day, minutes: what it says, else what is usual for its kind."""
+        """Return when a place is open on the day, minutes: what it says, else what is usual for its kind."""
         key = place.id, self.date, self.holidays
         if key not in self._hours:
             given = self.given_hours(place)

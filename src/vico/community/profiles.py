@@ -34,13 +34,15 @@ from vico.community.model import (
 from vico.community.people import Household, ResidentDraft, childhood, schools
 from vico.community.place_index import GUEST_KINDS, PlaceIndex, kind_of
 from vico.community.relations import describe_household
-from vico.english import with_article
+from vico.english import enumerate_words, with_article
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Place
 
-# When one rises early, rises late, and goes to bed late, seconds of the day.
-_EARLY_RISE, _LATE_RISE, _LATE_TO_BED = 6 * 3600 + 1800, 8 * 3600, 23 * 3600
+# Seconds of the day.
+_EARLY_RISE = 6 * 3600 + 1800
+_LATE_RISE = 8 * 3600
+_LATE_TO_BED = 23 * 3600
 
 
 class Biographer:
@@ -83,8 +85,8 @@ class Biographer:
             "Her": draft.her.capitalize(),
             "him": him,
         }
-        traits = join(draft.character.traits)
-        hobbies = join([h.name for h in draft.hobbies])
+        traits = enumerate_words(draft.character.traits)
+        hobbies = enumerate_words([h.name for h in draft.hobbies])
         sentences = [self._work(draft), self._home(draft, household, words)]
         says = self._children_say if draft.child else self._says
         young = childhood().biography
@@ -184,7 +186,7 @@ class Biographer:
 
 
 def address(place: Place) -> str:
-    """Where a home is, as one says it: "at Mikonkatu 3", "in the apartments on Unioninkatu", "at Hotel Torni"."""
+    """Return an address as one says it: "at Mikonkatu 3", "in the apartments on Unioninkatu", "at Hotel Torni"."""
     head, _, rest = place.name.partition(", ")
     if head.lower() == "apartments" and rest:
         return f"at {rest}"
@@ -217,13 +219,13 @@ def lifestyle_of(
         rhythm = "Keeps regular hours"
     if draft.child:
         told = childhood().biography.ways
-        return f"{rhythm}; {join([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
+        return f"{rhythm}; {enumerate_words([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
     options = [way for way in ways() if draft.status in way.statuses and agrees(way.text, measures)]
     first = [way.text for way in options if _is_told_of(way, draft)]
     anybody = [way.text for way in options if not (way.values or way.hobbies or way.trait)]
     spare = [anybody[int(k)] for k in rng.permutation(len(anybody))]
     picked = [first[int(k)] for k in rng.permutation(len(first))][:3]
-    return f"{rhythm}; {join([*picked, *spare[: max(0, 2 - len(picked))]])}."
+    return f"{rhythm}; {enumerate_words([*picked, *spare[: max(0, 2 - len(picked))]])}."
 
 
 def _is_told_of(way: Way, draft: ResidentDraft) -> bool:
@@ -246,18 +248,13 @@ def honest_character(draft: ResidentDraft, measures: DayMeasures) -> Personality
     return character.model_copy(update={"traits": told})
 
 
-def join(parts: Sequence[str]) -> str:
-    """Join words with commas and a final "and"."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
 Rgb = tuple[int, int, int]
 Colours = tuple[Rgb, ...]
 _GUIDE = "docs/adding_people.md"
 
 
 class TradeClothes(DataRecord):
-    """What is worn at some trades, as the fields of an appearance; of several values one is drawn.
+    """Clothes of some trades, as the fields of an appearance; of several values one is drawn.
 
     Attributes
     ----------
@@ -378,8 +375,8 @@ _SHOE_COLOURS: tuple[Colour, ...] = (
 _YEARS = (5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18)
 _BOYS = (1.10, 1.16, 1.22, 1.275, 1.33, 1.38, 1.43, 1.49, 1.56, 1.635, 1.69, 1.735, 1.76, 1.79)
 _GIRLS = (1.09, 1.15, 1.21, 1.27, 1.33, 1.385, 1.445, 1.51, 1.57, 1.605, 1.625, 1.64, 1.65, 1.655)
-# After this age people grow smaller by so many metres a year.
-_SHRINK_FROM, _SHRINK = 60, 0.0013
+_SHRINK_FROM = 60  # age in years after which people grow smaller
+_SHRINK = 0.0013  # metres a year
 
 
 def stature(age: float, *, female: bool) -> tuple[float, float]:
@@ -439,7 +436,8 @@ class Wardrobe:
         if family:
             # A child of two takes after both.
             ancestry = tuple(np.mean([one["ancestry"] for one in family], axis=0).round(3).tolist())
-            skin = self._colour([_mean([one["skin"] for one in family])], 3.0)
+            red, green, blue = np.mean([one["skin"] for one in family], axis=0).astype(int).tolist()
+            skin = self._colour([(red, green, blue)], 3.0)
             hair_colour = self._colour([self._one(family)["hair_colour"]], 4.0)
             if min(hair_colour) > 130 and age < 55:  # a parent's is grey already
                 hair_colour = self._colour(_HAIR["light" if ancestry[2] > 0.8 else "dark"], 5.0)
@@ -475,7 +473,7 @@ class Wardrobe:
         else:
             styles, weights = ["bald", "crop", "short", "curly", "bun", "bob"], [0.3, 1.5, 3, 1, 0.2, 0]
             if age > 50:
-                weights[0], weights[4] = 1.6, 0
+                weights = [1.6, 1.5, 3, 1, 0, 0]
             elif age < 18:
                 weights = [0, 1.2, 3, 1.2, 0, 0.3]
         return self._pick(styles, weights)
@@ -536,8 +534,3 @@ class Wardrobe:
             if options := trade.colours(f"{field}_colour"):
                 found[f"{field}_colour"] = self._colour(options, 4.0)
         return found
-
-
-def _mean(colours: Sequence[Colour]) -> Colour:
-    red, green, blue = np.mean(colours, axis=0).astype(int).tolist()
-    return red, green, blue

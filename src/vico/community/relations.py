@@ -24,12 +24,13 @@ from vico.community.groups import Meeting
 from vico.community.model import Community, Relation, RelationKind
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex
+from vico.english import enumerate_words
 
-# Friends of an adult of middling extraversion where there are many to choose from, and the shape of their gamma
-# distribution; among few, this share of all others.
-_MANY, _SHAPE, _OF_FEW = 7.0, 2.6, 0.33
-# Children have friends of their age, to within so many years; adults' friends thin out with the years between, scale.
-_CHILD_AGE_GAP, _YEARS_BETWEEN = 2, 9.0
+_MANY = 7.0  # friends of an adult of middling extraversion where there are many to choose from
+_SHAPE = 2.6  # of the gamma distribution of how many friends adults have
+_OF_FEW = 0.33  # share of all others who are friends where there are few to choose from
+_CHILD_AGE_GAP = 2  # years between children who are friends, at most
+_YEARS_BETWEEN = 9.0  # years over which friendships of adults thin out by a factor of e
 # Chance that a place in somebody's circle is filled by a friend of a friend.
 _CLOSURE = 0.35
 # How likely two are to be friends for what they share, of ties that may be of several kinds.
@@ -174,12 +175,14 @@ class _Draw:
 _NEXT_DOOR = 40.0
 
 _RANK = list(RelationKind)
-# Children have friends from this age, years; friends are of one age, to within so many years.
-_FRIENDS_FROM, _SAME_AGE_YEARS = 3, 2
-# Of many at one workplace one knows so many to either side, this share of them across; pupils know so many teachers.
-_TEAM, _ACROSS, _TEACHERS = 3, 0.15, 2
-# How many one knows in a house, and next door; and the largest chance to know somebody next door.
-_KNOWN_IN_HOUSE, _KNOWN_NEXT_DOOR, _NEXT_DOOR_KNOWN = 5.0, 2.5, 0.5
+_FRIENDS_FROM = 3  # age in years from which on children have friends
+_SAME_AGE_YEARS = 2  # years between pupils of one age, at most
+_TEAM = 3  # of many at one workplace one knows so many to either side
+_ACROSS = 0.15  # share of them that are rewired across
+_TEACHERS = 2  # that a pupil knows
+_KNOWN_IN_HOUSE = 5.0  # people one knows in a house
+_KNOWN_NEXT_DOOR = 2.5  # people one knows next door
+_NEXT_DOOR_KNOWN = 0.5  # the largest chance to know somebody next door
 
 
 def draw_relations(
@@ -195,7 +198,10 @@ def draw_relations(
     for household in households:
         _tie_household(rng, network, household)
     for group in groups:
-        _tie_group(rng, network, group)
+        note = f"both in the {group.circle.name.lower()}, a child and a grown-up"
+        for a, b in combinations(group.members, 2):
+            if a.child != b.child and a.household != b.household:
+                network.tie(a, b, (RelationKind.NEIGHBOUR, note), rng.uniform(0.15, 0.5), rng.exponential(2))
     house, street = _neighbours(rng, index, people)
     colleagues = _colleagues(rng, people)
     same_class, same_school = _pupils(people)
@@ -208,7 +214,10 @@ def draw_relations(
     ]
     _tie_friends(rng, network, people, groups, acquaintances)
     _tie_colleagues(rng, network, people, colleagues)
-    _tie_neighbours(rng, network, people, house, street)
+    for pairs, where, (low, high) in ((house, "same house", (0.2, 0.55)), (street, "next door", (0.15, 0.45))):
+        for i, j in pairs:
+            bond = RelationKind.NEIGHBOUR, where
+            network.tie(people[i], people[j], bond, rng.uniform(low, high), rng.exponential(5))
     return network.relations()
 
 
@@ -263,21 +272,17 @@ def _tie_household(rng: np.random.Generator, network: _Network, household: House
         elif household.kind == "parent":
             network.tie(a, b, (RelationKind.FAMILY, "parent and child"), rng.uniform(0.8, 1.0), youngest)
         elif household.kind == "family":
-            _tie_family(rng, network, a, b)
+            if a.child and b.child:
+                note, strength, years = "siblings", rng.uniform(0.6, 0.95), youngest
+            elif a.child or b.child:
+                note, strength, years = "parent and child", rng.uniform(0.85, 1.0), youngest
+            else:
+                note, strength, years = "partners", rng.uniform(0.8, 1.0), youngest - 17
+            network.tie(a, b, (RelationKind.FAMILY, note), strength, years)
         elif household.kind == "siblings":
             network.tie(a, b, (RelationKind.FAMILY, "siblings"), rng.uniform(0.75, 0.95), youngest)
         else:
             network.tie(a, b, (RelationKind.FRIEND, "flatmates"), rng.uniform(0.6, 0.85), rng.uniform(0, 4))
-
-
-def _tie_family(rng: np.random.Generator, network: _Network, a: ResidentDraft, b: ResidentDraft) -> None:
-    if a.child and b.child:
-        bond, strength, years = "siblings", rng.uniform(0.6, 0.95), min(a.age, b.age)
-    elif a.child or b.child:
-        bond, strength, years = "parent and child", rng.uniform(0.85, 1.0), min(a.age, b.age)
-    else:
-        bond, strength, years = "partners", rng.uniform(0.8, 1.0), min(a.age, b.age) - 17
-    network.tie(a, b, (RelationKind.FAMILY, bond), strength, years)
 
 
 def _tie_friends(
@@ -294,14 +299,6 @@ def _tie_friends(
         strength += 0.2 * (a.character.agreeableness + b.character.agreeableness - 1)
         bond = RelationKind.FRIEND, friendship.note
         network.tie(a, b, bond, float(np.clip(strength, 0.15, 0.95)), rng.exponential(3.5))
-
-
-def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> None:
-    """Let children and grown-ups of a group know each other."""
-    note = f"both in the {group.circle.name.lower()}, a child and a grown-up"
-    for a, b in combinations(group.members, 2):
-        if a.child != b.child and a.household != b.household:
-            network.tie(a, b, (RelationKind.NEIGHBOUR, note), rng.uniform(0.15, 0.5), rng.exponential(2))
 
 
 def _circle(rng: np.random.Generator, members: Sequence[int]) -> list[tuple[int, int]]:
@@ -401,21 +398,8 @@ def _neighbours(
     return house, street
 
 
-def _tie_neighbours(
-    rng: np.random.Generator,
-    network: _Network,
-    people: Sequence[ResidentDraft],
-    house: Sequence[tuple[int, int]],
-    street: Sequence[tuple[int, int]],
-) -> None:
-    for pairs, note, (low, high) in ((house, "same house", (0.2, 0.55)), (street, "next door", (0.15, 0.45))):
-        for i, j in pairs:
-            bond = RelationKind.NEIGHBOUR, note
-            network.tie(people[i], people[j], bond, rng.uniform(low, high), rng.exponential(5))
-
-
 def describe_household(household: Household, draft: ResidentDraft, relations: Mapping[str, str]) -> str:
-    """Who somebody lives with, as the end of a sentence; empty for those who live alone."""
+    """Return who somebody lives with, as the end of a sentence; empty for those who live alone."""
     others = [m for m in household.members if m is not draft]
     if not others:
         return ""
@@ -452,12 +436,8 @@ def _describe_family(household: Household, draft: ResidentDraft) -> str:
         parts += [f"{draft.her} partner {name}" for name in adults]
         told = [f"{child.first} ({child.age})" for child in children]
         one = "daughter" if children[0].gender == "female" else "son"
-        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {_enumerate_names(told)}")
-    return f"with {_enumerate_names(parts)}"
-
-
-def _enumerate_names(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {enumerate_words(told)}")
+    return f"with {enumerate_words(parts)}"
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vico.clock import DAY
 from vico.community.model import Mode
+from vico.geometry import distances
 from vico.rules import BIKE_RATE, BIKE_SPEED, BUS_FARE, WALK_SPEED
 from vico.world.model import Point2
 from vico.world.transit import LineTimes, Stop, TramStop, TramTimes, Transit
@@ -27,8 +28,8 @@ from vico.world.trips.network import TURN
 from vico.world.walk_lengths import Walk
 from vico.world.world import World
 
-# A point that so many walks began or ended at is worth learning about; so many points are.
-_OFTEN, _MOST_LEARNED = 12, 64
+_OFTEN = 12  # walks that begin or end at a point that is worth learning about
+_MOST_LEARNED = 64  # points
 
 
 class Walks:
@@ -109,7 +110,7 @@ class RideTrip:
 
 
 class _Ends:
-    """Where rides of a mode begin and end, and the ways to and from there.
+    """Ends of the rides of a mode, and the ways to and from there.
 
     Parameters
     ----------
@@ -125,8 +126,7 @@ class _Ends:
     def seconds(self, door: Point2) -> NDArray[np.float64]:
         """Seconds on foot between a door and each end; bounds of those not measured yet."""
         if door not in self._from:
-            bee_line = np.hypot(*(self._xy - np.array(door)).T)
-            bounds = np.maximum(bee_line - _SNAP, 0.0) / WALK_SPEED
+            bounds = np.maximum(distances(self._xy, door) - _SNAP, 0.0) / WALK_SPEED
             self._from[door] = bounds, np.zeros(len(bounds), np.bool_)
         return self._from[door][0]
 
@@ -262,7 +262,7 @@ class RideTimes:
 
 
 def _seconds(way: Walk, speed: float) -> float:
-    """How long a way takes, with a moment at every corner."""
+    """Return how long a way takes, with a moment at every corner."""
     return way.metres / speed + TURN * way.corners
 
 

@@ -26,8 +26,8 @@ from vico.errors import InputError
 from vico.world.model import Category
 from vico.world.opening_hours import Span
 
-# Places that close for so long, minutes, do so for a midday break; staff go home if they have so long there.
-_CLOSED, _HOME_FOR_LUNCH = 30, 40
+_CLOSED = 30  # minutes of closing that are a midday break
+_HOME_FOR_LUNCH = 40  # minutes at home for which staff go there
 # How much longer one sleeps on a day off, minutes, unless one rises early anyway.
 _LIE_IN = 70
 
@@ -382,7 +382,7 @@ def drafts_on(index: PlaceIndex, planned: DayDrafts, streams: Streams) -> DayDra
     """
     carers = {care.carer.id for care in planned.cares}
     households = [
-        replace(household, members=[_on(index, planned.index, member, streams) for member in household.members])
+        replace(household, members=[_draft_on(index, planned.index, member, streams) for member in household.members])
         for household in planned.households
     ]
     cares = [
@@ -394,7 +394,7 @@ def drafts_on(index: PlaceIndex, planned: DayDrafts, streams: Streams) -> DayDra
     return DayDrafts(index, households, cares)
 
 
-def _on(index: PlaceIndex, planned: PlaceIndex, draft: ResidentDraft, streams: Streams) -> ResidentDraft:
+def _draft_on(index: PlaceIndex, planned: PlaceIndex, draft: ResidentDraft, streams: Streams) -> ResidentDraft:
     if draft.child:
         lessons = lessons_on(index, draft)
         at_school = lessons is not None and lessons.place is not None
@@ -417,11 +417,13 @@ def meetings_on(day: DayDrafts, meetings: Sequence[Meeting], later: int) -> list
     here = {draft.id: draft for draft in day.people}
     found: list[Meeting] = []
     joined: dict[str, list[Meeting]] = {}
+    small = {child.id for care in day.cares for child in care.small}
     for meeting in meetings:
         if not _takes_place(day.index, meeting, later):
             continue
         again = replace(meeting, members=[])
-        if meeting.circle.small_children or _families(meeting, day.cares):
+        # Small children and their carers come together or not at all.
+        if meeting.circle.small_children or any(member.id in small for member in meeting.members):
             come_to_play(day.index, day.cares, meeting, again)
         else:
             again.members = [
@@ -434,12 +436,6 @@ def meetings_on(day: DayDrafts, meetings: Sequence[Meeting], later: int) -> list
             for member in again.members:
                 joined.setdefault(member.id, []).append(again)
     return found
-
-
-def _families(meeting: Meeting, cares: Sequence[Care]) -> bool:
-    """Whether small children belong to a group: they and their carers come together or not at all."""
-    small = {child.id for care in cares for child in care.small}
-    return any(member.id in small for member in meeting.members)
 
 
 def _takes_place(index: PlaceIndex, meeting: Meeting, later: int) -> bool:

@@ -30,16 +30,18 @@ from vico.world.opening_hours import Span
 
 #: Monday to Friday there is school.
 SCHOOL_DAYS = range(5)
-# Lessons last at least so long, and are within these hours of the day, minutes.
-_LEAST, _EARLIEST, _LATEST = 150, 7 * 60 + 30, 17 * 60
+_LEAST = 150  # minutes that lessons last
+_EARLIEST = 7 * 60 + 30  # minute of the day when lessons begin
+_LATEST = 17 * 60  # minute of the day when lessons end
 # How long one stays when one takes a child to school or fetches it, and how long before the lessons that is, minutes.
 _AT_THE_GATE = 5
-# Until when all small children are fetched, and how long one sees them in at home then, minutes.
-_LAST_FETCH, _SEEING_IN = 17 * 60 + 10, 10
+_LAST_FETCH = 17 * 60 + 10  # minute of the day until which all small children are fetched
+_SEEING_IN = 10  # minutes that one sees them in at home then
 # When those who learn at home do, minutes of the day.
 _HOME_LESSONS = (9 * 60, 14 * 60 + 30)
-# Until when children go out alone, and when they are back from meetings, minutes of the day by age.
-_CURFEW_AGES, _OUT, _BACK = (10, 13, 17), (18 * 60, 19 * 60, 21 * 60), (19 * 60 + 15, 20 * 60, 21 * 60 + 30)
+_CURFEW_AGES = (10, 13, 17)  # years
+_OUT = (18 * 60, 19 * 60, 21 * 60)  # minutes of the day until which children go out alone, by age
+_BACK = (19 * 60 + 15, 20 * 60, 21 * 60 + 30)  # ... when they are back from meetings
 # How long work beside children is at least, minutes.
 _PART_TIME = 4 * 60
 # When a parent who is alone with small children is back for the evening.
@@ -104,7 +106,7 @@ def _to_school(
 
 
 def learn_at_home(index: PlaceIndex, child: ResidentDraft) -> None:
-    """Let a child learn at home."""
+    """Plan lessons at home."""
     child.occupation, child.workplace, child.shift = childhood().home_school.title, None, None
     child.lessons = Lessons(None, None, *_HOME_LESSONS) if index.weekday in SCHOOL_DAYS else None
 
@@ -136,17 +138,13 @@ def care_on(index: PlaceIndex, household: Household, carer: ResidentDraft) -> Ca
         for child in care.small:
             if child.workplace == care.stops[-1]:
                 child.lessons = child.shift = None
-    carer.shift = _beside(index, care)
+    if carer.shift is None or carer.workplace is None or not care.stops:
+        carer.shift = None  # with children at home nobody goes to work
+    else:
+        carer.shift = hours_between_school_runs(index, care, carer.workplace, carer.shift)
     carer.out_until = 0
     settle_care(index, care)
     return care
-
-
-def _beside(index: PlaceIndex, care: Care) -> tuple[int, int] | None:
-    carer = care.carer
-    if carer.shift is None or carer.workplace is None or not care.stops:
-        return None  # with children at home nobody goes to work
-    return hours_between_school_runs(index, care, carer.workplace, carer.shift)
 
 
 def hours_between_school_runs(
@@ -163,7 +161,7 @@ def hours_between_school_runs(
 
 @dataclass
 class Care:
-    """What a grown-up does for the small children of a household on a school day.
+    """Care of a grown-up for the small children of a household on a school day.
 
     Attributes
     ----------
@@ -219,12 +217,6 @@ def plan_care(rng: np.random.Generator, index: PlaceIndex, households: Sequence[
     return found
 
 
-def _doors(index: PlaceIndex, place: Place) -> list[Span]:
-    """Return when parents find somebody at a school, minutes: as it says, else somewhat longer than is usual."""
-    given = index.given_hours(place)
-    return staffed_spans(index.hours(place)) if given is None else given
-
-
 def _plan_stops(index: PlaceIndex, care: Care) -> bool:
     """Set when the carer comes to which school; False if that can't be done."""
     lessons = [child.lessons for child in care.small if child.lessons is not None and child.lessons.place is not None]
@@ -232,7 +224,13 @@ def _plan_stops(index: PlaceIndex, care: Care) -> bool:
     care.stops = sorted(begin, key=lambda place: (begin[place], place))
     if not care.stops:
         return True
-    hours = [_doors(index, index.place_by_id[stop]) for stop in care.stops]
+    # Parents find somebody at a school when it says, else for somewhat longer than its usual hours.
+    schools = [index.place_by_id[stop] for stop in care.stops]
+    given = [index.given_hours(school) for school in schools]
+    hours = [
+        staffed_spans(index.hours(school)) if spans is None else spans
+        for school, spans in zip(schools, given, strict=True)
+    ]
     walks = [index.minutes(a, b) for a, b in zip(care.stops, care.stops[1:], strict=False)]
     if None in walks:
         return False
@@ -292,8 +290,8 @@ def settle_care(index: PlaceIndex, care: Care) -> None:
 _SLEEP_AGES, _SLEEP = (5, 9, 13, 17), (650, 610, 560, 510)
 # When they wake by themselves, minutes of the day, by age.
 _WAKE = (405, 410, 425, 450)
-# Around when lunch is, and how long it takes, minutes.
-_NOON, _LUNCH = 11 * 60 + 50, 30
+_NOON = 11 * 60 + 50  # minute of the day around which lunch is
+_LUNCH = 30  # minutes that it takes
 # Stretches of lessons at home, minutes of the day.
 _HOME_SCHOOL_HOURS = ((9 * 60, 12 * 60), (13 * 60, 16 * 60))
 

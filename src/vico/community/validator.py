@@ -47,8 +47,9 @@ from vico.world.world import World
 
 # Years between a child and at least one adult it lives with.
 _PARENT = (16, 60)
-# Seconds of a school day that are lessons, at school and at home, and of a night that children sleep.
-_AT_SCHOOL, _AT_HOME, _SLEEP = 2 * 3600, 3600, 7.5 * 3600
+_AT_SCHOOL = 2 * 3600  # seconds of lessons of a day at school
+_AT_HOME = 3600  # seconds of lessons of a day at home
+_SLEEP = 7.5 * 3600  # seconds that children sleep a night
 # Children are out between these seconds of the day only.
 _OUT = (6 * 3600, 22 * 3600 + 1800)
 
@@ -98,7 +99,7 @@ class _Child:
         self.school_day = index.weekday in SCHOOL_DAYS
 
     def findings(self, adults: list[Resident], offered: set[str]) -> Iterator[CommunityFinding]:
-        """Say what is wrong.
+        """Return what is wrong.
 
         Parameters
         ----------
@@ -306,7 +307,7 @@ class _Check:
     def day(self) -> None:
         """Check all that another day may have wrong."""
         for resident in self.community.residents:
-            self.known(resident)
+            self.known_places(resident)
             self.schedule(resident)
         self.found += households_of(self.community, self.index)
         self.groups()
@@ -355,7 +356,7 @@ class _Check:
                 "use the resident's age; gender 0 for female, 1 for male",
             )
 
-    def known(self, r: Resident) -> None:
+    def known_places(self, r: Resident) -> None:
         """Everywhere that somebody is, lives, works or meets is known to them."""
         used = {r.home, *([r.workplace] if r.workplace else []), *(i.place for i in r.schedule if i.place)}
         used |= {g.place for g in self.groups_of.get(r.id, ())}
@@ -425,7 +426,7 @@ class _Check:
             else:
                 self.stay(r, item, where)
                 if k and items[k - 1].type is not ItemType.COMMUTE:
-                    self.joined(items[k - 1], item, where)
+                    self.way_between(items[k - 1], item, where)
 
     def commute(self, r: Resident, k: int, where: str) -> None:
         items, item = r.schedule, r.schedule[k]
@@ -450,14 +451,14 @@ class _Check:
             if math.isinf(needed):
                 self.say(where, f"no {item.mode} goes {names}", "walk, or choose a place that can be reached so")
                 return
-        given = _item_seconds(item)
+        given = seconds_of_day(item.end) + (1 if item.end == LAST else 0) - seconds_of_day(item.start)
         taking = f"{given} s for the {what} {names}, which takes {needed:.0f} s"
         if given < needed:
             self.say(where, taking, f"allow {math.ceil(needed)} s or more")
         elif given > SLACK * needed + SPARE:
             self.say(where, taking, "leave later or arrive earlier")
 
-    def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
+    def way_between(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
         places = self.index.place_by_id
         a, b = before.place, item.place
         if a in places and b in places and a is not None and b is not None and a != b:
@@ -557,10 +558,6 @@ class _Check:
 def is_employed(r: Resident) -> bool:
     """Whether somebody's workplace is where they work, and not where they learn."""
     return r.age >= GROWN_UP and not r.occupation.lower().startswith("student")
-
-
-def _item_seconds(item: ScheduleItem) -> int:
-    return seconds_of_day(item.end) + (1 if item.end == LAST else 0) - seconds_of_day(item.start)
 
 
 def _works_without_place(occupation: str) -> bool:

@@ -114,20 +114,20 @@ def staff_capacity(index: PlaceIndex, place: Place) -> int:
     return max(_LEAST, round(index.floor_area(place) / metres))
 
 
-# From this share of the beds on homes are chosen that leave few free; so many can be filled with households.
-_CROWDED, _FILLED = 0.5, 0.9
+_CROWDED = 0.5  # share of the beds from which on homes are chosen that leave few free
+_FILLED = 0.9  # share of the beds that can be filled with households
 #: Where students study. `workplace` of a student is one of these.
 STUDY_KINDS = frozenset({"university", "college", "research_institute", "library", "music_school"})
 
 # What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
 _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
-# Metres as the crow flies that people go to work or to lectures; minutes at home before midnight.
-_COMMUTE, _LAST = 2000.0, 10
+_COMMUTE = 2000.0  # metres as the crow flies that people go to work or to lectures
+_LAST = 10  # minutes at home before midnight
 # Days of work in a week; trades that work from Monday to Friday only; and the other two days.
 _WORKING_DAYS = 5
-# Trades that one may stay longer at, and how much longer than others the most ambitious of all would, minutes.
-_OPEN_ENDED, _OVERTIME = ("office", "bank", "school", "health", "day"), 200
+_OPEN_ENDED = ("office", "bank", "school", "health", "day")  # patterns of trades that one may stay longer at
+_OVERTIME = 200  # minutes that the most ambitious of all would stay longer than others
 # Share of those who work the first part of a long day.
 _FIRST = 0.55
 _OFFICE_DAYS, _WEEKEND = ("office", "bank", "school"), (5, 6)
@@ -179,7 +179,7 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
 
 
 def check_beds(index: PlaceIndex, people: int) -> None:
-    """See to it that there are beds for some people, where it is known how many there are.
+    """Check that there are beds for some people, where it is known how many there are.
 
     Raises
     ------
@@ -215,12 +215,12 @@ def workdays(spans: Sequence[Span]) -> list[list[Span]]:
 
 def study_places(index: PlaceIndex) -> list[Place]:
     """Places where students study, open on the day."""
-    found = [p for p in index.places() if kind_of(p) in STUDY_KINDS and _long_enough(index.hours(p))]
+    found = [
+        p
+        for p in index.places()
+        if kind_of(p) in STUDY_KINDS and any(start <= 11 * 60 and end >= 16 * 60 for start, end in index.hours(p))
+    ]
     return [p for p in found if kind_of(p) != "library"] or found
-
-
-def _long_enough(spans: Sequence[Span]) -> bool:
-    return any(start <= 11 * 60 and end >= 16 * 60 for start, end in spans)
 
 
 def assign_work(

@@ -1,1 +1,1 @@
-"""Where facts come from: frames, map data and elevation. Imports nothing else of ours."""
+"""Sources of facts: frames, map data and elevation. Imports nothing else of ours."""

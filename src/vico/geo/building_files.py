@@ -323,7 +323,7 @@ _HEADER = ("type", "version", "transform", "metadata")
 
 @dataclass
 class _Header:
-    """What stands at the top of a file."""
+    """Header of a file."""
 
     said: str = ""  # the reference system, where the caller says it
     members: dict[str, Any] = field(default_factory=dict)
@@ -343,7 +343,7 @@ class _Header:
         name = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
         return ToFrame(self.said or str(name or ""), frame, str(path))
 
-    def placed(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    def transform_vertices(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return vertices as the transform has them."""
         transform = self.members.get("transform")
         if not isinstance(transform, dict):
@@ -402,7 +402,9 @@ def _read_object(path: Path, frame: LocalFrame, header: _Header, pieces: Buildin
         elif key in _HEADER:
             header.members[key] = value
     header.check(path)
-    vertices = header.to_frame(frame, path)(header.placed(np.frombuffer(numbers, np.float64).reshape(-1, 3)))
+    vertices = header.to_frame(frame, path)(
+        header.transform_vertices(np.frombuffer(numbers, np.float64).reshape(-1, 3))
+    )
     for key, name, value in JsonStream(path).members(within=frozenset(("CityObjects", "vertices", "appearance"))):
         if key == "CityObjects":
             _take_city_object(name, value, vertices, pieces)
@@ -418,7 +420,7 @@ def _read_lines(path: Path, frame: LocalFrame, header: _Header, pieces: Building
             continue
         if feature.get("type") != "CityJSONFeature":
             raise SchemaError(f"{path}:{number}: its type is {str(feature.get('type'))[:40]!r}, not CityJSONFeature")
-        vertices = to_frame(header.placed(np.asarray(feature["vertices"], np.float64).reshape(-1, 3)))
+        vertices = to_frame(header.transform_vertices(np.asarray(feature["vertices"], np.float64).reshape(-1, 3)))
         for name, value in feature["CityObjects"].items():
             _take_city_object(name, value, vertices, pieces)
     if to_frame is None:

@@ -100,7 +100,7 @@ class FoundBuilding:
 
 @dataclass(frozen=True)
 class FoundBuildings:
-    """What a file has in a window.
+    """Buildings of a file in a window.
 
     Attributes
     ----------
@@ -202,8 +202,8 @@ _ABOVE_GROUND = 1.5  # metres above the ground from which on an unnamed level su
 _SPECK = 0.02  # square metres
 _CLOSING = 0.03  # metres of gap between surfaces that are one
 _COVERED = 0.85  # share of the footprint that a roof must cover
-_LEAST_AREA = 2.0
-_LOWEST, _HIGHEST = 1.0, 900.0
+_LEAST_AREA = 2.0  # square metres that a building covers
+_LOWEST, _HIGHEST = 1.0, 900.0  # metres above its ground that the top of a roof may lie
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,10 @@ def building_of_surfaces(
     for surface in surfaces:
         if surface.kind == "roof" or (not named and surface.kind == ""):
             facets += _facets(surface, ground, floor=0.0 if named else _ABOVE_GROUND)
-    footprint = _footprint(floors, facets)
+    # It covers its ground surfaces seen from above, or else its roof's.
+    shapes = [shape for floor in floors if (shape := _outline(floor.rings)) is not None]
+    shapes = shapes or [facet.polygon for facet in facets]
+    footprint = union_closing_gaps(shapes, gap=_CLOSING, least=_LEAST_AREA) if shapes else Polygon()
     if footprint.area < _LEAST_AREA:
         return f"covers {footprint.area:.1f} m2 of ground"
     tags = dict(facts)
@@ -260,7 +263,7 @@ def building_of_surfaces(
 
 
 def _fault(facets: Sequence[RoofFacet], footprint: BaseGeometry) -> str:
-    """Say why a roof can't be built of these surfaces; empty if it can."""
+    """Return why a roof can't be built of these surfaces; empty if it can."""
     if not facets:
         return "no roof surfaces"
     tops = np.concatenate([facet.height(np.asarray(facet.polygon.exterior.coords)[:, :2]) for facet in facets])
@@ -271,16 +274,6 @@ def _fault(facets: Sequence[RoofFacet], footprint: BaseGeometry) -> str:
     if covered < _COVERED:
         return f"roof surfaces cover {100 * covered:.0f} % of its footprint"
     return ""
-
-
-def _footprint(floors: Sequence[Surface3], facets: Sequence[RoofFacet]) -> Polygon | MultiPolygon:
-    """Return what a building covers: its ground surfaces seen from above, or else its roof's."""
-    shapes = [shape for floor in floors if (shape := _outline(floor.rings)) is not None]
-    if not shapes:
-        shapes = [facet.polygon for facet in facets]
-    if not shapes:
-        return Polygon()
-    return union_closing_gaps(shapes, gap=_CLOSING, least=_LEAST_AREA)
 
 
 def _outline(rings: Sequence[NDArray[np.float64]]) -> Polygon | MultiPolygon | None:
@@ -438,16 +431,15 @@ class BuildingPieces:
             # Blocks and outlines say how high and how wide, not which roof.
             surfaces = [Surface3("wall" if best >= 1.0 else "ground", s.rings) for s in surfaces]
             if best >= 1.0:
-                surfaces = _with_floor(surfaces)
+                # The lowest level surfaces of a block are its ground.
+                lowest = min(float(s.rings[0][:, 2].min()) for s in surfaces)
+                surfaces = [
+                    Surface3("ground" if float(s.rings[0][:, 2].max()) < lowest + 0.05 else s.kind, s.rings)
+                    for s in surfaces
+                ]
         return building_of_surfaces(surfaces, key=root, kind=self._kind, file=self._file, facts=tags)
 
 
 def _worth(detail: float) -> float:
-    """How good a level of detail is: 2 with its refinements, then 3, then blocks, then outlines."""
+    """Return how good a level of detail is: 2 with its refinements, then 3, then blocks, then outlines."""
     return {2: 30.0, 3: 20.0, 1: 10.0}.get(int(detail), 0.0) + detail
-
-
-def _with_floor(surfaces: list[Surface3]) -> list[Surface3]:
-    """Name the lowest level surfaces of a block its ground."""
-    lowest = min(float(s.rings[0][:, 2].min()) for s in surfaces)
-    return [Surface3("ground" if float(s.rings[0][:, 2].max()) < lowest + 0.05 else s.kind, s.rings) for s in surfaces]

@@ -112,7 +112,7 @@ class Located:
 
 @dataclass(frozen=True)
 class Detections:
-    """What a file of detections gives.
+    """Content of a file of detections.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def sightings_of(
 
 
 def _unusable(one: PhotoBox, pose: PhotoPose | None, reach: float) -> str | None:
-    """Say why a box can't be used, if it can't."""
+    """Return why a box can't be used, if it can't."""
     left, top, wide, tall = one.box
     if pose is None:
         return f"photo {one.photo} has no pose"
@@ -272,7 +272,7 @@ class CocoFile(_Foreign):
 
 
 class FeatureProperties(_Foreign):
-    """What a feature of a GeoJSON file says."""
+    """Properties of a feature of a GeoJSON file."""
 
     name: Annotated[str, Field(min_length=1, max_length=200, validation_alias=AliasChoices("class", "object_value"))]
     score: Score = 1.0
@@ -343,7 +343,8 @@ def read_detections(path: Path, frame: LocalFrame, half: float, *, photos: Path 
     for key, properties, (lon, lat) in points:
         xy = frame.to_enu(lat, lon)
         if is_within(xy, half):
-            located.append(Located(key, properties.name, properties.score, xy, _photos_of(properties)))
+            seen_in = [*properties.photos, *([] if properties.photo is None else [properties.photo])]
+            located.append(Located(key, properties.name, properties.score, xy, tuple(dict.fromkeys(seen_in))))
         else:
             refused.append((key, "it lies outside the window"))
     return Detections(
@@ -384,7 +385,13 @@ def _from_coco(file: CocoFile, path: Path) -> tuple[list[PhotoBox], list[tuple[s
     classes = {category.id: category.name for category in file.categories}
     boxes: list[PhotoBox] = []
     refused: list[tuple[str, str]] = []
-    keys = _unique_keys([one.id for one in file.annotations], path)
+    # Keys are ids, or the numbers of all where one has no id.
+    ids = [one.id for one in file.annotations]
+    numbered = any(one is None for one in ids)
+    keys = [f"d{number if numbered else one}" for number, one in enumerate(ids)]
+    doubled = next((key for key in keys if keys.count(key) > 1), None) if len(set(keys)) < len(keys) else None
+    if doubled is not None:
+        raise SchemaError(f"{path}: annotations: id {doubled[1:]} twice; give each its own")
     for key, one in zip(keys, file.annotations, strict=True):
         image, name = images.get(one.image_id), classes.get(one.category_id)
         if image is None or name is None:
@@ -416,20 +423,6 @@ def _from_geojson(features: Sequence[Feature]) -> tuple[list[PhotoBox], list[_Po
         else:
             refused.append((key, "neither a box in a photo nor a point"))
     return boxes, points, refused
-
-
-def _photos_of(said: FeatureProperties) -> tuple[str, ...]:
-    return tuple(dict.fromkeys([*said.photos, *([] if said.photo is None else [said.photo])]))
-
-
-def _unique_keys(ids: Sequence[Id | None], path: Path) -> list[str]:
-    """Return keys of detections: their ids, or their numbers where one has none."""
-    numbered = any(one is None for one in ids)
-    keys = [f"d{number if numbered else one}" for number, one in enumerate(ids)]
-    doubled = next((key for key in keys if keys.count(key) > 1), None) if len(set(keys)) < len(keys) else None
-    if doubled is not None:
-        raise SchemaError(f"{path}: annotations: id {doubled[1:]} twice; give each its own")
-    return keys
 
 
 def _folder_of_poses(path: Path, photos: Path | None) -> FolderImages:

@@ -9,7 +9,7 @@ ground is flat, without a step where the files end.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -110,7 +110,12 @@ def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = 
     """
     if not path.is_file():
         raise MissingFileError(f"{path}: no such elevation file; give a point cloud, or leave it out for flat ground")
-    laspy = _library(path)
+    try:
+        import laspy
+    except ImportError:
+        raise MissingExtraError(f"{path}: point clouds need laspy; install it with: {_COMMAND}") from None
+    if path.name.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
+        raise MissingExtraError(f"{path}: packed point clouds need lazrs; install it with: {_COMMAND}")
     side = int(np.ceil(reach / FINEST))
     total, count = np.zeros((2 * side) ** 2), np.zeros((2 * side) ** 2, np.int64)
     inside = 0
@@ -121,7 +126,9 @@ def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = 
             transformer = Transformer.from_crs(system, frame.proj4, always_xy=True)
             if not _reaches(reader.header, transformer, reach):
                 return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
-            for xyz, ground in _chunks(reader):
+            for points in reader.chunk_iterator(_CHUNK):
+                xyz = np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
+                ground = np.asarray(points.classification) == GROUND
                 x, y = transformer.transform(xyz[:, 0], xyz[:, 1])
                 column, row = np.floor(x / FINEST) + side, np.floor(-y / FINEST) + side
                 near = (column >= 0) & (column < 2 * side) & (row >= 0) & (row < 2 * side)
@@ -144,17 +151,12 @@ def ground_of_points(path: Path, frame: LocalFrame, reach: float, *, crs: str = 
         )
     with np.errstate(invalid="ignore"):
         heights = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(2 * side, 2 * side)
-    return _crop_to_ground(heights, frame, side)
-
-
-def _library(path: Path) -> Any:
-    try:
-        import laspy
-    except ImportError:
-        raise MissingExtraError(f"{path}: point clouds need laspy; install it with: {_COMMAND}") from None
-    if path.name.lower().endswith(".laz") and not laspy.LazBackend.detect_available():
-        raise MissingExtraError(f"{path}: packed point clouds need lazrs; install it with: {_COMMAND}")
-    return laspy
+    # Beyond the part of the grid in which there is ground the file does not reach.
+    rows, columns = np.flatnonzero(np.isfinite(heights).any(axis=1)), np.flatnonzero(np.isfinite(heights).any(axis=0))
+    if not len(rows):
+        return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
+    part = heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return _raster(part, frame, (columns[0] - side + 0.5) * FINEST, (side - rows[0] - 0.5) * FINEST)
 
 
 def _system(header: Any, path: Path) -> CRS:
@@ -188,22 +190,6 @@ def _reaches(header: Any, transformer: Transformer, reach: float) -> bool:
     if not np.isfinite(there).all():
         return True  # the points will tell
     return bool((there.min(axis=0) < reach).all() and (there.max(axis=0) > -reach).all())
-
-
-def _chunks(reader: Any) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
-    """Coordinates of points, and which are ground."""
-    for points in reader.chunk_iterator(_CHUNK):
-        xyz = np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
-        yield xyz, np.asarray(points.classification) == GROUND
-
-
-def _crop_to_ground(heights: NDArray[np.float64], frame: LocalFrame, side: int) -> Raster:
-    """Return the part of the grid in which there is ground: beyond it the file does not reach."""
-    rows, columns = np.flatnonzero(np.isfinite(heights).any(axis=1)), np.flatnonzero(np.isfinite(heights).any(axis=0))
-    if not len(rows):
-        return _raster(np.zeros((0, 0)), frame, 0.0, 0.0)
-    part = heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return _raster(part, frame, (columns[0] - side + 0.5) * FINEST, (side - rows[0] - 0.5) * FINEST)
 
 
 def _raster(heights: NDArray[np.float64], frame: LocalFrame, west: float, north: float) -> Raster:
@@ -311,7 +297,11 @@ def read_elevation(
         cuts.sort(key=lambda cut: round(math.log(cut.spacing) / 0.02))
     covered = _coverage(cuts, frame, half)
     if not cuts or covered <= 0.0:
-        _refuse(given, rasters, frame, half)
+        raise EmptyInputError(
+            f"{given[0] if len(given) == 1 else 'elevation'}: nothing of the {2 * half:.0f} m square around "
+            f"{frame.lat}, {frame.lon} is there ({_extents(given, rasters)}); give files of this place, or leave "
+            "elevation out for flat ground"
+        )
     points, filled, counts = _merge_cuts(cuts, frame, half)
     beyond = ""
     if covered < 1.0:
@@ -362,17 +352,8 @@ def _coverage(cuts: Sequence[RasterCut], frame: LocalFrame, half: float) -> floa
     return float(covered.mean())
 
 
-def _refuse(paths: Sequence[Path], rasters: Sequence[Raster], frame: LocalFrame, half: float) -> None:
-    """Say what the files cover, since nothing of the window is among it."""
-    raise EmptyInputError(
-        f"{paths[0] if len(paths) == 1 else 'elevation'}: nothing of the {2 * half:.0f} m square around {frame.lat}, "
-        f"{frame.lon} is there ({_extents(paths, rasters)}); give files of this place, or leave elevation out for flat "
-        "ground"
-    )
-
-
 def _extents(paths: Sequence[Path], rasters: Sequence[Raster]) -> str:
-    """Say what files cover."""
+    """Return what files cover."""
     extents: list[str] = []
     for path, raster in zip(paths, rasters, strict=True):
         rows, columns = raster.pixels.shape
@@ -432,7 +413,7 @@ def _merge_cuts(
 def _offset(
     xy: NDArray[np.float64], own: NDArray[np.float64], finer: NDArray[np.float64], spacing: float
 ) -> NDArray[np.float64]:
-    """How much a file must be raised where it meets finer ones, so that there is no step; nothing farther away."""
+    """Return how much a file must be raised so that it meets finer ones without a step; nothing farther away."""
     both = np.isfinite(own) & np.isfinite(finer)
     offset = np.zeros(len(xy))
     if not both.any():

@@ -66,7 +66,7 @@ class GltfPart:
 
 @dataclass(frozen=True)
 class GltfScene:
-    """What a glTF file shows.
+    """Triangles and textures of a glTF file.
 
     Attributes
     ----------

@@ -31,8 +31,8 @@ _MOST_REPEATS = 2_000  # departures that one row of frequencies.txt may stand fo
 _MOST_DAYS = 3_660
 _MOST_BROKEN = 200
 _WEEK = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
-_TIME = re.compile(r"\s*(\d{1,3}):([0-5]?\d)(?::([0-5]?\d)(?:\.\d*)?)?\s*([ap])?\.?(?:m\.?)?\s*", re.IGNORECASE)
-_DATE = re.compile(r"(\d{4})(-?)(\d\d)\2(\d\d)")
+_TIME = re.compile(r"\s*(\d{1,3}):([0-5]?\d)(?::([0-5]?\d)(?:\.\d*)?)?\s*(?P<half>[ap])?\.?(?:m\.?)?\s*", re.IGNORECASE)
+_DATE = re.compile(r"(?P<year>\d{4})(?P<dash>-?)(?P<month>\d\d)(?P=dash)(?P<day>\d\d)")
 _COLOUR = re.compile(r"[0-9a-fA-F]{6}")
 _TRAMS = {0, 5, 12, *range(900, 907)}
 _COACHES, _BUSES = range(200, 210), {*range(700, 717), 800}  # extended types
@@ -105,17 +105,17 @@ def seconds_of(text: str) -> int | None:
     if match is None:
         return None
     hours = int(match[1])
-    if match[4] is not None:
+    if match["half"] is not None:
         if not 1 <= hours <= 12:
             return None
-        hours = hours % 12 + (12 if match[4] in "pP" else 0)
+        hours = hours % 12 + (12 if match["half"] in "pP" else 0)
     return hours * 3600 + int(match[2]) * 60 + int(match[3] or 0)
 
 
 def _date_of(text: str) -> date | None:
     match = _DATE.fullmatch(text)
     try:
-        return None if match is None else date(int(match[1]), int(match[3]), int(match[4]))
+        return None if match is None else date(*(int(match[part]) for part in ("year", "month", "day")))
     except ValueError:
         return None
 
@@ -266,7 +266,7 @@ class _Reader:
         return near[inside], xy[inside]
 
     def _tell_of_elsewhere(self, table: NDArray[np.float64]) -> None:
-        """Say where the stops lie, as none is in the window; and whether they would be, the other way round."""
+        """Report where stops lie when none is in the window, and whether they would be with coordinates exchanged."""
         (south, west), (north, east) = table.min(axis=0), table.max(axis=0)
         turned = table[:, ::-1][np.abs(table[:, 1]) <= 90.0]
         count = len(self._in_window(turned)[0]) if len(turned) else 0
@@ -399,7 +399,7 @@ class _Reader:
         return min(weekdays, key=lambda when: (-load[when], when)) if weekdays else None
 
     def _tell_of_calendar(self, chosen: date | None, as_of: date | None) -> None:
-        """Say that the timetable is an old one, where it ended before the map's day or the day the feed was packed."""
+        """Report a timetable that ended before the map's day or the day the feed was packed."""
         if chosen is None:
             return
         ended = max(day for days in self._days.values() for day in days)
@@ -508,7 +508,7 @@ class _Reader:
         return lines
 
     def _attribution(self, agencies: dict[str, str], served: Collection[str]) -> str:
-        """Who made it: the publisher of feed_info.txt and attributions.txt, else the agencies that serve the window."""
+        """Return the publisher of feed_info.txt and attributions.txt, else the agencies that serve the window."""
         named = [name for (name,) in self._rows("feed_info.txt", [], ["feed_publisher_name"])]
         named += [name for (name,) in self._rows("attributions.txt", [], ["organization_name"])]
         named = [name for name in named if name] or sorted(name for name in served if name)
@@ -518,13 +518,10 @@ class _Reader:
 
 def _counts_in_words(kinds: Counter[str], names: Mapping[str, str], column: str) -> str:
     """Return counts by kind in words, the most frequent first."""
-    shown = [f"{count:,} of {column} {kind or 'empty'}{_in_words(kind, names)}" for kind, count in kinds.most_common(4)]
+    words = {kind: f" ({name})" for kind, name in names.items()}
+    shown = [f"{count:,} of {column} {kind or 'empty'}{words.get(kind, '')}" for kind, count in kinds.most_common(4)]
     more = [f"{len(kinds) - 4} more kinds"] if len(kinds) > 4 else []
     return ", ".join(shown + more)
-
-
-def _in_words(kind: str, names: Mapping[str, str]) -> str:
-    return f" ({names[kind]})" if kind in names else ""
 
 
 def _interpolate_times(trip: _Trip) -> str | None:

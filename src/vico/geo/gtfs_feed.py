@@ -71,7 +71,7 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Feed:
-    """What a GTFS feed says about a window on one day of service.
+    """Content of a GTFS feed for a window and one day of service.
 
     Attributes
     ----------

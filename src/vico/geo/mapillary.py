@@ -63,7 +63,7 @@ class Point(BaseModel):
 
 
 class MapillaryImage(BaseModel):
-    """What the API says about one photo; fields that were not asked for are ignored."""
+    """Fields of one photo as the API gives them; those that were not asked for are ignored."""
 
     model_config = ConfigDict(extra="ignore", coerce_numbers_to_str=True)
     id: Annotated[str, Field(min_length=1, max_length=80)]
@@ -241,7 +241,7 @@ class Mapillary:
         if len(pieces) > _MOST_PIECES:
             raise InputError(f"mapillary: the place takes {len(pieces):,} requests, it is too large or lies at a pole")
         for piece in pieces:
-            for image in self._listed(piece):
+            for image in self._images_in(piece):
                 found.setdefault(image.id, image)
         usable = []
         for image in sorted(found.values(), key=lambda i: i.id):
@@ -267,7 +267,7 @@ class Mapillary:
                 taken += 1
                 yield photo
 
-    def _listed(self, box: tuple[float, float, float, float]) -> Iterator[MapillaryImage]:
+    def _images_in(self, box: tuple[float, float, float, float]) -> Iterator[MapillaryImage]:
         """Everything in a box: page by page, or quarter by quarter where a full page has no next one."""
         after: str | None = None
         for _ in range(_MOST_PAGES):
@@ -282,7 +282,7 @@ class Mapillary:
             middle = (west + east) / 2, (south + north) / 2
             for x in ((west, middle[0]), (middle[0], east)):
                 for y in ((south, middle[1]), (middle[1], north)):
-                    yield from self._listed((x[0], y[0], x[1], y[1]))
+                    yield from self._images_in((x[0], y[0], x[1], y[1]))
 
     def _page(
         self, box: tuple[float, float, float, float], after: str | None

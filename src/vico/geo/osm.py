@@ -104,7 +104,7 @@ class OsmRelation:
 
 @dataclass(frozen=True)
 class OsmData:
-    """What an OSM file holds within a window, in the order of the file.
+    """Content of an OSM file within a window, in the order of the file.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class OsmData:
 
     @property
     def sides(self) -> tuple[float, float]:
-        """How wide and how high that box is, metres."""
+        """Return how wide and how high that box is, metres."""
         west, south, east, north = self.box
         return east - west, north - south
 
@@ -451,7 +451,7 @@ def extract_bounds(path: Path) -> tuple[float, float, float, float]:
 
 
 def _elsewhere(path: Path, frame: LocalFrame) -> str:
-    """Say how to mend a window that lies beside what an extract covers: where that is, or what is exchanged."""
+    """Return how to mend a window that lies beside what an extract covers: where that is, or what is exchanged."""
     south, west, north, east = extract_bounds(path)
     where = f"the extract covers {south:.4f} to {north:.4f} north, {west:.4f} to {east:.4f} east"
     if south <= frame.lat <= north and west <= frame.lon <= east:
@@ -469,7 +469,12 @@ def _build_osm_data(reader: _Reader, half: float, margin: float, digest: str) ->
     shapely.prepare(window)
     ways: list[OsmWay] = []
     areas: list[OsmArea] = []
-    broken = _of_editor(reader)
+    broken = [(f"{kind}{key}", "deleted in the editor that saved the file") for kind, key in sorted(reader.deleted)]
+    if len(broken) > _MOST_TOLD:
+        broken = [("map", f"{len(broken):,} objects are deleted in the editor that saved the file")]
+    if reader.drafts:
+        ids = FIRST_DRAFT + 1
+        broken.append(("map", f"{reader.drafts:,} objects are drafts of an editor (negative ids); -1 is read as {ids}"))
     by_id: dict[int, tuple[NDArray[np.float64], Tags]] = {}
     for (way_id, refs, _, _, tags, near), line in zip(reader.way_rows, _lines(reader), strict=True):
         by_id[way_id] = (line, tags)
@@ -480,7 +485,7 @@ def _build_osm_data(reader: _Reader, half: float, margin: float, digest: str) ->
         if not tags:
             continue
         way = OsmWay(way_id, refs, line, len(refs) > 3 and refs[0] == refs[-1], tags)
-        if not way.closed and _is_building(tags):
+        if not way.closed and any(tags.get(key, "no") != "no" for key in ("building", "building:part")):
             way = _close_outline(way, reader, window, broken)
         if way.closed and means_area(tags):
             area = _area_of_way(way, window, reader.partial.get(way_id, 0), broken)
@@ -504,10 +509,6 @@ def _build_osm_data(reader: _Reader, half: float, margin: float, digest: str) ->
     return replace(found, covered=reader.covered)
 
 
-def _is_building(tags: Mapping[str, str]) -> bool:
-    return any(tags.get(key, "no") != "no" for key in ("building", "building:part"))
-
-
 def _close_outline(way: OsmWay, reader: _Reader, window: Polygon, broken: list[tuple[str, str]]) -> OsmWay:
     """Return a building's outline that is no ring, closed if its ends nearly meet; say so, or why it is no building."""
     if not np.isfinite(way.line).all() or not window.intersects(LineString(way.line)):
@@ -529,17 +530,6 @@ def _close_outline(way: OsmWay, reader: _Reader, window: Polygon, broken: list[t
         line = np.concatenate([way.line, way.line[:1]])
         return replace(way, nodes=[*way.nodes, way.nodes[0]], line=line, closed=True)
     return way
-
-
-def _of_editor(reader: _Reader) -> list[tuple[str, str]]:
-    """Say what of a file an editor marked for deletion, and how its drafts are numbered."""
-    told = [(f"{kind}{number}", "deleted in the editor that saved the file") for kind, number in sorted(reader.deleted)]
-    if len(told) > _MOST_TOLD:
-        told = [("map", f"{len(told):,} objects are deleted in the editor that saved the file")]
-    if reader.drafts:
-        ids = FIRST_DRAFT + 1
-        told.append(("map", f"{reader.drafts:,} objects are drafts of an editor (negative ids); -1 is read as {ids}"))
-    return told
 
 
 def _nodes(reader: _Reader) -> list[OsmNode]:

@@ -19,7 +19,8 @@ FIRST_DRAFT = 10**12
 
 _KINDS = {"node": "n", "way": "w", "relation": "r"}
 _MARK = re.compile(rb"""\b(?:action\s*=\s*["']delete|visible\s*=\s*["']false)""")
-_BLOCK, _LONGEST_MARK = 1 << 20, 64
+_BLOCK = 1 << 20  # bytes that are read at a time
+_LONGEST_MARK = 64  # bytes
 # Overpass says at the end of its answer why that is not whole.
 _REMARK = re.compile(rb"<remark>(.*?)</remark>", re.DOTALL)
 _NODE_WITH_PLACE = re.compile(rb"""<nd\s[^>]*\blat\s*=""")

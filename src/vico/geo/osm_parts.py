@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,19 +72,19 @@ class OsmParts:
             relations=relations,
             broken=broken,
             covered=None,
-            sea=None if whole.sea is None else _parts_in(whole.sea, window, shift),
+            sea=None
+            if whole.sea is None
+            else [
+                _translate(part, shift)
+                for shape in whole.sea
+                for part in polygons_of(overlay.intersection(shape, window))
+            ],
         )
 
 
 def _touching_shapes(tree: shapely.STRtree, window: Polygon) -> list[int]:
     """Return the numbers of the shapes that touch a window, in their order."""
     return sorted(tree.query(window, predicate="intersects").tolist())
-
-
-def _parts_in(shapes: Sequence[Polygon], window: Polygon, shift: NDArray[np.float64]) -> list[Polygon]:
-    """Return what of shapes lies in a window, told from another middle."""
-    parts = [part for shape in shapes for part in polygons_of(overlay.intersection(shape, window))]
-    return [_translate(part, shift) for part in parts]
 
 
 def _translate(shape: BaseGeometry, shift: NDArray[np.float64]) -> BaseGeometry:

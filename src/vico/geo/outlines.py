@@ -28,12 +28,14 @@ from vico.errors import SchemaError
 from vico.geo import overlay
 from vico.geo.frame import LocalFrame
 from vico.geo.overlay import OverlayError, polygons_of
+from vico.geometry import distances
 
 #: A building with more corners than this is simplified: OpenStreetMap allows 2,000 nodes a way.
 MOST_CORNERS = 1000
 # Mending takes time that grows with the third power of the crossings: 200 random corners take seconds, 2,000 days.
 _MOST_CROSSINGS = 200
-_FREE, _MOST_RATIO = 64 << 20, 60  # real extracts unpack to 3 (pbf) to 20 times (XML) their size
+_FREE = 64 << 20  # bytes that any extract may unpack to
+_MOST_RATIO = 60  # real extracts unpack to 3 (pbf) to 20 times (XML) their size
 
 
 def is_scribble(lines: list[NDArray[np.float64]]) -> bool:
@@ -298,7 +300,7 @@ def _with_islands(outside: _Rings, holes: _Rings) -> Polygon | MultiPolygon:
 
 
 def _reason(outside: _Rings, missing: int, count: int, cut: bool, frame: LocalFrame) -> str:
-    """Say why members make no area."""
+    """Return why members make no area."""
     if not outside.shape.is_empty:
         return "its holes cover all of it; left out (are the roles outer and inner exchanged?)"
     if missing:
@@ -410,7 +412,7 @@ def _gaps(lines: Sequence[LineString]) -> _Rings:
     reach = np.inf if len(loose) <= _MOST_ENDS else GAP
     tree = cKDTree(loose)
     pairs = tree.query_pairs(min(reach, 1e9), output_type="ndarray")
-    widths = np.hypot(*(loose[pairs[:, 0]] - loose[pairs[:, 1]]).T)
+    widths = distances(loose[pairs[:, 0]], loose[pairs[:, 1]])
     paired: set[int] = set()
     for k in np.lexsort((pairs[:, 1], pairs[:, 0], widths)).tolist():
         ends = pairs[k].tolist()

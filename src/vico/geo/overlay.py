@@ -142,12 +142,12 @@ def offset_curve(line: Any, distance: Any, **style: Any) -> Any:
 def simplify(shape: Any, tolerance: Any) -> Any:
     """Return a geometry with fewer corners, none farther off than the tolerance, valid if the given one is."""
 
-    def simplified(it: Any, tolerance: Any) -> Any:
+    def simplify_valid(it: Any, tolerance: Any) -> Any:
         made = shapely.simplify(it, tolerance, preserve_topology=True)
         torn = ~shapely.is_valid(made)
         return np.where(torn, it, made) if np.ndim(torn) else (it if torn else made)
 
-    return _robust(simplified, "simplification", shape, tolerance)
+    return _robust(simplify_valid, "simplification", shape, tolerance)
 
 
 def on_grid(shape: Any, *, grid: float = GRID) -> Any:

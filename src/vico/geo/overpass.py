@@ -27,7 +27,9 @@ ENDPOINT = "https://overpass-api.de/api/interpreter"
 #: Map data reach this far beyond the window, metres: as far as `read_osm` keeps them, and one for a rounded radius.
 MARGIN = 61.0
 
-_SECONDS, _MEMORY = 180, 512 << 20  # what a query may take on the server; its own defaults
+# Limits of a query on the server; its own defaults.
+_SECONDS = 180
+_MEMORY = 512 << 20  # bytes
 _MOST_HALF = 10_000.0
 _MOST_ANSWER = 512 << 20
 _DEEPEST = 3  # splits: 64 pieces at most
@@ -228,7 +230,7 @@ def quarters(box: Box) -> list[Box]:
 
 
 def seconds_to_a_slot(page: str) -> float:
-    """How long to wait, as a server's status page says; 0 where a slot is free, or the page says nothing."""
+    """Return how long to wait, as a server's status page says; 0 where a slot is free, or the page says nothing."""
     if re.search(r"Rate limit: 0\b|\b[1-9]\d* slots? available now", page):
         return 0.0
     waits = [int(found) for found in re.findall(r"Slot available after:[^\n]*?in (-?\d{1,9}) seconds", page)]

@@ -180,8 +180,12 @@ def read_overture_buildings(path: Path, frame: LocalFrame, half: float, crs: str
     credits: set[str] = set()
     files = parquet_files([path], what="Overture's theme=buildings")
     for file in files:
-        for row in _rows(file, frame, half):
-            name = f"{OVERTURE}:{_word(row.get('id'), 80) or _key_of(row)}"
+        for row in rows_near(
+            file, frame.boxes(half), columns=_HOUSE_FIELDS, needed=("geometry",), give="Overture's theme=buildings"
+        ):
+            # A row without an id is known by its outline.
+            key = _word(row.get("id"), 80) or sha256(bytes(row.get("geometry") or b"")).hexdigest()[:12]
+            name = f"{OVERTURE}:{key}"
             shape = _shape(row.get("geometry"), frame)
             if shape is None:
                 refused.append((name, "its geometry is no outline on Earth"))
@@ -196,7 +200,9 @@ def read_overture_buildings(path: Path, frame: LocalFrame, half: float, crs: str
                 parts.setdefault(f"{OVERTURE}:{_word(row['building_id'], 80)}", []).append((shape, tags))
                 continue
             buildings[name] = FoundBuilding(name, OVERTURE, path.name, shape, tags)
-            credits.update(_datasets(row))
+            for source in row.get("sources") or ():
+                if isinstance(source, dict) and (dataset := _word(source.get("dataset"))):
+                    credits.add("© OpenStreetMap contributors" if dataset == "OpenStreetMap" else dataset)
             if len(buildings) > _MOST_BUILDINGS:
                 raise SchemaError(
                     f"{file}: more than {_MOST_BUILDINGS:,} buildings in the window; this is no real place"
@@ -210,17 +216,6 @@ def read_overture_buildings(path: Path, frame: LocalFrame, half: float, crs: str
     found = tuple(buildings[name] for name in sorted(buildings))
     return FoundBuildings(
         OVERTURE, path.name, digest, found, tuple(sorted(refused)), (ATTRIBUTION, *sorted(credits)), LICENCE
-    )
-
-
-def _key_of(row: dict[str, Any]) -> str:
-    """Return a key of a row without an id: of its outline."""
-    return sha256(bytes(row.get("geometry") or b"")).hexdigest()[:12]
-
-
-def _rows(file: Path, frame: LocalFrame, half: float) -> Iterator[dict[str, Any]]:
-    return rows_near(
-        file, frame.boxes(half), columns=_HOUSE_FIELDS, needed=("geometry",), give="Overture's theme=buildings"
     )
 
 
@@ -265,13 +260,6 @@ def _tags(row: dict[str, Any]) -> dict[str, str]:
 
 def _word(value: Any, longest: int = 60) -> str:
     return " ".join(value.split())[:longest] if isinstance(value, str) else ""
-
-
-def _datasets(row: dict[str, Any]) -> Iterator[str]:
-    """Names of the data sets that a row was made of."""
-    for source in row.get("sources") or ():
-        if isinstance(source, dict) and (name := _word(source.get("dataset"))):
-            yield "© OpenStreetMap contributors" if name == "OpenStreetMap" else name
 
 
 LEAST_CONFIDENCE = 0.5

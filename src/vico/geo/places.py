@@ -16,7 +16,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -59,25 +59,6 @@ class FoundPlace:
     may_be_kept: bool = True
 
 
-class PlaceSource(Protocol):
-    """Something that knows places.
-
-    Attributes
-    ----------
-    name
-        What it is called in messages and reports.
-    may_be_kept
-        Whether its terms allow to store what it says.
-    """
-
-    name: str
-    may_be_kept: bool
-
-    def near(self, frame: LocalFrame, half: float) -> list[FoundPlace]:
-        """Every place in the square of half side `half` metres around the frame's origin, sorted by id."""
-        ...
-
-
 def one_line(text: str, most: int = 120) -> str:
     """Return a name without line breaks, control characters and endless length."""
     return " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())[:most].strip()
@@ -91,7 +72,8 @@ _NEW = "https://places.googleapis.com/v1/places:searchNearby"
 _FIELDS = "places.id,places.displayName,places.types,places.primaryType,places.location,places.businessStatus"
 _PAGES = 3  # a search gives 60 at most, on three pages
 _TOKEN_READY = 2.0  # seconds until a page token is good
-_FULL, _FULL_NEW = 60, 20
+_FULL = 60  # answers of a full search, legacy API
+_FULL_NEW = 20  # answers of a full search, new API
 _LEAST_RADIUS = 20.0  # metres: a full circle is not parted below this
 _MOST_CALLS = 400
 _MOST_ANSWER = 4 << 20

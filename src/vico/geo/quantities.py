@@ -15,11 +15,14 @@ from enum import Enum
 from functools import lru_cache
 
 FOOT, INCH = 0.3048, 0.0254  # metres
-_KMH, _MPH, _KNOT = 1 / 3.6, 0.44704, 0.514444  # metres a second
+# Metres a second.
+_KMH = 1 / 3.6
+_MPH = 0.44704
+_KNOT = 0.514444
 
 
 class Kind(Enum):
-    """What a tag's value measures."""
+    """Quantity that a tag's value measures."""
 
     LENGTH = "length"
     """Metres, where no unit is said."""
@@ -34,7 +37,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Reading:
-    """What a value says.
+    """A value as it is read.
 
     Attributes
     ----------
@@ -185,7 +188,10 @@ def _read(text: str, kind: Kind) -> Reading:
         return Reading(float(sum(map(int, said.split("+")))), "; ".join([*rules, "added up"]))
     if kind is Kind.STOREYS and (summed := _sum_of_storeys(said)) is not None:
         return Reading(summed.value, "; ".join([*rules, summed.rule]))
-    pieces = [piece for piece in _several(said, kind) if piece]
+    if kind is Kind.STOREYS and not re.fullmatch(r"\d+,(?:50?|25|75)", said):
+        # Halves and quarters are all the fractions there are: "1,2" lists two values, "1,5" is one and a half.
+        said = said.replace(",", ";")
+    pieces = [piece for piece in _SEVERAL.split(said.strip(" ,")) if piece]
     readings = [_one(piece, kind) for piece in pieces]
     if not readings or any(one is None for one in readings):
         return Reading(None)
@@ -204,14 +210,6 @@ class _Piece:
     number: float
     unit: str
     rule: str = ""
-
-
-def _several(said: str, kind: Kind) -> list[str]:
-    """Part a list or a range into its values."""
-    if kind is Kind.STOREYS and not re.fullmatch(r"\d+,(?:50?|25|75)", said):
-        # Halves and quarters are all the fractions there are: "1,2" lists two values, "1,5" is one and a half.
-        said = said.replace(",", ";")
-    return _SEVERAL.split(said.strip(" ,"))
 
 
 def _one(piece: str, kind: Kind) -> _Piece | None:

@@ -30,8 +30,9 @@ _ABOVE = ((9, 200.0, 4.0), (400, 1000.0, 20.0))
 _BELOW = ((9, 60.0, 3.0), (400, 500.0, 10.0))
 _LEAST_AROUND = 3  # neighbours that are known
 _MOST_ROUNDS = 8
-# Large grids are gone through in overlapping tiles: a group wider than the overlap is none.
-_STRIDE, _OVERLAP = 512, 128
+# Large grids are gone through in overlapping tiles, pixels: a group wider than the overlap is none.
+_STRIDE = 512
+_OVERLAP = 128
 
 
 def without_outliers(
@@ -60,7 +61,8 @@ def without_outliers(
             # What is left out may have hidden another beside it.
             for _ in range(_MOST_ROUNDS):
                 part = heights[tile]
-                if not _largest_step(part) >= least:
+                steps = [np.abs(np.diff(part, axis=axis)) for axis in (0, 1)]
+                if not any(np.max(step, initial=0.0, where=np.isfinite(step)) >= least for step in steps):
                     break
                 ends = (top == 0, top + len(part) == rows, left == 0, left + part.shape[1] == columns)
                 bad = _outlying(part, spacing, ends)
@@ -71,12 +73,6 @@ def without_outliers(
                 heights = heights.copy()
                 heights[tile][bad] = np.nan
     return heights, found
-
-
-def _largest_step(heights: NDArray[np.float64]) -> float:
-    """Return the largest difference of pixels side by side, metres."""
-    steps = [np.abs(np.diff(heights, axis=axis)) for axis in (0, 1)]
-    return max(float(np.max(step, initial=0.0, where=np.isfinite(step))) for step in steps)
 
 
 def _outlying(heights: NDArray[np.float64], spacing: float, ends: tuple[bool, ...]) -> NDArray[np.bool_]:
@@ -150,11 +146,14 @@ _RING = 3  # pixels from a patch to the ground that it is held against: resampli
 _LEAST_RING = 8
 _SEA_LEVEL = 2.0  # metres around 0: geoids differ
 _NEARLY_ALL = 0.95
-_MIXED, _MANY_MIXED = 0.8, 0.1  # of the step, below which a pixel beside a void is a mixture; share of these
+_MIXED = 0.8  # share of the step below which a pixel beside a void is a mixture
+_MANY_MIXED = 0.1  # share of the pixels beside a void that are mixtures where all are left out
 # What nearly all of the ring stands above the patch or below it, metres and times the distance between pixels: where
 # the patch is left out, and where it is told of and kept. No lake has walls of 69 degrees along its whole shore. At 0
 # there is the sea, with cliffs of 214 m over kilometres (Moher). Stacks and towers have a flat top on a coarse grid.
-_LAKE, _SEA, _TOP = ((100.0, 8.0), (100.0, 8.0)), ((250.0, 8.0), (30.0, 3.0)), ((300.0, 8.0), (100.0, 8.0))
+_LAKE = (100.0, 8.0), (100.0, 8.0)
+_SEA = (250.0, 8.0), (30.0, 3.0)
+_TOP = (300.0, 8.0), (100.0, 8.0)
 _TOUCHING = np.ones((3, 3), bool)
 
 
@@ -215,7 +214,9 @@ def without_voids(heights: NDArray[np.float64], spacing: float) -> tuple[NDArray
             steps = _steps(given[reach], patch, value)
             if steps is None:
                 continue
-            row, column = _middle(patch)
+            places = np.argwhere(patch)
+            middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
+            row, column = places[middle].tolist()
             found = Patch(
                 row + reach[0].start, column + reach[1].start, value, int(sizes[number]), float(np.median(steps))
             )
@@ -246,7 +247,7 @@ def _repeated_values(heights: NDArray[np.float64], spacing: float) -> list[float
 
 
 def _steps(heights: NDArray[np.float64], patch: NDArray[np.bool_], value: float) -> NDArray[np.float64] | None:
-    """How much higher the ring around a patch is, metres; None where too little of it is known."""
+    """Return how much higher the ring around a patch is, metres; None where too little of it is known."""
     outside = ndimage.binary_dilation(patch, _TOUCHING, _RING) & ~ndimage.binary_dilation(patch, _TOUCHING, _RING - 1)
     steps = heights[outside] - value
     steps = steps[np.isfinite(steps)]
@@ -267,13 +268,6 @@ def _with_mixed(heights: NDArray[np.float64], patch: NDArray[np.bool_], value: f
     beside = near & ~patch & np.isfinite(heights)
     mixed = beside & (away < _MIXED * ground)
     return near if mixed.sum() > _MANY_MIXED * beside.sum() else patch
-
-
-def _middle(patch: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the row and column of the pixel of a patch that is nearest to its middle."""
-    places = np.argwhere(patch)
-    nearest = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
-    return int(places[nearest, 0]), int(places[nearest, 1])
 
 
 _LOWEST, _HIGHEST = -1000.0, 9000.0  # SRTM's void is -32768, others use -9999; no dry land lies under -430 m

@@ -94,7 +94,13 @@ def read_raster(path: Path) -> Raster:
         content = path.read_bytes() if size in _HGT_SIDES else b""
         return _hgt(content, path.name, path, size)
     if name.endswith(".hgt.gz"):
-        return _gzipped_hgt(path)
+        most = max(_HGT_SIDES) + 1
+        try:
+            with gzip.open(path) as file:
+                content = file.read(most)
+        except (OSError, EOFError, zlib.error) as error:
+            raise SchemaError(f"{path}: broken gzip file ({error}); download it again") from None
+        return _hgt(content, path.name, path, len(content))
     if name.endswith(".zip"):
         return _zipped_hgt(path)
     raise InputError(
@@ -135,16 +141,6 @@ def _hgt(content: bytes, name: str, path: Path, size: int) -> Raster:
     heights = np.frombuffer(content, ">i2").reshape(side, side)
     affine = np.array([[step, 0.0, west], [0.0, -step, south + 1.0]])
     return Raster(GridArray(heights), affine, CRS.from_epsg(4326))
-
-
-def _gzipped_hgt(path: Path) -> Raster:
-    most = max(_HGT_SIDES) + 1
-    try:
-        with gzip.open(path) as file:
-            content = file.read(most)
-    except (OSError, EOFError, zlib.error) as error:
-        raise SchemaError(f"{path}: broken gzip file ({error}); download it again") from None
-    return _hgt(content, path.name, path, len(content))
 
 
 def _zipped_hgt(path: Path) -> Raster:

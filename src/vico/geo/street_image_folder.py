@@ -119,7 +119,7 @@ class OpenSfmShot(BaseModel):
 
 
 class Reference(BaseModel):
-    """Where an OpenSfM reconstruction's coordinates start."""
+    """Origin of an OpenSfM reconstruction's coordinates."""
 
     model_config = ConfigDict(extra="ignore")
     latitude: Latitude
@@ -226,7 +226,7 @@ class FolderImages:
         self._poses, self.refused = path, []
         if path.name == "photos.json":
             return self._own(frame)
-        return self._graph(frame) if path.name == "images.json" else self._reconstructed(frame)
+        return self._graph(frame) if path.name == "images.json" else self._reconstruction_poses(frame)
 
     def _bytes(self, name: str) -> bytes:
         """Return a file of the folder; names that lead out of it are refused."""
@@ -298,7 +298,7 @@ class FolderImages:
             )
         return cameras
 
-    def _reconstructed(self, frame: LocalFrame) -> list[PhotoPose]:
+    def _reconstruction_poses(self, frame: LocalFrame) -> list[PhotoPose]:
         try:
             document = json.loads(self._text())
             parts = [Reconstruction.model_validate(part) for part in document]
@@ -346,7 +346,7 @@ class FolderImages:
 
 @dataclass(frozen=True)
 class PhotoPose:
-    """Where a photo was taken and how, before its picture is read.
+    """Pose and camera of a photo, before its picture is read.
 
     Attributes
     ----------

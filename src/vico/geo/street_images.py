@@ -227,7 +227,7 @@ def is_within(xy: ArrayLike, half: float) -> bool:
 
 
 KINDS = ("spherical", "equirectangular")
-"""What cameras of such pictures are called."""
+"""Names of cameras of such pictures."""
 
 VIEWS = 6
 LONGER = 4
@@ -286,7 +286,7 @@ def cut_panorama(panorama: StreetImage) -> list[StreetImage]:
 def _whence(
     turn: NDArray[np.float64], lens: NDArray[np.float64], width: int, height: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Where in the panorama each pixel of a view lies; `turn` takes the view's axes to the panorama's."""
+    """Return where in the panorama each pixel of a view lies; `turn` takes the view's axes to the panorama's."""
     wide, tall = round(2 * lens[0, 2]), round(2 * lens[1, 2])
     x = (np.arange(wide) + 0.5 - lens[0, 2]) / lens[0, 0]
     y = (np.arange(tall) + 0.5 - lens[1, 2]) / lens[1, 1]

@@ -145,7 +145,7 @@ _READ_EXTENSIONS = {
 
 @dataclass(frozen=True)
 class TileLimits:
-    """What a tileset may ask of us.
+    """Limits on what is read of a tileset.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ class TileLimits:
 
 @dataclass(frozen=True)
 class TileReport:
-    """What became of a tileset.
+    """Report on a tileset that was read.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class _Piece:
 
 @dataclass
 class _Found:
-    """What lies below a tile: pieces, and whether anything of it is missing."""
+    """Content below a tile: pieces, and whether anything of it is missing."""
 
     pieces: list[_Piece] = field(default_factory=list)
     missing: bool = False
@@ -329,7 +329,7 @@ class _Walk:
         """Everything wanted of a tileset."""
         for name in document.get("extensionsRequired", []) or []:
             if name not in _READ_EXTENSIONS:
-                return self._lost(base, f"requires the extension {str(name)[:60]}, which is not read")
+                return self._leave_out(base, f"requires the extension {str(name)[:60]}, which is not read")
         asset = document.get("asset")
         axis = str(asset.get("gltfUpAxis", "Y")).upper() if isinstance(asset, dict) else "Y"
         said = document.get("geometricError")
@@ -345,7 +345,7 @@ class _Walk:
                 "or a smaller window"
             )
         if place.depth > self.limits.depth:
-            return self._lost(place.base, f"goes on for more than {self.limits.depth} levels")
+            return self._leave_out(place.base, f"goes on for more than {self.limits.depth} levels")
         try:
             here = place.inside(tile, self.files.name(place.base))
             volume = tile.get("boundingVolume")
@@ -356,9 +356,9 @@ class _Walk:
             children = [child for child in tile.get("children") or [] if isinstance(child, dict)]
             contents = list(_contents(tile))
         except (VicoError, ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
-            return self._lost(place.base, f"a tile is broken ({' '.join(str(error).split())[:120]})")
+            return self._leave_out(place.base, f"a tile is broken ({' '.join(str(error).split())[:120]})")
         if "implicitTiling" in tile or "3DTILES_implicit_tiling" in (tile.get("extensions") or {}):
-            return self._lost(place.base, "uses implicit tiling, which is not read; export explicit tiles")
+            return self._leave_out(place.base, "uses implicit tiling, which is not read; export explicit tiles")
         deeper = bool(children) and here.error > self.error
         if not deeper:
             return self._content(contents, here)
@@ -385,7 +385,9 @@ class _Walk:
         found = _Found()
         for uri in uris:
             found += (
-                self._lost(place.base, "a tile's content has no address") if uri is None else self._file(uri, place)
+                self._leave_out(place.base, "a tile's content has no address")
+                if uri is None
+                else self._file(uri, place)
             )
         return found
 
@@ -394,12 +396,12 @@ class _Walk:
         try:
             address = self.files.resolve(uri, place.base)
         except (VicoError, ValueError) as error:
-            return self._lost(uri.partition("?")[0][:200], str(error), plain=True)
+            return self._leave_out(uri.partition("?")[0][:200], str(error), plain=True)
         name = self.files.name(address)
         if address in place.trail:
-            return self._lost(address, "is a tileset that holds itself")
+            return self._leave_out(address, "is a tileset that holds itself")
         try:
-            file = self._opened(address, name)
+            file = self._open_file(address, name)
             if file.tileset is not None:
                 return self.tileset(file.tileset, address, place.transform, place.depth + 1, (*place.trail, address))
             found = _Found()
@@ -413,9 +415,9 @@ class _Walk:
         except (MissingExtraError, _TooMuch):
             raise
         except VicoError as error:
-            return self._lost(address, str(error).removeprefix(f"{name}: "))
+            return self._leave_out(address, str(error).removeprefix(f"{name}: "))
 
-    def _opened(self, address: str, name: str) -> TileFile:
+    def _open_file(self, address: str, name: str) -> TileFile:
         self.fetched += 1
         data = self.files.get(address)
         self.bytes += len(data)
@@ -476,7 +478,7 @@ class _Walk:
             scene.copyright,
         )
 
-    def _lost(self, address: str, reason: str, *, plain: bool = False) -> _Found:
+    def _leave_out(self, address: str, reason: str, *, plain: bool = False) -> _Found:
         self.left_out.append((address if plain else self.files.name(address), reason))
         return _Found(missing=True)
 
@@ -487,7 +489,7 @@ class _TooMuch(InputError):
 
 @dataclass(frozen=True)
 class _Place:
-    """Where in a tileset we are: what a tile takes from those above it."""
+    """A place in a tileset: what a tile takes from those above it."""
 
     base: str
     transform: NDArray[np.float64]
@@ -555,6 +557,6 @@ def _merge_pieces(pieces: list[_Piece], weld: float) -> TileMesh:
 
 
 def credits_of(said: Iterator[str] | list[str]) -> tuple[str, ...]:
-    """Whom to credit: the parts of ``asset.copyright`` between semicolons, the most frequent first."""
+    """Return whom to credit: the parts of ``asset.copyright`` between semicolons, the most frequent first."""
     names = Counter(name for text in said for part in text.split(";") if (name := part.strip()))
     return tuple(sorted(names, key=lambda name: -names[name]))

@@ -1,1 +1,1 @@
-"""What a world is: its model, its folder, and the look-ups everybody shares. No generation code."""
+"""Worlds: their model, their folder, and the look-ups that all rooms share. No generation code."""

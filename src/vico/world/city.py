@@ -243,7 +243,8 @@ def whole_walkable(folder: Path, half: float) -> WalkableMap:
 
 
 #: Entities of the first tile's things begin here: above those of bodies and of what a simulation adds.
-_FIRST, _EACH = 2_000_000, 500_000
+_FIRST = 2_000_000
+_EACH = 500_000  # entities of a tile
 # A city has millions of things: their names take a quarter of the room if each takes only what it needs.
 _TEXT = np.dtypes.StringDType()
 _OF_THE_CITY = ("stop_", "tram_stop_", "bikes_")
@@ -251,7 +252,7 @@ _OF_THE_CITY = ("stop_", "tram_stop_", "bikes_")
 
 @dataclass(frozen=True)
 class TileShift:
-    """How a tile's things become its city's.
+    """Shift of a tile's identifiers and coordinates to those of its city.
 
     Attributes
     ----------
@@ -447,7 +448,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Profile:
-    """What a tile draws along a side: edges of triangles.
+    """Edges of triangles that a tile draws along a side.
 
     Attributes
     ----------
@@ -589,7 +590,7 @@ def _houses(city: City, first: tuple[int, int], axis: int) -> NDArray[np.float64
 
 
 def _unmatched_edges(one: Profile, other: Profile, houses: NDArray[np.float64]) -> list[str]:
-    """Say where the edges of one side are not met by those of the other; what lies under others nobody sees."""
+    """Return where the edges of one side are not met by those of the other; what lies under others nobody sees."""
     found: list[str] = []
     # In the middle between any two ends, too: where a piece of the other side is missing none need end.
     ends = np.unique(np.r_[one.start, one.end, other.start, other.end])

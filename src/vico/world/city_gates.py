@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.geometry import polyline_length
 from vico.io.arrays import read_npz
 from vico.io.compiled import compiled
 from vico.world.grid_search import (
@@ -79,10 +80,10 @@ class Gates:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return them as named arrays, for a file; `steps`, which are many, are written apart."""
-        return {name: getattr(self, name) for name in self._named()}
+        return {name: getattr(self, name) for name in self._array_names()}
 
     @classmethod
-    def _named(cls) -> list[str]:
+    def _array_names(cls) -> list[str]:
         return [name for name in cls.__dataclass_fields__ if name != "steps"]
 
     @classmethod
@@ -100,10 +101,10 @@ class Gates:
             If the file does not hold them, or the steps are those of other walks.
         """
         arrays = read_npz(path.read_bytes())
-        missing = sorted(set(cls._named()) - set(arrays))
+        missing = sorted(set(cls._array_names()) - set(arrays))
         if missing:
             raise SchemaError(f"{path}: has no {', '.join(missing)}; build the city anew")
-        whole = {k: np.ascontiguousarray(arrays[k], np.int64) for k in cls._named() if k != "metres"}
+        whole = {k: np.ascontiguousarray(arrays[k], np.int64) for k in cls._array_names() if k != "metres"}
         if steps.dtype != np.uint8 or steps.shape != (whole["count"].sum(),):
             raise SchemaError(f"{path}: the steps beside it are those of other walks; build the city anew")
         return cls(**whole, metres=np.ascontiguousarray(arrays["metres"], np.float64), steps=steps)
@@ -177,7 +178,7 @@ class WindowSearch:
         final = self._scratch.memory.cells["stamp"][own] == self._scratch.generation + 1
         return np.where(final, self._scratch.memory.cells["g"][own], -1).astype(np.int64)
 
-    def reached(
+    def reach(
         self, start: int, goals: Ints, clearance: NDArray[np.float32], cell: float, *, steps: bool = False
     ) -> ReachedCells:
         """Return what walks from a cell of the map to others cost, and how long they are, pulled straight.
@@ -199,7 +200,7 @@ class WindowSearch:
         first = int(self.own(np.array([start]))[0])
         for k, last in enumerate(self.own(goals).tolist()):
             if cost[k] > 0:
-                cells, costs = self._found(first, last)
+                cells, costs = self._walk_between(first, last)
                 metres[k], corners[k] = self._length(cells, costs, clearance, cell)
                 if steps:
                     told[k] = steps_of(cells, self._cost.shape[1])
@@ -212,7 +213,7 @@ class WindowSearch:
         first, last = self.own(np.array([start, goal])).tolist()
         if self._search(start, goal_at(last, self._cost.shape[1])) < 0:
             return None
-        return self._length(*self._found(first, last), clearance, cell)
+        return self._length(*self._walk_between(first, last), clearance, cell)
 
     def walk(self, start: int, goal: int) -> tuple[Ints, Ints] | None:
         """Return the cells of the cheapest walk between two cells of the map, and its cost up to each."""
@@ -235,7 +236,7 @@ class WindowSearch:
         last = self._search(start, goals)
         if last < 0:
             return None
-        cells, costs = self._found(int(self.own(np.array([start]))[0]), last)
+        cells, costs = self._walk_between(int(self.own(np.array([start]))[0]), last)
         side = self._cost.shape[1]
         return (cells // side + self._row) * self._width + cells % side + self._column, costs
 
@@ -244,7 +245,7 @@ class WindowSearch:
         first = int(self.own(np.array([start]))[0])
         return int(search(self._cost, self._scratch.memory, first, goals, self._scratch.generation, self._landmarks))
 
-    def _found(self, first: int, last: int) -> tuple[Ints, Ints]:
+    def _walk_between(self, first: int, last: int) -> tuple[Ints, Ints]:
         known = self._scratch.memory.cells["g"], self._scratch.memory.cells["stamp"], self._scratch.generation + 1
         cells = backtrack(self._cost, known, first, last)
         return cells, self._scratch.memory.cells["g"][cells].astype(np.int64)
@@ -253,7 +254,7 @@ class WindowSearch:
         side = self._cost.shape[1]
         points = np.column_stack([cells % side, cells // side]) + 0.5
         kept = points[string_pull(self._cost, clearance, _NOTHING, False, points, costs)]
-        return float(np.hypot(*np.diff(kept, axis=0).T).sum()) * cell, max(0, len(kept) - 2)
+        return polyline_length(kept) * cell, max(0, len(kept) - 2)
 
 
 def border_gates(mine: NDArray[Any], theirs: NDArray[Any]) -> list[int]:
@@ -281,6 +282,16 @@ def _runs(on: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
+class _GateWalk(NamedTuple):
+    """A walk from a gate to another: their cells, what it costs, metres, and corners between its ends."""
+
+    start: int
+    end: int
+    cost: int
+    metres: float
+    corners: int
+
+
 def tile_gates(
     cost: NDArray[Any], clearance: NDArray[np.float32], square: tuple[slice, slice], *, cell: float
 ) -> Gates:
@@ -304,11 +315,17 @@ def tile_gates(
         ((bottom, slice(left, right)), (-1, 0)),
     ]
     own: list[int] = []
-    walks: list[tuple[int, int, int, float, int]] = []
+    walks: list[_GateWalk] = []
     steps: list[NDArray[np.uint8]] = []
     for (rows, columns), (up, aside) in sides:
-        there = tuple(_shift_slice(part, by) for part, by in ((rows, up), (columns, aside)))
-        if not all(_within(part, size) for part, size in zip(there, (height, width), strict=True)):
+        there = tuple(
+            slice(part.start + by, part.stop + by) if isinstance(part, slice) else part + by
+            for part, by in ((rows, up), (columns, aside))
+        )
+        if not all(
+            part.start >= 0 and part.stop <= size if isinstance(part, slice) else 0 <= part < size
+            for part, size in zip(there, (height, width), strict=True)
+        ):
             continue
         mine, theirs = cost[rows, columns], cost[there]
         for k in border_gates(mine, theirs):
@@ -317,33 +334,28 @@ def tile_gates(
             own.append(row * width + column)
             if up + aside > 0:
                 other = (row + up) * width + column + aside
-                walks.append((own[-1], other, STRAIGHT * (int(mine[k]) + int(theirs[k])) // 2, cell, 0))
+                walks.append(_GateWalk(own[-1], other, STRAIGHT * (int(mine[k]) + int(theirs[k])) // 2, cell, 0))
                 steps.append(steps_of(np.array([own[-1], other], np.int64), width))
     cells = np.unique(np.array(own, np.int64))
     window = WindowSearch(np.ascontiguousarray(cost[square], np.int32), bottom, left, width)
     room = np.ascontiguousarray(clearance[square], np.float32)
     for k, first in enumerate(cells.tolist()):
         rest = cells[k + 1 :]
-        found = window.reached(first, rest, room, cell, steps=True)
+        found = window.reach(first, rest, room, cell, steps=True)
         for j in np.flatnonzero(found.cost >= 0).tolist():
-            walks.append(
-                (first, int(rest[j]), int(found.cost[j]), round(float(found.metres[j]), 2), int(found.corners[j]))
-            )
+            metres = round(float(found.metres[j]), 2)
+            walks.append(_GateWalk(first, int(rest[j]), int(found.cost[j]), metres, int(found.corners[j])))
             steps.append(found.steps[j])
-    ends = np.array([walk[:3] for walk in walks], np.int64).reshape(-1, 3)
-    metres = np.array([walk[3] for walk in walks], np.float64)
-    corners = np.array([walk[4] for walk in walks], np.int64)
-    start, end, far = ends.T
-    count = np.array([len(one) for one in steps], np.int64)
-    return Gates(cells, start, end, far, metres, corners, count, np.concatenate([_NO_STEP, *steps]))
-
-
-def _shift_slice(part: slice | int, by: int) -> slice | int:
-    return slice(part.start + by, part.stop + by) if isinstance(part, slice) else part + by
-
-
-def _within(part: slice | int, size: int) -> bool:
-    return part.start >= 0 and part.stop <= size if isinstance(part, slice) else 0 <= part < size
+    return Gates(
+        cells,
+        np.array([walk.start for walk in walks], np.int64),
+        np.array([walk.end for walk in walks], np.int64),
+        np.array([walk.cost for walk in walks], np.int64),
+        np.array([walk.metres for walk in walks], np.float64),
+        np.array([walk.corners for walk in walks], np.int64),
+        np.array([len(one) for one in steps], np.int64),
+        np.concatenate([_NO_STEP, *steps]),
+    )
 
 
 _FAR = np.int64(1) << 60

@@ -28,12 +28,12 @@ from vico.world.routing import SNAP, Router, walking_costs
 from vico.world.walk_lengths import Walk, walk_of
 from vico.world.walkable import WalkableMap
 
-# Cells: walks between ends so near are looked for at once, so far around them.
-_NEAR, _AROUND = 800, 300
+_NEAR = 800  # cells; walks between ends so near are looked for at once
+_AROUND = 300  # cells around both ends in which they are looked for
 # How often a walk is looked for anew where something closed is in the way of the last.
 _TRIES = 40
-# Kept: costs from so many ends to the gates around them, 8 bytes a gate; so many walks to or from a gate, 8 a cell.
-_ENDS, _LEGS = 8192, 8192
+_ENDS = 8192  # ends whose costs to the gates around them are kept, 8 bytes a gate
+_LEGS = 8192  # walks to or from a gate that are kept, 8 bytes a cell
 # Tiles that are read before the memory that the map is read into is given back: some 4 MB each at 400 m a tile. What is
 # given back has to be mapped again: five minutes of 27 km2 took 16 million page faults with 24, 2.4 million with this.
 _TILES = 96
@@ -96,7 +96,7 @@ class CityRouter(Router):
     ) -> NDArray[np.float64] | None:
         """Find a walk; as `Router.path`."""
         a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
-        with self._lock, self._closed(closed):
+        with self._lock, self._close_squares(closed):
             ask = self._ask(blocked, room, closed)
             first, last = (self._end_near(ask, point) for point in (a, b))
             if first < 0 or last < 0:
@@ -105,13 +105,13 @@ class CityRouter(Router):
             if walk is None:
                 return None
             shut = self._shut if blocked is None else blocked | self._shut
-            return self._pulled(a, b, first, last, walk, shut if closed or blocked is not None else None)
+            return self._pull_string(a, b, first, last, walk, shut if closed or blocked is not None else None)
 
     @contextmanager
-    def _closed(self, squares: Sequence[tuple[float, float, float]]) -> Iterator[None]:
+    def _close_squares(self, squares: Sequence[tuple[float, float, float]]) -> Iterator[None]:
         self._is_closing = len(squares) > 0
         try:
-            with super()._closed(squares):
+            with super()._close_squares(squares):
                 yield
         finally:
             self._is_closing = False
@@ -338,10 +338,11 @@ class _WalkQuery:
         return self._windows[key]
 
 
-# Cells of a metre: walks between ends so near are looked for at once, so far around them; gates lie so far off at most.
-_NEAR_METRES, _AROUND_METRES, _OFF = 400, 150, 3
-# So many ends are remembered with their walks to the gates around them, some 600 bytes each, and so many tiles' cells.
-_LENGTH_ENDS, _LENGTH_TILES = 32_768, 24
+_NEAR_METRES = 400  # cells of a metre; walks between ends so near are looked for at once
+_AROUND_METRES = 150  # cells of a metre around both ends in which they are looked for
+_OFF = 3  # cells of a metre that gates lie off at most
+_LENGTH_ENDS = 32_768  # ends that are remembered with their walks to the gates around them, some 600 bytes each
+_LENGTH_TILES = 24  # tiles whose cells are remembered
 
 
 class CityWalkLengths:
@@ -440,7 +441,7 @@ class CityWalkLengths:
                 cost = np.ascontiguousarray(self._cost[square])
                 window = WindowSearch(cost, square[0].start, square[1].start, self._n)
                 self._windows.keep((row, column), window)
-            reached = window.reached(cell, cells, np.ascontiguousarray(self._room[square]), self._cell)
+            reached = window.reach(cell, cells, np.ascontiguousarray(self._room[square]), self._cell)
             known = numbers, reached._replace(cost=np.where(reached.cost < 0, -1, 2 * reached.cost))
             self._ends.keep(cell, known)
         return known

@@ -92,7 +92,7 @@ class CityEntities(Mapping[int, dict[str, str]]):
         return chain(self._of_all, self._at_stops, *tiles)
 
     def __len__(self) -> int:
-        """How many there are; every tile is read for that."""
+        """Return how many there are; every tile is read for that."""
         return len(self._of_all) + len(self._at_stops) + sum(len(self._of_tile(t).entity) for t in self._places())
 
     def _places(self) -> list[tuple[int, int]]:
@@ -120,7 +120,7 @@ class CityEntities(Mapping[int, dict[str, str]]):
 
 
 class _Named:
-    """What the things of one tile are.
+    """Identifiers and places of the things of one tile in their city.
 
     Parameters
     ----------
@@ -172,8 +172,11 @@ class CityRooms(Sequence[Room]):
     def __init__(self, files: Sequence[tuple[Path, TileShift]]) -> None:
         self._files = list(files)
         self._maps = [_map_file(path) for path, _ in files]
-        self._ends = [_line_ends(content) for content in self._maps]
-        self._first = np.cumsum([0, *map(_rows, self._ends)])
+        self._ends = [np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n")) for content in self._maps]
+        # A file has a room a line between its brackets, and an empty line where there is none.
+        empty = [len(ends) < 3 or ends[1] - ends[0] == 1 for ends in self._ends]
+        rooms = [0 if none else len(ends) - 2 for none, ends in zip(empty, self._ends, strict=True)]
+        self._first = np.cumsum([0, *rooms])
         self._kept = lru_cache(maxsize=_ROOMS_KEPT)(self._read)
 
     def __len__(self) -> int:
@@ -278,16 +281,6 @@ def _map_file(path: Path) -> bytes | mmap.mmap:
         raise MissingFileError(f"{path}: no such file; build the city anew") from None
 
 
-def _rows(ends: np.ndarray) -> int:
-    """Return how many rooms a file has: a line each between its brackets, and an empty one where there is none."""
-    return 0 if len(ends) < 3 or ends[1] - ends[0] == 1 else len(ends) - 2
-
-
-def _line_ends(content: bytes | mmap.mmap) -> np.ndarray:
-    """Return where lines end."""
-    return np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
-
-
 T = TypeVar("T")
 
 # Counts of tiles that say nothing added up: a street is in several of them, and so are kinds of things.
@@ -314,7 +307,7 @@ class CityWorld(World):
 
     @property
     def edges(self) -> tuple[float, float, float, float] | None:
-        """Where a city ends whose tiles fill no square around its middle, metres."""
+        """Return where a city ends whose tiles fill no square around its middle, metres."""
         known = self.city.manifest
         (west, south), (east, north) = (
             [(k + side) * known.size for k in corner] for corner, side in ((known.first, -0.5), (known.last, 0.5))
@@ -330,7 +323,7 @@ class CityWorld(World):
         """SHA-256 of ``city.json``, which holds the digests of all tiles: the city's identity."""
         return sha256_of(self.city.path / CITY)
 
-    def _joined(self, read: Callable[[World, TileShift], Iterable[T]]) -> list[T]:
+    def _from_tiles(self, read: Callable[[World, TileShift], Iterable[T]]) -> list[T]:
         """Return what all tiles have, in their order."""
         return [one for tile in self._own for one in read(*self._tile(tile))]
 
@@ -354,17 +347,17 @@ class CityWorld(World):
     @cached_property
     def buildings(self) -> list[Building]:
         """Buildings, tile by tile."""
-        return self._joined(lambda world, shift: map(shift.building, world.buildings))
+        return self._from_tiles(lambda world, shift: map(shift.building, world.buildings))
 
     @cached_property
     def places(self) -> list[Place]:
         """Named places, tile by tile."""
-        return self._joined(lambda world, shift: map(shift.place, world.places))
+        return self._from_tiles(lambda world, shift: map(shift.place, world.places))
 
     @cached_property
     def entrances(self) -> list[Entrance]:
         """Doors of the accessible buildings."""
-        return self._joined(lambda world, shift: map(shift.entrance, world.entrances))
+        return self._from_tiles(lambda world, shift: map(shift.entrance, world.entrances))
 
     @cached_property
     def rooms(self) -> CityRooms:
@@ -380,7 +373,7 @@ class CityWorld(World):
     @cached_property
     def parking(self) -> list[ParkingSpot]:
         """Parking spots."""
-        return self._joined(lambda world, shift: map(shift.spot, world.parking))
+        return self._from_tiles(lambda world, shift: map(shift.spot, world.parking))
 
     @cached_property
     def objects(self) -> Objects:
@@ -395,7 +388,7 @@ class CityWorld(World):
 
     @cached_property
     def walkable(self) -> WalkableMap:
-        """Where people can walk, read where it is looked at."""
+        """Return where people can walk, read where it is looked at."""
         return whole_walkable(self.city.path / WHOLE, self.half)
 
     @cached_property
@@ -440,7 +433,7 @@ class CityWorld(World):
         if layer not in self._layers:
             parts = (self._tile(tile) for tile in self._own)
             self._layers[layer] = [
-                shift.surface(replace(one, material=self._materials.shared(one.material)))
+                shift.surface(replace(one, material=self._materials.first_alike(one.material)))
                 for world, shift in parts
                 for one in world.surfaces(layer)
             ]
@@ -457,7 +450,7 @@ class CityWorld(World):
         for tile in self._own:
             for name, surfaces in self._tile(tile)[0].prototypes().items():
                 if name not in found:
-                    found[name] = [replace(one, material=self._materials.shared(one.material)) for one in surfaces]
+                    found[name] = [replace(one, material=self._materials.first_alike(one.material)) for one in surfaces]
         return dict(sorted(found.items()))
 
 
@@ -492,7 +485,7 @@ class CityPart(CityWorld):
 
     @cached_property
     def walkable(self) -> WalkableMap:
-        """Where people can walk in the city."""
+        """Return where people can walk in the city."""
         return self.whole.walkable
 
     @cached_property
@@ -544,7 +537,7 @@ class _Materials:
     def __init__(self) -> None:
         self._known: dict[tuple[Any, ...], Material] = {}
 
-    def shared(self, material: Material) -> Material:
+    def first_alike(self, material: Material) -> Material:
         """Return the first of the materials that look like this one."""
         picture = material.texture
         look = b"" if picture is None else blake2b(np.ascontiguousarray(picture).data).digest()

@@ -49,12 +49,8 @@ class ColouredTriangles(NamedTuple):
         return ColouredTriangles(*(column[chosen] for column in self))
 
 
-def _linear_table() -> NDArray[np.float64]:
-    value = np.arange(256) / 255.0
-    return np.where(value <= 0.04045, value / 12.92, each(math.pow, (value + 0.055) / 1.055, 2.4))
-
-
-LINEAR = _linear_table()
+_value = np.arange(256) / 255.0
+LINEAR = np.where(_value <= 0.04045, _value / 12.92, each(math.pow, (_value + 0.055) / 1.055, 2.4))
 """Linear light of the values of sRGB, 0 to 1, shape ``(256,)``."""
 
 
@@ -137,7 +133,8 @@ def _texture_means(
     total = below(last[:, 0], last[:, 1]) - below(first[:, 0], last[:, 1])
     total += below(first[:, 0], first[:, 1]) - below(last[:, 0], first[:, 1])
     texels_of = np.prod(last - first, axis=1)
-    return total[:, :3] / np.maximum(total[:, 3:4], 1e-9), total[:, 3] / texels_of, total[:, 4] / texels_of
+    colour, (cover, shine) = total[:, :3], total[:, 3:].T
+    return colour / np.maximum(cover[:, None], 1e-9), cover / texels_of, shine / texels_of
 
 
 def sums_by(group: NDArray[Any], weight: NDArray[np.float64], values: NDArray[np.float64], count: int) -> Any:
@@ -217,7 +214,7 @@ def _picture() -> NDArray[np.uint8]:
 
 
 WINDOWS = Material("far windows", _picture(), emission=1.0)
-"""What walls with windows are of."""
+"""Material of walls with windows."""
 
 assert WINDOWS.texture is not None
 WINDOWS_MEAN = LINEAR[WINDOWS.texture[..., :3]].mean(axis=(0, 1))

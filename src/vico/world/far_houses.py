@@ -38,13 +38,15 @@ CELL = 2.0
 _HIDDEN = 4.0  # metres; how far below a roof floors are hidden
 _FOOT = 0.6  # metres that walls reach below the ground
 _TOLERANCES = (1.5, 3.0, 4.5)  # metres; the first after which an outline has few enough corners
-_CORNERS, _PER_CORNER = 6, 1000.0  # corners that an outline may have, and square metres for each one more
+_CORNERS = 6  # that an outline may have
+_PER_CORNER = 1000.0  # square metres for each corner more
 _YARD = 150.0  # square metres; smaller yards are roofed over
 _SLAB = 0.6  # metres; of roofs that are open below
 _LEAST = 24.0  # square metres of what is drawn higher than the rest
 _HUT = 50.0  # square metres; smaller outlines have four corners
 _STEP, _PITCHED_STEP = 3.0, 5.0  # metres between the heights of roofs that are drawn as two
-_TALL, _TOWER = 8.0, 6  # ... between those of a tower and the rest; cells that it has at least
+_TALL = 8.0  # ... between those of a tower and the rest
+_TOWER = 6  # cells that a tower has at least
 _BLUNT = frozenset({"flat", "dome"})  # shapes of roofs that have no eaves
 
 
@@ -190,7 +192,7 @@ def _levels(part: FarPart, step: float, more: int) -> Iterator[FarPart]:
 
 
 def _is_high(heights: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
-    """Tell which heights are those of the higher of two roofs; none where one roof explains them."""
+    """Return which heights are those of the higher of two roofs; none where one roof explains them."""
     n = len(heights)
     if n < 8:
         return np.zeros(n, bool)

@@ -142,7 +142,7 @@ def _name(url: str) -> str:
 
 @contextmanager
 def _only_one(folder: Path) -> Iterator[None]:
-    """Let one process at a time into the block; the system opens it again however that process ends."""
+    """Lock a folder for one process at a time; the system unlocks it however that process ends."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)

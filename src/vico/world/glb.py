@@ -26,7 +26,11 @@ from vico.world.mesh import Material, Surface
 
 # glTF is y-up: (x, y, z) of ours is (x, z, -y) of the file's.
 _TO_GLTF = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)
-_FLOAT, _UINT, _USHORT, _UBYTE = 5126, 5125, 5123, 5121
+# Component types of accessors, glTF 2.0, 3.6.2.2.
+_FLOAT = 5126
+_UINT = 5125
+_USHORT = 5123
+_UBYTE = 5121
 # Of JPEG: 40 dB on walls, 37 on roofs; photogrammetry itself is 20 dB off. 84 saves a seventh and costs 1 dB.
 _PHOTO_QUALITY = 88
 _PNG_LEVEL = 6  # an eighth smaller than 4; 9 takes six times as long for another twelfth

@@ -58,7 +58,7 @@ class SearchMemory(NamedTuple):
 
 
 class Goals(NamedTuple):
-    """Where a search may end; without any it goes everywhere.
+    """Cells where a search may end; without any it goes everywhere.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,33 @@ _DECK_CELL = 16.0  # metres; of the grid by which pieces are found
 _SLACK = 1e-3  # metres by which the box around a piece of a strip is larger than that, for rounding
 
 Floats = NDArray[np.float64]
+
+
+class _Strips(NamedTuple):
+    """Decks as the kernel takes them.
+
+    Attributes
+    ----------
+    points, half_width, pavement, rise
+        As those of `Decks`.
+    box
+        West, south, east and north of all, metres.
+    strip, start, boxes
+        Of each piece between two points: its strip, its first point, and the box around it.
+    first, pieces
+        The pieces that reach cell ``i`` of the grid over `box` are ``pieces[first[i]:first[i + 1]]``.
+    """
+
+    points: Floats
+    half_width: Floats
+    pavement: Floats
+    rise: Floats
+    box: Floats
+    strip: NDArray[np.int64]
+    start: NDArray[np.int64]
+    boxes: Floats
+    first: NDArray[np.int64]
+    pieces: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,15 +118,15 @@ class Decks:
         _nearest_surface(self._strips, np.ascontiguousarray(points, np.float64), ground)
 
     @cached_property
-    def _strips(self) -> tuple[NDArray[Any], ...]:
-        """The strips as the kernel takes them: with the box around all of them, and the pieces that reach each cell."""
+    def _strips(self) -> _Strips:
         strip = np.repeat(np.arange(len(self)), np.diff(self.first) - 1)
         piece = np.delete(np.arange(len(self.points)), self.first[1:] - 1)
         start, end = self.points[piece, :2], self.points[piece + 1, :2]
         reach = (self.half_width[strip] + _ENDS + _SLACK)[:, None]
         boxes = np.column_stack([np.minimum(start, end) - reach, np.maximum(start, end) + reach])
         first, pieces = _by_cell(self.box, boxes)
-        return self.points, self.half_width, self.pavement, self.rise, self.box, strip, piece, boxes, first, pieces
+        sizes = self.half_width, self.pavement, self.rise
+        return _Strips(self.points, *sizes, self.box, strip, piece, boxes, first, pieces)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return them as named arrays, for a file."""
@@ -138,9 +165,9 @@ def _by_cell(box: Floats, boxes: Floats) -> tuple[NDArray[np.int64], NDArray[np.
 @compiled
 def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
     """Replace `ground` by the height of the strip nearest to each place, where one is nearer."""
-    points, half_width, pavement, rise, box, strip, piece, boxes, first, pieces = strips
+    points, box, boxes = strips.points, strips.box, strips.boxes
     columns = max(int(np.ceil((box[2] - box[0]) / _DECK_CELL)), 1)
-    rows = (len(first) - 1) // columns
+    rows = (len(strips.first) - 1) // columns
     for k in range(len(places)):
         px, py, pz = places[k, 0], places[k, 1], places[k, 2]
         if px < box[0] or py < box[1] or px > box[2] or py > box[3]:
@@ -149,8 +176,8 @@ def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
         found = abs(pz - best)
         row, column = min(int((py - box[1]) / _DECK_CELL), rows - 1), min(int((px - box[0]) / _DECK_CELL), columns - 1)
         cell = row * columns + column
-        for p in pieces[first[cell] : first[cell + 1]]:
-            s, m = strip[p], piece[p]
+        for p in strips.pieces[strips.first[cell] : strips.first[cell + 1]]:
+            s, m = strips.strip[p], strips.start[p]
             if px < boxes[p, 0] or py < boxes[p, 1] or px > boxes[p, 2] or py > boxes[p, 3]:
                 continue
             ax, ay = points[m, 0], points[m, 1]
@@ -160,12 +187,12 @@ def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
                 continue
             along = ((px - ax) * dx + (py - ay) * dy) / length
             across = abs((px - ax) * dy - (py - ay) * dx) / length
-            if across > half_width[s] or along < -_ENDS or along > length + _ENDS:
+            if across > strips.half_width[s] or along < -_ENDS or along > length + _ENDS:
                 continue
             t = min(max(along / length, 0.0), 1.0)
             height = points[m, 2] + t * (points[m + 1, 2] - points[m, 2])
-            if across > pavement[s]:
-                height += rise[s]
+            if across > strips.pavement[s]:
+                height += strips.rise[s]
             # Nobody is between the ground and a deck that lies low above it, nor above the floor of an open cut.
             away = 0.0 if 0.0 <= height - low < HEADROOM and pz < height else abs(pz - height)
             if 0.0 < low - height < HEADROOM and pz < low + HEADROOM:
@@ -215,19 +242,19 @@ class Stairs:
 
     def stand_on(self, points: Floats, ground: Floats) -> None:
         """Replace heights of the ground (`ground`, metres) by those of the treads at points, ``(n, 3)``, if any."""
-        found = self._found(points)
+        found = self._tread_at(points)
         on = found >= 0
         ground[on] = self.level[found[on]]
 
     def going_at(self, points: Floats) -> Floats:
-        """How deep the treads at points ``(n, 3)`` are, metres, shape ``(n,)``.
+        """Return how deep the treads at points ``(n, 3)`` are, metres, shape ``(n,)``.
 
         0 off stairs, and where treads are so deep that one walks on them as on the ground.
         """
-        found = self._found(points)
+        found = self._tread_at(points)
         return np.where((found >= 0) & (self.going[found] < DEEPEST), self.going[found], 0.0)
 
-    def _found(self, points: Floats) -> NDArray[np.int64]:
+    def _tread_at(self, points: Floats) -> NDArray[np.int64]:
         """Return the number of the tread at each point, -1 where there is none."""
         found = np.full(len(points), -1, np.int64)
         _find(self._grid, self.corners, self.level, np.ascontiguousarray(points, np.float64), found)
@@ -303,7 +330,7 @@ EDGE_WIDTH = 0.1
 
 @dataclass(frozen=True)
 class Steps:
-    """Where the ground steps down, over the same square as its height field.
+    """Edges where the ground steps down, over the same square as its height field.
 
     Attributes
     ----------
@@ -396,7 +423,7 @@ class HeightField:
         return found
 
     def going_at(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep the treads are that one climbs at points ``(n, 3)``, metres, shape ``(n,)``; 0 off stairs."""
+        """Return how deep the treads are that one climbs at points ``(n, 3)``, metres, shape ``(n,)``; 0 off stairs."""
         return np.zeros(len(xyz)) if self.stairs is None else self.stairs.going_at(xyz)
 
     def smooth(self, xy: ArrayLike) -> NDArray[np.float64]:

@@ -467,19 +467,6 @@ def _junction_of(lane: _Lane, junctions: dict[str, int]) -> int:
     return junctions[lane.edge[1:].rsplit("_", 1)[0]]
 
 
-def _lane_links(driven: list[_Lane], links: list[dict[str, str]]) -> list[tuple[int, int]]:
-    """Return which lanes lead into which, by number."""
-    index = {lane.id: i for i, lane in enumerate(driven)}
-    ends = [
-        (
-            index.get(f"{link['from']}_{link['fromLane']}"),
-            index.get(link.get("via") or f"{link['to']}_{link['toLane']}"),
-        )
-        for link in links
-    ]
-    return [(start, end) for start, end in ends if start is not None and end is not None]
-
-
 def _adjacent_lanes(driven: list[_Lane], step: int) -> Ints:
     """Return the lane beside each, -1 for none; lanes inside junctions have none."""
     by_place = {(lane.edge, lane.index): i for i, lane in enumerate(driven)}
@@ -498,7 +485,15 @@ def _build_graph(
     n = len(driven)
     edges = list(dict.fromkeys(lane.edge for lane in driven))
     edge_number = {edge: i for i, edge in enumerate(edges)}
-    pairs = _lane_links(driven, links)
+    index = {lane.id: i for i, lane in enumerate(driven)}
+    ends = [
+        (
+            index.get(f"{link['from']}_{link['fromLane']}"),
+            index.get(link.get("via") or f"{link['to']}_{link['toLane']}"),
+        )
+        for link in links
+    ]
+    pairs = [(start, end) for start, end in ends if start is not None and end is not None]
     junction_number = {j["id"]: i for i, j in enumerate(junctions)}
     inside = np.array(
         [_junction_of(lane, junction_number) if lane.function == "internal" else -1 for lane in driven],

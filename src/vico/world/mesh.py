@@ -18,7 +18,7 @@ from vico.exact import apply_matrix
 
 @dataclass(frozen=True)
 class Material:
-    """How a surface looks.
+    """Look of a surface.
 
     Attributes
     ----------
@@ -123,11 +123,6 @@ class Surface:
     def of_entity(self, entity: int) -> Surface:
         """Return a copy that belongs to one entity."""
         return replace(self, entity=np.full(len(self.positions), entity, np.int32))
-
-    def tinted(self, colour: tuple[int, int, int]) -> Surface:
-        """Return a copy whose vertex colours are multiplied by `colour` / 255."""
-        product = self.colour.astype(np.uint16) * np.asarray(colour, np.uint16) // 255
-        return replace(self, colour=product.astype(np.uint8))
 
 
 def quad_triangles(first: NDArray[Any], *, by_halves: bool = False) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""What a world is, as records: the shapes of every small file in a world folder, and what a check of it finds.
+"""Records of a world: the shapes of every small file in a world folder, and the findings of a check.
 
 Frame: local ENU metres, origin at the window's centre, z up, yaw counter-clockwise from east in radians.
 Every record that can be seen has an `entity`: a positive integer, unique in its world, stable between builds of the
@@ -44,7 +44,7 @@ class Record(BaseModel):
 
 
 class Origin(Record):
-    """Where the frame's projection is centred on Earth, degrees (WGS 84), and metres from there to its origin."""
+    """Centre of the frame's projection on Earth, degrees (WGS 84), and metres from there to its origin."""
 
     lat: Annotated[float, Field(ge=-90, le=90)]
     lon: Annotated[float, Field(ge=-180, le=180)]
@@ -52,7 +52,7 @@ class Origin(Record):
     north: float = 0.0
 
     @model_serializer(mode="wrap")
-    def _written(self, plain: SerializerFunctionWrapHandler) -> dict[str, float]:
+    def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, float]:
         """Only the tiles of a city are shifted; other worlds say nothing of it."""
         return {key: value for key, value in plain(self).items() if value or key in ("lat", "lon")}
 
@@ -72,9 +72,9 @@ OPEN_KINDS = frozenset({"roof", "carport", "canopy", "bridge"})
 """Values of the tag `building` for what stands on posts and is open below, however low it is."""
 
 FAILED = "can't be made"
-"""How the reason begins where an object's geometry is at fault."""
+"""Begin of the reason where an object's geometry is at fault."""
 FAULT = "can't be made, by a fault of the program"
-"""How the reason begins where an object brought out a fault of the program."""
+"""Begin of the reason where an object brought out a fault of the program."""
 TRIED = "tried"
 """Among a stage's counts, where it left something out: of how many objects it was to make something."""
 
@@ -91,7 +91,7 @@ class Dropped(Record):
 
 
 class StageReport(Record):
-    """What a stage of the build made and left out. Seconds are kept apart (`build.json`): they differ every time."""
+    """Counts of what a stage of the build made and left out; its seconds are in `build.json`, as they differ."""
 
     name: str
     counts: dict[str, int]
@@ -132,7 +132,7 @@ class Manifest(Record):
 
 
 class BuildingSources(Record):
-    """Where a building's facts are from.
+    """Sources of a building's facts.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ class Building(Record):
 
 
 class Category(StrEnum):
-    """What a place is for."""
+    """Use of a place."""
 
     ACCOMMODATION = "accommodation"
     FOOD = "food"
@@ -388,7 +388,7 @@ class Road(Record):
 
 
 class Junction(Record):
-    """Where three or more drivable roads meet."""
+    """A junction: three or more drivable roads meet."""
 
     id: str
     position: Point2
@@ -422,7 +422,7 @@ class WayIntoSpot(Record):
 
 
 class WaysOfSpot(Record):
-    """How one gets into a spot of a car park, and out of it again.
+    """Ways into a spot of a car park, and out of it again.
 
     Attributes
     ----------

@@ -22,6 +22,7 @@ from defusedxml.ElementTree import ParseError, fromstring
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.geometry import direction, rotate, wrap_angle
 from vico.world.city import XODR
 from vico.world.model import WorldFinding
 from vico.world.world import World
@@ -33,11 +34,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _PARTS = 16
 _AT = ((np.arange(_PARTS)[:, None] + (_NODES + 1) / 2) / _PARTS).ravel()
 _SHARE = np.tile(_WEIGHTS / (2 * _PARTS), _PARTS)
-
-
-def wrap_angle(angle: float) -> float:
-    """Return an angle from -pi to pi."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class Curve:
     @classmethod
     def straight(cls, start: Floats, heading: float, length: float) -> Curve:
         """Return a straight line."""
-        step = length * np.array([math.cos(heading), math.sin(heading)])
+        step = length * direction(heading)
         return cls(np.array([start, step, (0.0, 0.0), (0.0, 0.0)], np.float64))
 
     @classmethod
@@ -65,10 +61,10 @@ class Curve:
         distance = math.hypot(*chord)
         across = math.atan2(chord[1], chord[0])
         tangents = []
-        for direction in (heading, heading_there):
-            bend = min(abs(wrap_angle(across - direction)), math.radians(110.0))
+        for yaw in (heading, heading_there):
+            bend = min(abs(wrap_angle(across - yaw)), math.radians(110.0))
             reach = distance / math.cos(bend / 2) ** 2
-            tangents.append(reach * np.array([math.cos(direction), math.sin(direction)]))
+            tangents.append(reach * direction(yaw))
         leaving, arriving = tangents
         return cls(np.array([start, leaving, 3 * chord - 2 * leaving - arriving, leaving + arriving - 2 * chord]))
 
@@ -91,9 +87,7 @@ class Curve:
         local = np.array([[float(cubic.get(f"{name}{axis}", "nan")) for axis in "UV"] for name in "abcd"])
         if cubic.get("pRange") != "normalized":
             local = local * (length ** np.arange(4))[:, None]
-        c, s = math.cos(heading), math.sin(heading)
-        turned = np.stack([c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]], axis=1)
-        return cls(turned + np.array([[x, y], [0, 0], [0, 0], [0, 0]]))
+        return cls(rotate(local, heading) + np.array([[x, y], [0, 0], [0, 0], [0, 0]]))
 
     @property
     def is_straight(self) -> bool:

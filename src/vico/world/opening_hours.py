@@ -271,7 +271,7 @@ def _readable(text: str) -> str | None:
 
 
 def how_read(text: str) -> Literal["as typed", "respelled", "not read"]:
-    """Say how a value of `opening_hours` is read: as typed, in the specification's spelling instead, or not at all."""
+    """Return how a value of `opening_hours` is read: as typed, respelled as in the specification, or not at all."""
     readable = _readable(text)
     if readable is None:
         return "not read"
@@ -313,10 +313,10 @@ def _within_days(text: str) -> tuple[str, list[int]] | None:
         moments |= {int(hour) * 60 + int(minute) for hour, minute in _ONE_TIME.findall(piece)}
     order = sorted(moments)
 
-    def ranked(found: re.Match[str]) -> str:
+    def rank_as_clock(found: re.Match[str]) -> str:
         return _clock(_NOON + order.index(int(found[1]) * 60 + int(found[2])))
 
-    pieces[::2] = [_ONE_TIME.sub(ranked, piece) for piece in pieces[::2]]
+    pieces[::2] = [_ONE_TIME.sub(rank_as_clock, piece) for piece in pieces[::2]]
     return "".join(pieces), order
 
 
@@ -421,7 +421,7 @@ def _spans(text: str, date: Date, coordinates: Coordinates | None, holidays: boo
 def open_spans(
     text: str, date: Date, coordinates: Coordinates | None = None, *, holidays: bool = True
 ) -> list[Span] | None:
-    """When a place is open on a date, by its `opening_hours`.
+    """Return when a place is open on a date, by its `opening_hours`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What anybody may know of a world: streets, buildings, named places, transit. No rooms, no things.
+"""The public map of a world: streets, buildings, named places, transit. No rooms, no objects.
 
 `StreetIndex` finds streets by name, and the street that a point lies in.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.world.heights import HeightField
-from vico.world.model import Category, Point2, Point3, Ring, Roads
+from vico.world.model import Category, Point2, Point3, Ring
 from vico.world.routing import Router
 from vico.world.transit import BikeStation, Line, Stop, TramLine, TramStop, Transit
 from vico.world.trips import Trips
@@ -36,11 +36,6 @@ class PublicStreet:
     name: str
     line: list[Point2]
     width: float
-
-
-def named_streets(roads: Roads) -> list[PublicStreet]:
-    """Return the streets of a road database that have names and are open."""
-    return [PublicStreet(r.name, r.line, r.width) for r in roads.roads if r.name and not r.closed and len(r.line) > 1]
 
 
 class StreetIndex:
@@ -174,7 +169,11 @@ class PublicMap:
             world.router,
             transit.tram_stops,
             transit.tram_lines,
-            named_streets(world.roads),
+            [
+                PublicStreet(r.name, r.line, r.width)
+                for r in world.roads.roads
+                if r.name and not r.closed and len(r.line) > 1
+            ],
         )
 
     @cached_property

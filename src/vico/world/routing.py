@@ -153,7 +153,7 @@ class Router:
         a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
         with self._lock:
             self._count_search()
-            with self._closed(closed):
+            with self._close_squares(closed):
                 if blocked is None and room == 0.0:
                     return self._path(a, b, self._cost, self._shut if closed else None)
                 shut = self._shut if blocked is None else blocked | self._shut
@@ -178,9 +178,9 @@ class Router:
         if costs is None:
             return None
         cells = backtrack(cost, costs, first, last)
-        return self._pulled(a, b, first, last, (cells, costs[0][cells].astype(np.int64)), shut)
+        return self._pull_string(a, b, first, last, (cells, costs[0][cells].astype(np.int64)), shut)
 
-    def _pulled(
+    def _pull_string(
         self,
         a: NDArray[np.float64],
         b: NDArray[np.float64],
@@ -222,7 +222,7 @@ class Router:
         return self._work.cells["g"], self._work.cells["stamp"], self._generation + 1
 
     @contextmanager
-    def _closed(self, squares: Sequence[tuple[float, float, float]]) -> Iterator[None]:
+    def _close_squares(self, squares: Sequence[tuple[float, float, float]]) -> Iterator[None]:
         """Close squares for a while; writing all cells anew would take as long as a search."""
         kept = []
         for x, y, reach in squares:

@@ -1,4 +1,4 @@
-"""What can be seen and collided with of a world, as glTF, MuJoCo's MJCF, and OpenUSD.
+"""Looks and collision shapes of a world, as glTF, MuJoCo's MJCF, and OpenUSD.
 
 glTF
     One glTF 2.0 file (GLB) with everything that can be seen; models are stored once and placed by nodes.
@@ -54,7 +54,9 @@ def write_gltf(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
                 node = buildings[entity].id if entity else name
                 layers[node] = [*layers.get(node, ()), part]
     layers |= {f"model {name}": models[name] for name in used}
-    text, binary = _chunks(glb_bytes(layers))
+    glb = glb_bytes(layers)
+    length = struct.unpack_from("<I", glb, 12)[0]
+    text, binary = json.loads(glb[20 : 20 + length]), glb[28 + length :]
     mesh_of: dict[str, int] = {}
     nodes: list[dict[str, Any]] = []
     for node in text["nodes"]:
@@ -81,7 +83,11 @@ def write_gltf(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
     text["scenes"] = [{"name": world.manifest.name, "nodes": list(range(len(nodes)))}]
     origin = world.manifest.origin
     text["asset"]["copyright"] = "; ".join(source.attribution for source in world.manifest.sources)
-    text["asset"]["extras"] = {"latitude": origin.lat, "longitude": origin.lon, "buildings": _entities(world)}
+    text["asset"]["extras"] = {
+        "latitude": origin.lat,
+        "longitude": origin.lon,
+        "buildings": {building.id: building.entity for building in world.buildings},
+    }
     write_bytes(folder / "world.glb", _glb_container(text, binary))
     return {"nodes": len(nodes), "models": len(mesh_of), "layers": len(names)}
 
@@ -106,16 +112,6 @@ def _by_entity(surface: Surface, buildings: set[int]) -> Iterator[tuple[int, Sur
         )
 
 
-def _entities(world: World) -> dict[str, int]:
-    """Return building ids and the numbers that the vertex attribute ``_ENTITY`` holds for them."""
-    return {building.id: building.entity for building in world.buildings}
-
-
-def _chunks(glb: bytes) -> tuple[dict[str, Any], bytes]:
-    length = struct.unpack_from("<I", glb, 12)[0]
-    return json.loads(glb[20 : 20 + length]), glb[28 + length :]
-
-
 def _glb_container(document: dict[str, Any], binary: bytes) -> bytes:
     text = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
@@ -133,7 +129,7 @@ def write_mjcf(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
 
     Collision lies in geom group 3 and looks in group 2, as is usual; looks take no part in contacts.
     """
-    root = Element("mujoco", model=_name(world.manifest.name))
+    root = Element("mujoco", model="".join(c if c.isalnum() or c in "_-" else "_" for c in world.manifest.name))
     SubElement(root, "compiler", meshdir="assets", texturedir="assets", angle="radian")
     SubElement(root, "option", timestep="0.002")
     visual = SubElement(root, "visual")
@@ -155,10 +151,6 @@ def write_mjcf(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
     indent(root)
     write_bytes(folder / "world.xml", b'<?xml version="1.0" encoding="utf-8"?>\n' + tostring(root, encoding="utf-8"))
     return {"hulls": hulls, "boxes": boxes, "materials": looks}
-
-
-def _name(text: str) -> str:
-    return "".join(c if c.isalnum() or c in "_-" else "_" for c in text)
 
 
 def _numbers(values: Any) -> str:
@@ -228,7 +220,10 @@ def _looks(surfaces: list[Surface], asset: Element, body: Element, folder: Path)
     count = 0
     for surface in merge_surfaces(surfaces):
         # MuJoCo has no vertex colours: one mesh a tint of a material, tints rounded to a few steps.
-        tints, tint_of = np.unique(_tints(surface), axis=0, return_inverse=True)
+        colour = surface.colour[surface.triangles[:, 0]].astype(np.int64)
+        tints, tint_of = np.unique(
+            np.minimum((colour + 32) // 64 * 64, 255).astype(np.uint8), axis=0, return_inverse=True
+        )
         tint_of = np.ravel(tint_of)
         faces_of = np.bincount(tint_of)
         # A mesh needs four corners there: a lone triangle takes the tint that most others have.
@@ -254,11 +249,6 @@ def _looks(surfaces: list[Surface], asset: Element, body: Element, folder: Path)
             SubElement(body, "geom", {"class": "looks", "type": "mesh"}, mesh=name, material=name)
         count += 1
     return count
-
-
-def _tints(surface: Surface) -> NDArray[np.uint8]:
-    colour = surface.colour[surface.triangles[:, 0]].astype(np.int64)
-    return np.minimum((colour + 32) // 64 * 64, 255).astype(np.uint8)
 
 
 def _obj(surface: Surface, faces: NDArray[np.int32]) -> bytes:

@@ -40,7 +40,8 @@ FAR = "far"
 _MATERIAL = Material(FAR)
 _GRID = 12.5  # metres; cells of the ground
 _SKIRT = 1.0  # metres that the ground's edge hangs down, for the finer ground of a neighbour may lie lower
-_FINE, _LAYER = 8, 0.1  # parts of its side in which the topmost ground is looked for; metres that it is thick
+_FINE = 8  # parts of a cell's side in which the topmost ground is looked for
+_LAYER = 0.1  # metres that it is thick
 _GROUNDS = np.array([ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER, ENTITY_GREEN])
 # Leaves face all ways, and some of them the sun: a crown is lighter than the side of a pyramid. Measured in pictures.
 _CROWN_LIGHT = 1.2
@@ -294,10 +295,10 @@ class CitySilhouettes:
         place = tile.column, tile.row
         if place not in self._known:
             shift = TileShift.of(self._city, place)
-            self._known[place] = [shift.surface(surface) for surface in self._kept(tile)]
+            self._known[place] = [shift.surface(surface) for surface in self._load_or_make(tile)]
         return self._known[place]
 
-    def _kept(self, tile: CityTile) -> list[Surface]:
+    def _load_or_make(self, tile: CityTile) -> list[Surface]:
         """Return a tile's silhouette in its own frame: the kept one, or a new one that is kept."""
         path = cache_folder() / "silhouettes" / f"{tile.digest[:32]}.{_VERSION}.npz"
         known = _read(path)

@@ -137,10 +137,13 @@ STEP = 0.5
 ACROSS_REACH = 0.36
 #: Length of a tram, metres.
 TRAM_LENGTH = TRAM_SECTIONS * TRAM_SECTION
-#: Metres a second at most in a street, and metres a second squared that trams speed up and brake with, and that
-#: who stands in one is to feel at most in a bend.
-TRAM_SPEED, TRAM_ACCELERATION, TRAM_BRAKING = 9.0, 1.0, 1.1
-_SIDEWAYS = 0.9
+#: Speed of trams in a street at most, m/s.
+TRAM_SPEED = 9.0
+#: What trams speed up with, m/s².
+TRAM_ACCELERATION = 1.0
+#: What trams brake with, m/s².
+TRAM_BRAKING = 1.1
+_SIDEWAYS = 0.9  # m/s² that who stands in a tram is to feel at most in a bend
 _SLOWEST = 2.5  # m/s, however tight the bend
 #: Doors on both sides of a section, metres ahead of its middle.
 TRAM_DOORS = (2.3, -2.3)
@@ -183,7 +186,9 @@ class Track:
         self.xy = self.at(s)
         reach = TRAM_SECTION / 2
         before, here, after = self.at(s - reach), self.xy, self.at(s + reach)
-        turn = _angle(here - before, after - here)
+        into, out_of = here - before, after - here
+        cross = into[:, 0] * out_of[:, 1] - into[:, 1] * out_of[:, 0]
+        turn = each(math.atan2, cross, (into * out_of).sum(axis=1))
         bend = np.abs(turn) / reach
         self.half_width = TRAM_WIDTH / 2 + _AIR + np.minimum(TRAM_SECTION**2 / 8 * bend, 1.0)
         way = np.gradient(self.xy, axis=0) if len(self.xy) > 1 else np.ones((1, 2))
@@ -220,7 +225,7 @@ class Track:
         return found.reshape(*front.shape, 3)
 
     def seconds(self, start: float, end: float, *, standing: bool = True) -> float:
-        """How long a tram takes from one distance along the track to another, braking to a stand there if need be."""
+        """Return the seconds of a tram between two distances along the track, braking to a stand there if need be."""
         s = np.arange(start, max(end, start + STEP), STEP)
         limit = np.interp(s, np.arange(len(self.speed)) * STEP, self.speed)
         speed = np.minimum(limit, np.sqrt(0.25 + 2 * TRAM_ACCELERATION * (s - start)))
@@ -254,7 +259,7 @@ def _stand(middles, along, points, first, last, found):  # type: ignore[no-untyp
 
 
 def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Point2, Point2]:
-    """Where a door of a tram that stands with its front at `offset` is, and where its middle line is there.
+    """Return where a door of a tram that stands with its front at `offset` is, and where its middle line is there.
 
     Parameters
     ----------
@@ -270,12 +275,8 @@ def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Poin
     return (float(x + math.sin(yaw) * aside), float(y - math.cos(yaw) * aside)), (float(x), float(y))
 
 
-def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return each(math.atan2, a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
-
-
-def departure(line: Line, number: int) -> int:
-    """When a line's departure of this number is, seconds from the midnight before the first; each day is alike."""
+def departure(line: Line | TramLine, number: int) -> int:
+    """Return when a departure of a line is, seconds from the midnight before the first; all days are alike."""
     days, of_the_day = divmod(number, len(line.departures))
     return line.departures[of_the_day] + DAY * days
 
@@ -331,16 +332,16 @@ class LineTimes:
         return cls(line, buses, tuple(kept))
 
     def begins(self, number: int) -> float:
-        """When a round leaves the first stop, seconds from the midnight before the first."""
+        """Return when a round leaves the first stop, seconds from the midnight before the first."""
         days, of_the_day = divmod(number, len(self.departures))
         return self.departures[of_the_day] + DAY * days
 
     def arrives(self, number: int, stop: int) -> float:
-        """When the bus of a round comes to a stop of its line; ``len(stops)`` is the first one again, at the end."""
+        """Return when the bus of a round comes to a stop; ``len(stops)`` is the first one again, at the end."""
         return self.begins(number) + self.line.travel[stop]
 
     def leaves(self, number: int, stop: int) -> float:
-        """When the bus of a round leaves a stop of its line; from ``len(stops)`` it goes on with its next round."""
+        """Return when the bus of a round leaves a stop; from ``len(stops)`` it goes on with its next round."""
         if stop == len(self.line.stops):
             return max(self.begins(number + self.buses), self.arrives(number, stop) + BUS_DWELL)
         return self.begins(number) if stop == 0 else self.arrives(number, stop) + BUS_DWELL
@@ -366,16 +367,15 @@ class TramTimes:
     round: ClassVar[bool] = False
 
     def begins(self, number: int) -> float:
-        """When a tram comes in where the track begins, seconds from the midnight before the first."""
-        days, of_the_day = divmod(number, len(self.line.departures))
-        return self.line.departures[of_the_day] + DAY * days
+        """Return when a tram comes in where the track begins, seconds from the midnight before the first."""
+        return departure(self.line, number)
 
     def arrives(self, number: int, stop: int) -> float:
-        """When a tram comes to a stop of its line."""
+        """Return when a tram comes to a stop of its line."""
         return self.begins(number) + self.line.travel[stop]
 
     def leaves(self, number: int, stop: int) -> float:
-        """When a tram leaves a stop of its line."""
+        """Return when a tram leaves a stop of its line."""
         return self.arrives(number, stop) + BUS_DWELL
 
     def next_round(self, stop: int, second: float) -> int:

@@ -1,4 +1,4 @@
-"""How much room a walkway has beside solids and above the edges of kerbs, and where its line bends to get past.
+"""Room of walkways beside solids and above the edges of kerbs, and bends of their lines to get past.
 
 Lines are led past solids in compiled code: a city has thousands of them. Free intervals come as `Gaps`: those of
 place k are ``low[first[k]:first[k + 1]]`` to ``high[...]``, metres to the left of the line, rising.
@@ -29,13 +29,15 @@ GRID = 0.1
 WIDER = 0.4
 """Metres beyond its room that a line has on one side for what a kerb takes on the other."""
 
-_ASIDE, _NARROW = 0.01, 0.05  # what it costs to be a metre aside at a place, and to have a metre too little room
+_ASIDE = 0.01  # what it costs to be a metre aside at a place
+_NARROW = 0.05  # ... to have a metre too little room
 _MOVES = np.array([0.0, 0.1, 0.6, 1.5])  # what it costs to move by so many lines from one place to the next
 _APART = 0.56  # metres of room that two need to pass each other
 _EACH_WAY = 2.0  # metres before and after a narrow place that are as narrow: walkers look so far ahead
 _LEAST = 0.05
-# What it costs at a place to be too near to an edge or below, by metre, and metres.
-_BELOW, _DEEPER, _DEEPEST = 0.1, 0.4, 0.5
+_BELOW = 0.1  # what it costs at a place to be too near to an edge or below
+_DEEPER = 0.4  # and what it costs more by metre
+_DEEPEST = 0.5  # metres; what is deeper costs no more
 _NEARER = 0.2  # metres that they come nearer to an edge where they have little room
 _ROUND = 0.05  # metres to which room is rounded that a kerb leaves
 
@@ -114,26 +116,6 @@ def ways_through(free: Gaps, good: Gaps, room: float, bend: float, depth: Floats
     ends = [*begins[1:].tolist(), len(costs)]
     parts = [(int(a), chosen[a:b]) for a, b in zip(begins.tolist(), ends, strict=True)]
     return [(a, aside[part[part >= 0]]) for a, part in parts if (part >= 0).any()]
-
-
-def sides_along(free: Gaps, good: Gaps, along: Floats, aside: Floats, begin: int, room: float) -> Floats:
-    """Return the room to the left and to the right of a piece of a line, and the same in need, metres.
-
-    Parameters
-    ----------
-    free, good
-        As for `ways_through`, `good` within the line's own room.
-    along, aside
-        Metres along and to the left of the line at its places.
-    begin
-        Place of the line that is the piece's first.
-
-    Returns
-    -------
-    ndarray
-        From each of its places to the next, float64, shape ``(places, 4)``.
-    """
-    return np.asarray(_sides_along(free, good, along, aside, begin, room), np.float64)
 
 
 @compiled
@@ -321,7 +303,8 @@ BODY = 0.3
 
 _AIR = 0.06  # metres more from lines to solids
 _STEP = 0.5  # metres between the places at which a line is looked at
-_AROUND, _TRIES = 0.6, 4  # metres left out of a line that leads through a solid, and how often that is tried
+_AROUND = 0.6  # metres left out of a line that leads through a solid
+_TRIES = 4  # times that this is done
 _SAME = 0.02
 _OFF_EDGE = 0.3  # metres that walkers' middles stay from the edges of kerbs and quays, above them
 
@@ -424,8 +407,15 @@ class _Line:
         return self.depth(self.room) is not None
 
     def depth(self, bend: float) -> Floats | None:
-        """Return by how many metres each place across it is too near to an edge, or below it; None: none is."""
-        return _depth(self.points, self.normals, bend, self.ground)
+        """Return by how many metres each place across it is too near to an edge, or below it; None: none is.
+
+        Shape ``(places, columns)``; the columns are those of `columns_within`.
+        """
+        if self.ground is None or self.ground.steps is None:
+            return None
+        across = self.points[:, None, :] + columns_within(bend)[None, :, None] * self.normals[:, None, :]
+        depth = _OFF_EDGE - self.ground.edge_distance(across)
+        return depth if (depth > 0.0).any() else None
 
 
 def _led_past(line: _Line, free: list[list[Interval]], bend: float, tree: shapely.STRtree) -> list[ClearCourse]:
@@ -511,18 +501,6 @@ def _free(blocked: list[Interval], reach: float) -> list[Interval]:
     return free
 
 
-def _depth(points: Floats, normals: Floats, room: float, ground: HeightField | None) -> Floats | None:
-    """Return by how many metres each place across a line is too near to an edge, or below it; None: none is.
-
-    Shape ``(places, columns)``; the columns are those of `columns_within`.
-    """
-    if ground is None or ground.steps is None:
-        return None
-    across = points[:, None, :] + columns_within(room)[None, :, None] * normals[:, None, :]
-    depth = _OFF_EDGE - ground.edge_distance(across)
-    return depth if (depth > 0.0).any() else None
-
-
 def _courses(line: _Line, free: list[list[Interval]], bend: float, depth: Floats | None) -> list[ClearCourse]:
     """Lead one line past its solids, no more than `bend` metres aside: in pieces, where there is no way."""
     along, room = line.along, line.room
@@ -536,7 +514,7 @@ def _courses(line: _Line, free: list[list[Interval]], bend: float, depth: Floats
     found: list[ClearCourse] = []
     for begin, aside in ways_through(gaps, good, room, bend, depth):
         here = slice(begin, begin + len(aside))
-        sides = sides_along(gaps, sides_good, along, aside, begin, room)
+        sides = np.asarray(_sides_along(gaps, sides_good, along, aside, begin, room), np.float64)
         moved = line.points[here] + aside[:, None] * line.normals[here]
         kept = _needed_points(aside, sides, line.normals[here])
         is_whole = len(aside) == len(along)

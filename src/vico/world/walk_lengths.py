@@ -1,4 +1,4 @@
-"""How long walks are, outdoors and indoors.
+"""Lengths of walks, outdoors and indoors.
 
 Thousands of walks outdoors are measured when people are given homes, work and days: `CoarseWalkLengths` does so on
 cells of a metre. `IndoorWays` measures ways from the street through corridors, over stairs and in lifts to the rooms
@@ -20,7 +20,7 @@ from vico.world.routing import Router
 
 
 class Walk(NamedTuple):
-    """What a walk measures.
+    """Measures of a walk.
 
     Attributes
     ----------
@@ -78,9 +78,10 @@ def walk_of(router: Router, start: Point2, goal: Point2) -> Walk:
 
 #: Seconds that going through a door takes: an agent acts once a second.
 DOOR = 1.0
-#: Seconds for which a lift's doors close before a ride and open after it, and how fast it goes, metres a second: two
-#: seconds for a floor of 3.2 m.
-LIFT_DOORS, LIFT_SPEED = 4.0, 1.6
+#: Seconds for which a lift's doors close before a ride and open after it.
+LIFT_DOORS = 4.0
+#: Speed of a lift, m/s: two seconds for a floor of 3.2 m.
+LIFT_SPEED = 1.6
 
 
 def lift_seconds(up: float) -> float:
@@ -89,7 +90,7 @@ def lift_seconds(up: float) -> float:
 
 
 class IndoorWays:
-    """How long the ways are from the street to the rooms behind a door.
+    """Lengths of the ways from the street to the rooms behind a door.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where people can walk: a grid of surface classes over the square world.
+"""Walkable map: a grid of surface classes over the square world.
 
 The grid is a configuration space for a standing person: a cell is free only if a disc of `BODY` metres around its
 centre touches nothing solid, so a person may stand at the centre of any free cell.

@@ -33,7 +33,9 @@ from vico.world.walk_clearance import BODY, ClearCourse, courses_past
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-SIDEWALK, CROSSING, CORNER = 0, 1, 2
+SIDEWALK = 0
+CROSSING = 1
+CORNER = 2
 _AT_END = 1e-6  # metres from an end of a line that are no way: lengths are sums of rounded numbers
 SHORTEST = 6.0  # metres of sidewalk left between two obstacles that are worth keeping
 _ON_GROUND = 0.5  # metres from the ground's height to what lies on it
@@ -92,7 +94,7 @@ class Walkways:
         return self.points[self.first[stretch] : self.first[stretch + 1]]
 
     def room_at(self, stretch: int, offset: float) -> Floats:
-        """How far a walker may be to the left and to the right so many metres along a stretch, shape ``(2,)``."""
+        """Return the room to the left and to the right so many metres along a stretch, metres, shape ``(2,)``."""
         begin, end = int(self.first[stretch]), int(self.first[stretch + 1])
         segment = int(np.searchsorted(self.along[begin:end], offset, side="right")) - 1
         return self.room[begin + min(max(segment, 0), end - begin - 2)]
@@ -209,13 +211,13 @@ def walkways_of(
                 i, j = number[a], number[b]
                 if i == j:
                     continue
-                start, end = ways[i][2][-side_a], ways[j][2][-side_b]
+                start, end = rows[i].line[-side_a], rows[j].line[-side_b]
                 if np.linalg.norm(end - start) < 0.05:
                     end = end + np.array([0.05, 0.0])
-                width = min(ways[i][4], ways[j][4])
+                width = min(rows[i].width, rows[j].width)
                 ends = (2 * i + side_a, 2 * j + side_b)
                 path = area.path(start, end)
-                z = np.interp(_along(path), [0.0, _along(path)[-1]], [ways[i][3][-side_a], ways[j][3][-side_b]])
+                z = np.interp(_along(path), [0.0, _along(path)[-1]], [rows[i].z[-side_a], rows[j].z[-side_b]])
                 rows.append(_Row("", CORNER, path, z, width, *sides(path, width), place, ends))
     return _graph_arrays(rows)
 

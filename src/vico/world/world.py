@@ -195,7 +195,7 @@ class World:
 
     @property
     def edges(self) -> tuple[float, float, float, float] | None:
-        """Where it ends, west, south, east and north, metres, if it is no square of `half`."""
+        """Return where it ends, west, south, east and north, metres, if it is no square of `half`."""
         return None
 
     def file(self, name: str) -> Path:
@@ -260,7 +260,7 @@ class World:
 
     @cached_property
     def walkable(self) -> WalkableMap:
-        """Where people can walk."""
+        """Return where people can walk."""
         return read_walkable(self.file("walkable.npz"))
 
     @cached_property

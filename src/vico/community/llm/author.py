@@ -28,7 +28,6 @@ from vico.community.model import (
     Relation,
     RelationKind,
     Resident,
-    ScheduleItem,
     with_tags,
 )
 from vico.community.place_index import PlaceIndex
@@ -71,14 +70,22 @@ def assemble(
             schedule = days[before.id].items
             fitted.append(before.id)
         elif _is_as_before(lives, before, joined):
-            schedule = _renamed_schedule(lives, before)
+            renamed = lives.renames(before)
+            schedule = [item.model_copy(update={"activity": renamed(item.activity)}) for item in before.schedule]
         else:
             plain = lives.plain_day(before.id, joined)
             schedule = plain.items or before.schedule  # what does not fit is found below
             fitted.append(before.id)
         known = [*person.known_places, *(i.place for i in schedule if i.place), *(g.place for g in joined)]
         people.append(person.model_copy(update={"schedule": schedule, "known_places": list(dict.fromkeys(known))}))
-    people = _riding(lives, people, groups, fitted)
+    # Only those whose days are new choose anew between walking and riding.
+    fitted_ids = set(fitted)
+    riding = with_rides(
+        [r for r in people if r.id in fitted_ids], groups, cast.index,
+        lambda name: rng(cast.base.seed, "community", "llm", "rides", name),
+    )  # fmt: skip
+    by_id = {r.id: r for r in riding}
+    people = [by_id.get(r.id, r) for r in people]
     community = cast.base.model_copy(
         update={
             "author": author,
@@ -96,23 +103,6 @@ def _is_as_before(lives: Lives, before: Resident, groups: Sequence[Group]) -> bo
     meetings = {(g.place, g.start, g.end) for g in groups}
     old = {(g.place, g.start, g.end) for g in lives.cast.base.groups_of(before.id)}
     return meetings == old and lives.people[before.id].workplace == before.workplace
-
-
-def _renamed_schedule(lives: Lives, before: Resident) -> list[ScheduleItem]:
-    renamed = lives.renames(before)
-    return [item.model_copy(update={"activity": renamed(item.activity)}) for item in before.schedule]
-
-
-def _riding(lives: Lives, people: Sequence[Resident], groups: Sequence[Group], fitted: Sequence[str]) -> list[Resident]:
-    """Let those whose days are new take buses, trams and bicycles where it is worth it to them."""
-    base = lives.cast.base
-    chosen = set(fitted)
-    riding = with_rides(
-        [r for r in people if r.id in chosen], groups, lives.cast.index,
-        lambda name: rng(base.seed, "community", "llm", "rides", name),
-    )  # fmt: skip
-    by_id = {r.id: r for r in riding}
-    return [by_id.get(r.id, r) for r in people]
 
 
 def _relations(lives: Lives, groups: Sequence[Group], network: Network) -> list[Relation]:
@@ -172,7 +162,7 @@ _REPLIES: Mapping[str, type[BaseModel]] = {
 
 @dataclass
 class LlmReport:
-    """What came of asking a model, for people; `Community.authorship` says what lasts.
+    """Outcome of asking a model, for people to read; `Community.authorship` holds what lasts.
 
     Attributes
     ----------
@@ -295,14 +285,11 @@ class LlmCommunityAuthor:
                 break
             for resident in off:
                 del kept[resident]
-                items = _mark_ungrounded(items, f"{resident}.schedule", bad[resident])
+                name_of_day = f"{resident}.schedule"
+                items = [_ungrounded_item(one, bad[resident]) if one.item == name_of_day else one for one in items]
         # Nothing of the model's can be named as the cause: the procedural author's whole community stands.
         items = [_ungrounded_item(one, findings[0]) for one in items]
         return lives.cast.base, _by_resident(lives, items), drafts
-
-
-def _mark_ungrounded(items: Sequence[AuthoredItem], name: str, finding: CommunityFinding) -> list[AuthoredItem]:
-    return [_ungrounded_item(one, finding) if one.item == name else one for one in items]
 
 
 def _ungrounded_item(item: AuthoredItem, finding: CommunityFinding) -> AuthoredItem:

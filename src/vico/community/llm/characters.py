@@ -1,4 +1,4 @@
-"""Who people are and what they do on a day, as a model writes them.
+"""Characters and days of people, as a model writes them.
 
 Characters are asked for by household, as what one is called and does stands in the others' lives, too. A day is asked
 for by resident, after the paper's prompt for daily plans; our router says how long ways take.
@@ -156,7 +156,7 @@ class _CharacterJudge:
         return [*self._trade(person), *(f"{one.where}: {one.what}; {one.mend}" for one in settled)]
 
     def _trade(self, person: Resident) -> list[str]:
-        """Say whether somebody's place of work employs no such trade; the validator lets unknown ones pass."""
+        """Return whether somebody's place of work employs no such trade; the validator lets unknown ones pass."""
         cast = self._lives.cast
         if person.workplace is None or cast.keeps_work(person) or job_of(person.occupation) is not None:
             return []
@@ -167,8 +167,8 @@ class _CharacterJudge:
         return [f"{where}: {place} employs no {person.occupation!r}: choose of {', '.join(trades)}"]
 
     def _day(self, person: Resident) -> list[str]:
-        """Say whether somebody could not live the plain day of such a life."""
-        if person.id in self._lives.cast.coupled:
+        """Return whether somebody could not live the plain day of such a life."""
+        if person.id in self._lives.cast.tied_to_small_children:
             return []
         fitted = self._lives.plain_day(person.id, self._lives.cast.base.groups_of(person.id))
         return [f"{person.id}.workplace: its hours don't go with the rest of a day: {one}" for one in fitted.findings]
@@ -189,8 +189,9 @@ def _character_faults(reply: CharacterReply, person: Resident) -> list[str]:
 
 # Places that a resident's day is planned with, at most; the nearest of what they know.
 _MOST_PLACES = 24
-# Least sleep of grown-ups, and of children, minutes; least time at work of who has a workplace.
-_SLEEP, _SLEEP_OF_CHILDREN, _AT_WORK = 4 * 60, 7.5 * 60, 60
+_SLEEP = 4 * 60  # least minutes, of grown-ups
+_SLEEP_OF_CHILDREN = 7.5 * 60  # least minutes
+_AT_WORK = 60  # least minutes of who has a workplace
 
 
 def write_days(
@@ -216,7 +217,7 @@ def write_days(
         By id, the days that the model planned; an item a resident, in their order; the questions.
     """
     cast = lives.cast
-    asked = [r.id for r in cast.base.residents if r.id not in cast.coupled and r.id not in unasked]
+    asked = [r.id for r in cast.base.residents if r.id not in cast.tied_to_small_children and r.id not in unasked]
     judge = _DayJudge(lives, groups)
     drafts = [_day_question(prompt, lives, name, groups.get(name, ())) for name in asked]
     desk.settle("days", drafts, judge)
@@ -225,7 +226,11 @@ def write_days(
     for resident in cast.base.residents:
         name, draft = f"{resident.id}.schedule", by_id.get(resident.id)
         if draft is None:
-            why = "goes together with a small child's day" if resident.id in cast.coupled else "named by the validator"
+            why = (
+                "goes together with a small child's day"
+                if resident.id in cast.tied_to_small_children
+                else "named by the validator"
+            )
             items.append(AuthoredItem(item=name, origin=Origin.NOT_ASKED, detail=why))
         else:
             day = judge.days.get(resident.id)
@@ -310,7 +315,17 @@ class _DayJudge:
             for one in plan
             if one.place is not None
         ]  # fmt: skip
-        findings = _lacks(stays, person)
+        # Too little sleep, or too few hours at the place of work.
+        findings = []
+        asleep = sum(stay.minutes for stay in stays if stay.type is ItemType.SLEEP)
+        least = _SLEEP_OF_CHILDREN if person.age < GROWN_UP else _SLEEP
+        if asleep < least:
+            findings.append(f"schedule: {asleep / 60:.1f} h of sleep: plan {least / 60:g} h or more")
+        working = sum(stay.minutes for stay in stays if stay.place == person.workplace)
+        if person.workplace is not None and person.age >= GROWN_UP and working < _AT_WORK:
+            findings.append(
+                f"schedule: {working} min at {person.occupation}'s place of work: plan the hours such work takes there"
+            )
         if findings:
             return findings
         day = self._lives.day(person, stays, self._groups.get(draft.item, ()), others=self._lives.lessons(draft.item))
@@ -320,7 +335,7 @@ class _DayJudge:
 
 
 def _plan_faults(plan: Sequence[ActivityReply]) -> list[str]:
-    """Say what is wrong with a plan whatever the town."""
+    """Return what is wrong with a plan whatever the town."""
     findings: list[str] = []
     for k, one in enumerate(plan):
         where = f"schedule[{k}]"
@@ -344,19 +359,4 @@ def _plan_faults(plan: Sequence[ActivityReply]) -> list[str]:
         findings.append(f"schedule[{len(plan) - 1}]: the day ends at {plan[-1].end_time}, not at {LAST}")
     if "commute" in (plan[0].type, plan[-1].type):
         findings.append("schedule: the day begins and ends at a place, not on the way")
-    return findings
-
-
-def _lacks(stays: Sequence[Stay], person: Resident) -> list[str]:
-    """Say what a day of such a person lacks."""
-    findings = []
-    asleep = sum(stay.minutes for stay in stays if stay.type is ItemType.SLEEP)
-    least = _SLEEP_OF_CHILDREN if person.age < GROWN_UP else _SLEEP
-    if asleep < least:
-        findings.append(f"schedule: {asleep / 60:.1f} h of sleep: plan {least / 60:g} h or more")
-    working = sum(stay.minutes for stay in stays if stay.place == person.workplace)
-    if person.workplace is not None and person.age >= GROWN_UP and working < _AT_WORK:
-        findings.append(
-            f"schedule: {working} min at {person.occupation}'s place of work: plan the hours such work takes there"
-        )
     return findings

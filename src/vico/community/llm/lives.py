@@ -56,11 +56,11 @@ class Stay:
 
     @property
     def minutes(self) -> int:
-        """How long it takes."""
+        """Return how long it takes."""
         return self.end - self.start
 
     @property
-    def moved(self) -> int:
+    def shift_minutes(self) -> int:
         """By how many minutes its start or end was moved."""
         return 0 if self.planned is None else max(abs(self.start - self.planned[0]), abs(self.end - self.planned[1]))
 
@@ -178,7 +178,7 @@ class DayFitter:
             findings += [finding] if finding else []
         if findings:
             return FittedDay([], findings)
-        return FittedDay(self._items(line), [], max(stay.moved for stay in line))
+        return FittedDay(self._items(line), [], max(stay.shift_minutes for stay in line))
 
     def _end(self, line: list[Stay]) -> str:
         """Spend what is left of the day where one is, or at home."""
@@ -297,14 +297,16 @@ def _at_home(home: str, start: int, end: int) -> Stay:
     return Stay(start, end, ItemType.MAIN, "Spend time at home", home, ActivityTag.LEISURE)
 
 
-# Somebody whose working hours nobody has said works so long, from this time on if the place is open, minutes.
-_WORKING_DAY, _USUAL_START, _EARLIEST = 8 * 60, 9 * 60, 6 * 60
-# A working day of so many minutes has a break of so many.
-_LONG_DAY, _BREAK = 6 * 60, 30
+# Working hours that nobody has said.
+_WORKING_DAY = 8 * 60  # minutes
+_USUAL_START = 9 * 60  # minute of the day, if the place is open
+_EARLIEST = 6 * 60  # minute of the day
+_LONG_DAY = 6 * 60  # minutes of work from which on a day has a break
+_BREAK = 30  # minutes
 
 
 class Lives:
-    """Who everybody is by now.
+    """All residents as they are by now.
 
     Parameters
     ----------
@@ -323,7 +325,7 @@ class Lives:
         self._plain: dict[str, list[Stay]] = {}
 
     def accept(self, people: Sequence[Resident]) -> None:
-        """Let these people, of one household, be who they are from now on."""
+        """Replace the people of one household."""
         for person in people:
             self.people[person.id] = person
             self._plain.pop(person.id, None)
@@ -390,7 +392,7 @@ class Lives:
         fitted = DayFitter(self.cast.index, person).fit(movable, fixed, drop=drop)
         if fitted.findings:
             return fitted
-        items = [self._tagged(item, person, groups) for item in fitted.items]
+        items = [self._with_tag(item, person, groups) for item in fitted.items]
         known = dict.fromkeys([*person.known_places, *(i.place for i in items if i.place), *(g.place for g in groups)])
         whole = person.model_copy(update={"schedule": items, "known_places": list(known)})
         found = self.findings(whole, "schedule")
@@ -407,7 +409,7 @@ class Lives:
         lessons = self.lessons(resident)
         return self.day(self.people[resident], self.plain_stays(resident), groups, others=lessons, drop=True)
 
-    def _tagged(self, item: ScheduleItem, person: Resident, groups: Sequence[Group]) -> ScheduleItem:
+    def _with_tag(self, item: ScheduleItem, person: Resident, groups: Sequence[Group]) -> ScheduleItem:
         if item.tag is not None:
             return item
         tag = tag_of(item, person, groups, self.cast.index.place_by_id)
@@ -431,7 +433,11 @@ def stays_with_work(index: PlaceIndex, before: Resident, now: Resident, renamed:
 def _work(index: PlaceIndex, person: Resident) -> list[Stay]:
     """Return working hours at a new workplace, with a break."""
     assert person.workplace is not None
-    start, end = working_hours(index, person.workplace)
+    # Eight hours at most of the longest stretch in which the place is open.
+    spans = [(max(a, _EARLIEST), min(b, MIDNIGHT)) for a, b in index.hours(index.place_by_id[person.workplace])]
+    opens, closes = max(spans, key=lambda span: (span[1] - span[0], -span[0]), default=(_USUAL_START, 17 * 60))
+    start = min(max(opens, _USUAL_START), max(opens, closes - _WORKING_DAY))
+    end = min(closes, start + _WORKING_DAY)
     place = index.place_by_id[person.workplace]
     student = person.occupation.startswith("student")
     tag = ActivityTag.STUDY if student else ActivityTag.WORK
@@ -444,11 +450,3 @@ def _work(index: PlaceIndex, person: Resident) -> list[Stay]:
         Stay(noon, noon + _BREAK, ItemType.MEAL, "Have a lunch break", place.id, ActivityTag.MEAL_OUT),
         Stay(noon + _BREAK, end, ItemType.MAIN, words, place.id, tag),
     ]
-
-
-def working_hours(index: PlaceIndex, place: str) -> tuple[int, int]:
-    """Return from when until when somebody may work at a place, minutes of the day: eight hours at most."""
-    spans = [(max(a, _EARLIEST), min(b, MIDNIGHT)) for a, b in index.hours(index.place_by_id[place])]
-    start, end = max(spans, key=lambda span: (span[1] - span[0], -span[0]), default=(_USUAL_START, 17 * 60))
-    begin = min(max(start, _USUAL_START), max(start, end - _WORKING_DAY))
-    return begin, min(end, begin + _WORKING_DAY)

@@ -25,13 +25,13 @@ from vico.errors import InputError
 from vico.llm.prompts import Prompt
 from vico.world.model import Category
 
-# People of a question, meeting places in it, people a group.
-_BATCH, _PLACES, _A_GROUP = 20, 24, 4
+_BATCH = 20  # people of a question
+_PLACES = 24  # meeting places in it
+_A_GROUP = 4  # people a group
 _MEETING_PLACES = (Category.OPEN, Category.FOOD, Category.ENTERTAINMENT, Category.OFFICE)
-# Minutes a meeting takes; when the first one of a day may begin, minute of the day.
-_EARLIEST = 6 * 60
-_SHORTEST, _LONGEST = 20, 240
-_MOST_DETAIL = 240
+_EARLIEST = 6 * 60  # minute of the day when the first meeting may begin
+_SHORTEST, _LONGEST = 20, 240  # minutes a meeting takes
+_MOST_DETAIL = 240  # characters
 _MOST_GROUPS = 2  # of one person
 
 
@@ -69,9 +69,14 @@ def write_network(
     """
     cast = lives.cast
     people = [
-        r.id for r in cast.base.residents if r.age >= GROWN_UP and r.id not in cast.coupled and r.id not in unasked
+        r.id
+        for r in cast.base.residents
+        if r.age >= GROWN_UP and r.id not in cast.tied_to_small_children and r.id not in unasked
     ]
-    batches = _in_parts(people, _BATCH)
+    # Batches of about the same size, none of one person alone.
+    count = -(-len(people) // _BATCH)
+    edges = [round(k * len(people) / count) for k in range(count + 1)] if len(people) > 1 else []
+    batches = [people[a:b] for a, b in pairwise(edges)]
     drafts = [_question(prompt, lives, batch, number) for number, batch in enumerate(batches)]
     network = Network()
     judge = _NetworkJudge(lives, batches)
@@ -82,13 +87,6 @@ def write_network(
             network.groups += kept.groups
             network.ties += kept.ties
     return network, {name: draft for batch, draft in zip(batches, drafts, strict=True) for name in batch}
-
-
-def _in_parts(people: Sequence[str], most: int) -> list[list[str]]:
-    """Return people in parts of about the same size, none of one person alone."""
-    count = -(-len(people) // most)
-    edges = [round(k * len(people) / count) for k in range(count + 1)] if len(people) > 1 else []
-    return [list(people[a:b]) for a, b in pairwise(edges)]
 
 
 def network_items(
@@ -179,14 +177,14 @@ class _NetworkJudge:
 
     def __call__(self, draft: ModelDraft[SocialNetwork]) -> list[str]:
         findings: list[str] = []
-        self._kept(draft, findings)
+        self._keep_holding(draft, findings)
         return findings
 
     def sound(self, draft: ModelDraft[SocialNetwork]) -> Network:
         """Return what is without fault in a draft."""
-        return self._kept(draft, [])
+        return self._keep_holding(draft, [])
 
-    def _kept(self, draft: ModelDraft[SocialNetwork], findings: list[str]) -> Network:
+    def _keep_holding(self, draft: ModelDraft[SocialNetwork], findings: list[str]) -> Network:
         assert draft.value is not None
         kept = Network()
         for k, reply in enumerate(draft.value.groups):
@@ -305,23 +303,15 @@ def with_old_groups(lives: Lives, network: Network) -> list[Group]:
         for group in base.groups:
             if not needing & set(group.members):
                 continue
-            members = [m for m in group.members if m in needing or _fits(lives, m, [*new.of(m), group])]
+            members = [m for m in group.members if m in needing or not lives.plain_day(m, [*new.of(m), group]).findings]
             if len(members) < min(2, len(base.residents)):
                 blocked = next(g for m in group.members if m not in needing for g in new.of(m))
                 break
             old.append(group.model_copy(update={"members": members}))
         if blocked is None:
             network.groups = groups
-            return _renumber([*old, *groups])
+            return [group.model_copy(update={"id": f"group_{k}"}) for k, group in enumerate([*old, *groups])]
         groups.remove(blocked)
-
-
-def _fits(lives: Lives, member: str, groups: Sequence[Group]) -> bool:
-    return not lives.plain_day(member, groups).findings
-
-
-def _renumber(groups: Sequence[Group]) -> list[Group]:
-    return [group.model_copy(update={"id": f"group_{k}"}) for k, group in enumerate(groups)]
 
 
 def groups_by_member(groups: Sequence[Group]) -> Mapping[str, list[Group]]:

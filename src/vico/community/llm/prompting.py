@@ -1,4 +1,4 @@
-"""What a language model is asked for, what it is told, and how its drafts are mended in rounds.
+"""Questions to a language model: the replies it is asked for, its prompts, and rounds in which drafts are repaired.
 
 Many questions are asked at a time; the order of replies changes nothing. The model is told facts of the world and of
 the bodies that it is to give lives, in words and bounded lists. The fields of a day's activities are those of the
@@ -159,12 +159,12 @@ class ModelDesk:
     def _ask(self, draft: ModelDraft[T]) -> None:
         """Ask one question and note what came, or why nothing did."""
         if self.over:
-            self._unanswered(draft, self.over)
+            self._mark_unanswered(draft, self.over)
             return
         try:
             reply = self.model.ask(draft.messages, draft.reply, rounds=self.rounds)
         except LlmReplyError as error:
-            self._heard()
+            self._count_answer()
             if draft.origin is not Origin.NOT_GROUNDED:
                 draft.origin = Origin.UNUSABLE
                 draft.detail = (error.findings[0] if error.findings else "")[:_MOST_DETAIL]
@@ -178,17 +178,17 @@ class ModelDesk:
             if hopeless:
                 self._give_up(draft, str(error))
             else:
-                self._unanswered(draft, str(error))
+                self._mark_unanswered(draft, str(error))
         except InputError as error:
             if not self.model.replays:
                 raise
             # What the server did not answer when the calls were recorded is not in the recording.
-            self._unanswered(draft, str(error))
+            self._mark_unanswered(draft, str(error))
         else:
-            self._heard()
+            self._count_answer()
             draft.value, draft.origin, draft.detail, draft.told = reply.value, Origin.WRITTEN, "", ""
 
-    def _heard(self) -> None:
+    def _count_answer(self) -> None:
         with self._lock:
             self._failed = 0
             self.answers += 1
@@ -196,10 +196,10 @@ class ModelDesk:
     def _give_up(self, draft: ModelDraft[Any], why: str) -> None:
         with self._lock:
             self.over = self.over or why
-        self._unanswered(draft, why)
+        self._mark_unanswered(draft, why)
 
     @staticmethod
-    def _unanswered(draft: ModelDraft[Any], why: str) -> None:
+    def _mark_unanswered(draft: ModelDraft[Any], why: str) -> None:
         if draft.origin is not Origin.NOT_GROUNDED:
             draft.origin = Origin.NO_ANSWER
         draft.told = why
@@ -209,7 +209,9 @@ class ModelDesk:
 Percent = Annotated[int, Field(ge=0, le=100)]
 
 # The longest lists that are read: what is longer is no draft but a model that does not end.
-_MOST_ACTIVITIES, _MOST_GROUPS, _MOST_TIES = 48, 40, 120
+_MOST_ACTIVITIES = 48
+_MOST_GROUPS = 40
+_MOST_TIES = 120
 
 
 class _Reply(BaseModel):
@@ -345,7 +347,7 @@ _MOST_LABEL = 90
 
 
 def fault_of(kind: str, text: str) -> str:
-    """Say what is wrong with a text of a kind, or return an empty string."""
+    """Return what is wrong with a text of a kind, or return an empty string."""
     if not text.strip():
         return "is empty: write something"
     if len(text) > MOST[kind]:
@@ -358,13 +360,13 @@ def fault_of(kind: str, text: str) -> str:
 
 
 def faults_of(where: str, kind: str, texts: Sequence[str]) -> list[str]:
-    """Say what is wrong with some texts of a kind, a sentence each."""
+    """Return what is wrong with some texts of a kind, a sentence each."""
     faults = [(k, fault_of(kind, text)) for k, text in enumerate(texts)]
     return [f"{where}: {kind} {k + 1 if len(texts) > 1 else ''}".rstrip() + f" {fault}" for k, fault in faults if fault]
 
 
 def name_fault(name: str) -> str:
-    """Say what is wrong with a person's name, or return an empty string."""
+    """Return what is wrong with a person's name, or return an empty string."""
     if fault := fault_of("name", name):
         return fault
     if not _NAME.fullmatch(name) or len(name.split()) < 2 or len(name.split()[0]) < 2:
@@ -442,7 +444,7 @@ class Cast:
         return list(found.values())
 
     @cached_property
-    def coupled(self) -> frozenset[str]:
+    def tied_to_small_children(self) -> frozenset[str]:
         """Ids of small children and of those who take them: their days go together, minute by minute, and stay."""
         found: set[str] = set()
         for household in self.households:
@@ -491,11 +493,12 @@ class Cast:
             With the minutes on foot from this place.
         """
         found = self.index.place_by_id[place]
+        spans = [f"{clock_of(a * 60)[:5]}-{clock_of(min(b, _LATE) * 60)[:5]}" for a, b in self.index.hours(found)]
         facts: dict[str, Any] = {
             "name": self.labels[place],
             "building": found.building,
             "function": function_of(found),
-            "open": _hours_in_words(self.index, found),
+            "open": "always" if found.category is Category.ACCOMMODATION else ", ".join(spans) or "closed",
         }
         if jobs:
             facts["employs"] = self.trades(place)
@@ -530,7 +533,7 @@ class Cast:
 
     def keeps_work(self, resident: Resident) -> bool:
         """Whether somebody's occupation is settled: children's, and that of who takes small ones somewhere."""
-        return resident.age < GROWN_UP or resident.id in self.coupled
+        return resident.age < GROWN_UP or resident.id in self.tied_to_small_children
 
     def home_in_words(self, resident: Resident) -> str:
         """Return where somebody lives."""
@@ -569,13 +572,6 @@ def _ways(resident: Resident) -> list[tuple[str, str, str | None]]:
 def function_of(place: Place) -> str:
     """Return what a place is for, in words: ``cafe (food)``."""
     return f"{label_text(kind_of(place).replace('_', ' '))} ({place.category.value})"
-
-
-def _hours_in_words(index: PlaceIndex, place: Place) -> str:
-    if place.category is Category.ACCOMMODATION:
-        return "always"
-    spans = [f"{clock_of(a * 60)[:5]}-{clock_of(min(b, _LATE) * 60)[:5]}" for a, b in index.hours(place)]
-    return ", ".join(spans) or "closed"
 
 
 def looks_in_words(resident: Resident) -> str:

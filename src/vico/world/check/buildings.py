@@ -47,7 +47,7 @@ class CoplanarPairs:
     area: NDArray[np.float64]
     same: NDArray[np.bool_]
 
-    def chosen(self, which: NDArray[np.bool_]) -> CoplanarPairs:
+    def where(self, which: NDArray[np.bool_]) -> CoplanarPairs:
         """Return some of the pairs; `which` has shape ``(n,)``."""
         return CoplanarPairs(self.first[which], self.second[which], self.area[which], self.same[which])
 
@@ -118,7 +118,16 @@ def coplanar_overlaps(
     away = np.abs(np.einsum("nki,ni->nk", points[second], plane[first]) - offset[first, None]).max(axis=1)
     close = (away < _PLANE) & (np.abs(plane[first] - plane[second]).max(axis=1) < _TURN)
     first, second = first[close], second[close]
-    area = _common(points, plane, first, second, least)
+    # The area that two triangles of a plane share; 0 where it is certainly not more than `least`.
+    across, up = _axes(plane[first])
+    one, two = (
+        np.stack([np.einsum("nki,ni->nk", points[which], across), np.einsum("nki,ni->nk", points[which], up)], axis=-1)
+        for which in (first, second)
+    )
+    area = np.zeros(len(first))
+    near = np.flatnonzero((_most_common(one, two) > least) & (_most_common(two, one) > least))
+    shapes = (shapely.polygons(flat[near]) for flat in (one, two))
+    area[near] = np.asarray(overlay.common_area(*shapes), np.float64)
     real = area > least
     first, second, area = first[real], second[real], area[real]
     return CoplanarPairs(kept[first], kept[second], area, sign[first] == sign[second])
@@ -186,26 +195,6 @@ def _overlapping_boxes(
                 count += 1
             j += 1
     return first[:count], second[:count]
-
-
-def _common(
-    points: NDArray[np.float64],
-    plane: NDArray[np.float64],
-    first: NDArray[np.int64],
-    second: NDArray[np.int64],
-    least: float,
-) -> NDArray[np.float64]:
-    """Area two triangles of a plane share; 0 where it is certainly not more than `least`."""
-    across, up = _axes(plane[first])
-    one, two = (
-        np.stack([np.einsum("nki,ni->nk", points[which], across), np.einsum("nki,ni->nk", points[which], up)], axis=-1)
-        for which in (first, second)
-    )
-    area = np.zeros(len(first))
-    near = np.flatnonzero((_most_common(one, two) > least) & (_most_common(two, one) > least))
-    shapes = (shapely.polygons(flat[near]) for flat in (one, two))
-    area[near] = np.asarray(overlay.common_area(*shapes), np.float64)
-    return area
 
 
 def _most_common(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -411,4 +400,4 @@ def overlapping_faces(
     whose = np.stack([np.minimum(one, other), np.maximum(one, other)], axis=1)
     keys, index = np.unique(whose, axis=0, return_inverse=True)
     seen = np.bincount(index.ravel(), weights=pairs.area, minlength=len(keys)) >= _SEEN
-    return {(int(keys[k, 0]), int(keys[k, 1])): pairs.chosen(index.ravel() == k) for k in np.flatnonzero(seen).tolist()}
+    return {(int(keys[k, 0]), int(keys[k, 1])): pairs.where(index.ravel() == k) for k in np.flatnonzero(seen).tolist()}

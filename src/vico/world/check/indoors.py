@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vico.geo import overlay
 from vico.rules import REACH
-from vico.world.model import Doorway, Room, WorldFinding
+from vico.world.model import Container, Room, WorldFinding
 from vico.world.objects import Objects
 from vico.world.world import World
 
@@ -61,21 +61,14 @@ def walkable_inside(rooms: Sequence[Room], objects: Objects, *, body: float = BO
 
 
 def floor_space(room: Room, outlines: NDArray[np.float64], body: float = BODY) -> shapely.Geometry:
-    """Where the middle of a body can be: one part, or several that can't be walked between.
+    """Return where the middle of a body can be: one part, or several that can't be walked between.
 
     Parameters
     ----------
     outlines
         Corners of the solid things in the room, shape ``(n, 4, 2)``.
     """
-    c, s = math.cos(room.yaw), math.sin(room.yaw)
-    x, y = room.size[0] / 2 - body, room.size[1] / 2 - body
-    box = shapely.Polygon(
-        [
-            (room.centre[0] + c * u - s * v, room.centre[1] + s * u + c * v)
-            for u, v in ((-x, -y), (x, -y), (x, y), (-x, y))
-        ]
-    )
+    box = _box(room, body)
     if not len(outlines):
         return box
     taken = overlay.union_all(overlay.buffer(shapely.polygons(outlines), body, quad_segs=4), grid=None)
@@ -99,21 +92,9 @@ def _room(room: Room, outlines: NDArray[np.float64], body: float) -> list[WorldF
             found.append(
                 WorldFinding("container blocked", container.id, "its reach point can't be walked to from the door")
             )
-        if (
-            container.kind != "floor"
-            and _away(container.reach, container.centre, container.size, container.yaw) > REACH
-        ):
+        if _reach_of(container) > REACH:
             found.append(WorldFinding("container far", container.id, f"its reach point is more than {REACH} m from it"))
     return found
-
-
-def _away(
-    point: tuple[float, float], centre: tuple[float, float, float], size: tuple[float, float], yaw: float
-) -> float:
-    c, s = math.cos(yaw), math.sin(yaw)
-    dx, dy = point[0] - centre[0], point[1] - centre[1]
-    u, v = abs(dx * c + dy * s) - size[0] / 2, abs(dy * c - dx * s) - size[1] / 2
-    return math.hypot(max(u, 0.0), max(v, 0.0))
 
 
 def _doorways(room: Room, known: dict[str, Room]) -> list[WorldFinding]:
@@ -128,20 +109,13 @@ def _doorways(room: Room, known: dict[str, Room]) -> list[WorldFinding]:
         if not door.to:
             continue
         other = known.get(door.to)
-        back = _door_to(other, room.id) if other is not None else None
+        back = None if other is None else next((door for door in other.doors if door.to == room.id), None)
+        is_ride = other is not None and room.kind == other.kind == "lift"
         if back is None:
             found.append(WorldFinding("door one-sided", room.id, f"its door to {door.to} does not lead back"))
-        elif not _ride(room, other) and math.dist(door.position, back.position) > _SAME_DOOR:
+        elif not is_ride and math.dist(door.position, back.position) > _SAME_DOOR:
             found.append(WorldFinding("door apart", room.id, f"the two sides of its door to {door.to} do not meet"))
     return found
-
-
-def _ride(room: Room, other: Room | None) -> bool:
-    return room.kind == "lift" and other is not None and other.kind == "lift"
-
-
-def _door_to(room: Room, name: str) -> Doorway | None:
-    return next((door for door in room.doors if door.to == name), None)
 
 
 def _unreachable_rooms(place: str, rooms: Sequence[Room]) -> list[WorldFinding]:
@@ -161,9 +135,20 @@ def _unreachable_rooms(place: str, rooms: Sequence[Room]) -> list[WorldFinding]:
     ]
 
 
-def _box(room: Room) -> shapely.Polygon:
+def _reach_of(container: Container) -> float:
+    """Return how far a container's reach point is from its sides, metres; 0 on a floor."""
+    if container.kind == "floor":
+        return 0.0
+    c, s = math.cos(container.yaw), math.sin(container.yaw)
+    dx, dy = container.reach[0] - container.centre[0], container.reach[1] - container.centre[1]
+    u, v = abs(dx * c + dy * s) - container.size[0] / 2, abs(dy * c - dx * s) - container.size[1] / 2
+    return math.hypot(max(u, 0.0), max(v, 0.0))
+
+
+def _box(room: Room, inset: float = 0.0) -> shapely.Polygon:
+    """Return the outline of a room's floor, its sides `inset` metres farther in."""
     c, s = math.cos(room.yaw), math.sin(room.yaw)
-    x, y = room.size[0] / 2, room.size[1] / 2
+    x, y = room.size[0] / 2 - inset, room.size[1] / 2 - inset
     return shapely.Polygon(
         [
             (room.centre[0] + c * u - s * v, room.centre[1] + s * u + c * v)
@@ -223,12 +208,7 @@ def check_containers(world: World) -> Iterator[WorldFinding]:
                 yield WorldFinding(
                     "container blocked", container.id, "its reach point can't be walked to from the door"
                 )
-            away = 0.0
-            if container.kind != "floor":
-                c, s = math.cos(container.yaw), math.sin(container.yaw)
-                dx, dy = container.reach[0] - container.centre[0], container.reach[1] - container.centre[1]
-                u, v = abs(dx * c + dy * s) - container.size[0] / 2, abs(dy * c - dx * s) - container.size[1] / 2
-                away = math.hypot(max(u, 0.0), max(v, 0.0))
+            away = _reach_of(container)
             if away > REACH:
                 yield WorldFinding("container far", container.id, f"its reach point is {away:.2f} m from the surface")
             if not box.contains(shapely.Point(container.centre[:2])):

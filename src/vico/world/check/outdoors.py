@@ -14,11 +14,10 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
-from vico.geometry import distances
+from vico.geometry import direction, distances
 from vico.rules import BUS_DOOR_REACH, BUS_DOORS_BEHIND_FRONT, BUS_WIDTH, TRAM_SECTIONS
 from vico.world.check.buildings import outline_of
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph
 from vico.world.model import Entrance, Place, WorldFinding
 from vico.world.transit import TRAM_LENGTH, Stop, Track, tram_door
 from vico.world.walkable import WalkableMap
@@ -53,12 +52,6 @@ def check_objects(world: World) -> Iterator[WorldFinding]:
         yield WorldFinding("object not seated", str(objects.id[k]), "its foot is not at ground level")
 
 
-def _lane_bands(lanes: LaneGraph, chosen: NDArray[np.int64]) -> NDArray[np.object_]:
-    """Return what vehicles sweep on each lane, a little narrower than the lane."""
-    lines = np.array([shapely.LineString(lanes.line(int(k))[:, :2]) for k in chosen], object)
-    return np.asarray(overlay.buffer(lines, lanes.width[chosen] / 2 - _KERB, cap_style="flat"), object)
-
-
 def check_clearances(world: World) -> Iterator[WorldFinding]:
     """Check that nothing solid stands on a lane that is driven, nor in another solid thing."""
     objects = world.objects
@@ -69,7 +62,9 @@ def check_clearances(world: World) -> Iterator[WorldFinding]:
     lanes = world.lanes
     driven = np.flatnonzero(lanes.inside < 0) if len(lanes) else np.zeros(0, np.int64)
     if len(driven):
-        bands = _lane_bands(lanes, driven)
+        # What vehicles sweep on each lane: a little narrower than the lane.
+        lines = np.array([shapely.LineString(lanes.line(int(k))[:, :2]) for k in driven], object)
+        bands = np.asarray(overlay.buffer(lines, lanes.width[driven] / 2 - _KERB, cap_style="flat"), object)
         for k, lane in np.column_stack(shapely.STRtree(bands).query(feet, predicate="intersects")).tolist():
             inside = float(overlay.common_area(feet[k], bands[lane]))
             if inside > _TOUCH:
@@ -115,8 +110,7 @@ def entrance_findings(
         yield WorldFinding("entrance blocked", door.id, "its approach can't be reached on foot from the map's edge")
     if abs(float(height(door.position)) - door.position[2]) > 0.05:
         yield WorldFinding("entrance not seated", door.id, "it is not at ground level")
-    out = np.array([[math.cos(door.facing), math.sin(door.facing)]])
-    if bool(faces_into(outline, np.array([door.position[:2]]), out)[0]):
+    if bool(faces_into(outline, np.array([door.position[:2]]), direction(door.facing)[None])[0]):
         yield WorldFinding("entrance turned", door.id, "it faces into the building")
 
 

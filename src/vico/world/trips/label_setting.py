@@ -50,7 +50,7 @@ LABEL = np.dtype(
 
 
 class Timetable(NamedTuple):
-    """When lines run, line after line.
+    """Timetable of all lines, one after another.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Timetable(NamedTuple):
 
 
 class GroundWays(NamedTuple):
-    """How far it is between the nodes, the start, and the goal, which is the last; of a way not known, at least.
+    """Lengths of ways between the nodes, the start, and the goal, which is the last; of a way not known, a bound.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class GroundWays(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """What labels have to keep to, and how fast one is.
+    """Limits that labels have to keep to, and speeds.
 
     Attributes
     ----------
@@ -252,21 +252,45 @@ def _is_beaten(labels, first, then, price, arrive, metres, strictly):  # type: i
     return False
 
 
-@compiled
-def _offer(labels, lists, queue, counts, label_of, bounds, left):  # type: ignore[no-untyped-def]
-    """Take a label in if it may come to be the best: `counts` are those of labels, of the heap, and the limit.
+class _LegOffer(NamedTuple):
+    """A leg that leads on from a label.
 
-    `label_of` are the label it comes from, where it leads, when it begins and ends, metres on foot, the price, and
-    line, first and last stop.
+    Attributes
+    ----------
+    parent
+        The label it comes from.
+    node
+        Where it leads.
+    depart, arrive
+        When it begins and ends, seconds.
+    metres, price
+        On foot, and cents.
+    line, first, last
+        Of the ride: line, first and last stop.
     """
+
+    parent: int | np.int64
+    node: int | np.int64
+    depart: float
+    arrive: float
+    metres: float
+    price: int | np.int64
+    line: int | np.int64
+    first: int
+    last: int | np.int64
+
+
+@compiled
+def _offer(labels, lists, queue, counts, leg, bounds, left):  # type: ignore[no-untyped-def]
+    """Take a label in if it may come to be the best: `counts` are those of labels, of the heap, and the limit."""
     made, then_made, settled, then_settled = lists
-    parent, node, depart, arrive, metres, price, line, first, last = label_of
-    walked = line == ON_FOOT
-    total, limit = labels[parent].price + price, counts[2]
+    parent, arrive = leg.parent, leg.arrive
+    walked = leg.line == ON_FOOT
+    total, limit = labels[parent].price + leg.price, counts[2]
     if total / CENTS > bounds.cash or arrive + left > limit:
         return counts
-    metres += labels[parent].metres
-    place, goal = 2 * node + walked, len(made) - 1
+    metres = leg.metres + labels[parent].metres
+    place, goal = 2 * leg.node + walked, len(made) - 1
     if _is_beaten(labels, settled[place], then_settled, total, arrive, metres, False):
         return counts
     if bounds.all_good:
@@ -278,8 +302,9 @@ def _offer(labels, lists, queue, counts, label_of, bounds, left):  # type: ignor
     if _is_beaten(labels, made[place], then_made, total, arrive, metres, True):
         return count, waiting, limit
     one = labels[count]
-    one.least, one.arrive, one.metres, one.depart, one.price = arrive + left, arrive, metres, depart, total
-    one.node, one.parent, one.line, one.first, one.last, one.walked = node, parent, line, first, last, walked
+    one.least, one.arrive, one.metres, one.depart, one.price = arrive + left, arrive, metres, leg.depart, total
+    one.node, one.parent, one.walked = leg.node, parent, walked
+    one.line, one.first, one.last = leg.line, leg.first, leg.last
     one.steps = labels[parent].steps + 1
     then_made[count], made[place] = made[place], count
     _push(queue, waiting, labels, count)
@@ -370,7 +395,7 @@ def _on_wheels(label, memory, counts, rules, rides):  # type: ignore[no-untyped-
         for j in range(count):
             to = np.int64(rides[j, 0])
             left = ground.bee_line[to] / bounds.top_speed
-            ride = label, to, leaves, rides[j, 1], 0.0, _FARE, line, k, np.int64(rides[j, 2])
+            ride = _LegOffer(label, to, leaves, rides[j, 1], 0.0, _FARE, line, k, np.int64(rides[j, 2]))
             counts = _offer(labels, lists, queue, counts, ride, bounds, left)
     if timetable.gives[node]:
         for to in timetable.takes:
@@ -380,7 +405,7 @@ def _on_wheels(label, memory, counts, rules, rides):  # type: ignore[no-untyped-
                 continue
             arrive = ready + MOUNT + seconds + DISMOUNT
             price = _RATE * np.int64(math.ceil((seconds + DISMOUNT) / 60.0))
-            cycled = label, to, ready, arrive, 0.0, price, np.int64(BY_BICYCLE), 0, 0
+            cycled = _LegOffer(label, to, ready, arrive, 0.0, price, np.int64(BY_BICYCLE), 0, 0)
             counts = _offer(labels, lists, queue, counts, cycled, bounds, left)
     return counts
 
@@ -395,7 +420,7 @@ def _walks(label, memory, counts, rules):  # type: ignore[no-untyped-def]
     if bounds.direct or labels[label].parent >= 0:
         metres, seconds, _ = _way(ground, node, goal, bounds.walk_speed)
         if seconds < math.inf:
-            walk = label, goal, now, now + seconds, metres, 0, np.int64(ON_FOOT), 0, 0
+            walk = _LegOffer(label, goal, now, now + seconds, metres, 0, np.int64(ON_FOOT), 0, 0)
             counts = _offer(labels, lists, queue, counts, walk, bounds, 0.0)
     for to in timetable.boardable:
         metres, seconds, _ = _way(ground, node, to, bounds.walk_speed)
@@ -403,7 +428,7 @@ def _walks(label, memory, counts, rules):  # type: ignore[no-untyped-def]
             # Changing where one got off costs no way.
             metres, seconds = 0.0, 0.0
         if seconds < math.inf:
-            walk = label, to, now, now + seconds, metres, 0, np.int64(ON_FOOT), 0, 0
+            walk = _LegOffer(label, to, now, now + seconds, metres, 0, np.int64(ON_FOOT), 0, 0)
             left = ground.bee_line[to] / bounds.top_speed
             counts = _offer(labels, lists, queue, counts, walk, bounds, left)
     return counts

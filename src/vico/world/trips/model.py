@@ -1,4 +1,4 @@
-"""What a trip is: legs on foot and in vehicles, with their times and prices."""
+"""Trips: legs on foot and in vehicles, with their times and prices."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Leg:
 
     @property
     def seconds(self) -> float:
-        """How long it takes."""
+        """Return how long it takes."""
         return self.arrive - self.depart
 
 
@@ -82,17 +82,17 @@ class Trip:
 
     @property
     def arrive(self) -> float:
-        """When one is there, second of the day."""
+        """Return when one is there, second of the day."""
         return self.legs[-1].arrive
 
     @property
     def seconds(self) -> float:
-        """How long it takes, waiting included."""
+        """Return how long it takes, waiting included."""
         return self.arrive - self.depart
 
     @property
     def price(self) -> float:
-        """What all rides cost together."""
+        """Price of all rides together."""
         return round(sum(leg.price for leg in self.legs), 2)
 
     @property

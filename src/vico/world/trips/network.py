@@ -1,4 +1,4 @@
-"""What trips are made of: stops and stations as a graph of rides, and the ways on the ground between their ends.
+"""Parts of trips: stops and stations as a graph of rides, and the ways on the ground between their ends.
 
 Rides say what can be ridden from each stop or station, when, and at what price. Ways on the ground are bounds at first,
 found when it matters, then kept.
@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import polyline_length
 from vico.rules import BIKE_SPEED
 from vico.world.model import Point2
 from vico.world.routing import Router
@@ -122,7 +123,7 @@ class TripNetwork:
 
     @cached_property
     def timetable(self) -> Timetable:
-        """When what runs, as arrays."""
+        """Return the timetable as arrays."""
         travel = [times.line.travel[: len(times.line.stops) + times.round] for times in self.lines]
         nodes = [[self._number.get(stop, -1) for stop in times.line.stops] for times in self.lines]
         departures = [
@@ -198,7 +199,7 @@ class Way(NamedTuple):
     metres: float
 
     def seconds(self, speed: float) -> float:
-        """How long it takes at a speed, m/s, with a moment at every corner, in hundredths of a second."""
+        """Return how long it takes at a speed, m/s, with a moment at every corner, in hundredths of a second."""
         return round(self.metres / speed + TURN * max(0, len(self.path) - 2), 2)
 
 
@@ -212,7 +213,7 @@ def find_way(
     path = router.path(start, goal, blocked=blocked, often=often)
     if path is None:
         return NO_WAY
-    return Way(path, round(float(np.hypot(*np.diff(path, axis=0).T).sum()), 3))
+    return Way(path, round(polyline_length(path), 3))
 
 
 class KnownWays:
@@ -308,11 +309,11 @@ class Ways:
 
     @property
     def ground(self) -> GroundWays:
-        """What is known of them now."""
+        """The ways as they are known now."""
         row, known = self._known.arrays()
         return self._ground._replace(row=row, known=known)
 
-    def known(self, a: int, b: int) -> bool:
+    def is_known(self, a: int, b: int) -> bool:
         """Whether the way is known, and not a bound."""
         return self._get(a, b) is not None
 

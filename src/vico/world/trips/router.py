@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
+from vico.geometry import polyline_length
 from vico.rules import WALK_SPEED
 from vico.world.model import Point2
 from vico.world.routing import Router
@@ -56,7 +57,7 @@ class TripStep(NamedTuple):
 
 @dataclass(frozen=True)
 class TripQuery:
-    """What is asked: all that a search depends on.
+    """A question to the router: all that a search depends on.
 
     Attributes
     ----------
@@ -90,7 +91,7 @@ def best_trips(question: TripQuery, depart: float) -> list[list[TripStep]]:
         if not question.all_good:
             found = found[:1]
         on_ground = ((step.origin, step.to) for steps in found for step in steps if step.line < 0)
-        unknown = [(a, b) for a, b in on_ground if a != b and not ways.known(a, b)]
+        unknown = [(a, b) for a, b in on_ground if a != b and not ways.is_known(a, b)]
         if not unknown:
             return found
         for a, b in dict.fromkeys(unknown):
@@ -131,7 +132,7 @@ def _steps(labels: NDArray[np.void], label: int) -> list[TripStep]:
 
 
 class TripEnd(Protocol):
-    """What trips are planned on: a `World`, or a `PublicMap`."""
+    """A map that trips are planned on: a `World`, or a `PublicMap`."""
 
     @property
     def router(self) -> Router:
@@ -299,7 +300,7 @@ class Trips:
         else:
             path = np.array(network.bus_stops_between(step.line, step.first, step.last), np.float64)
             times = network.lines[step.line]
-            metres, line = float(np.hypot(*np.diff(path, axis=0).T).sum()), times.line.id
+            metres, line = polyline_length(path), times.line.id
             mode = "bus" if times.round else "tram"
         return Leg(
             mode,

@@ -20,8 +20,9 @@ import numpy as np
 from defusedxml.ElementTree import fromstring
 from numpy.typing import NDArray
 
+from vico.geometry import wrap_angle
 from vico.world.heights import HeightField
-from vico.world.opendrive import Curve, elevation, lane_borders, offset_point, reference_line, wrap_angle
+from vico.world.opendrive import Curve, elevation, lane_borders, offset_point, reference_line
 
 Floats = NDArray[np.float64]
 
