@@ -473,7 +473,9 @@ def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Ou
     """Build one place; bad input becomes an outcome, so that it does not end the others."""
     try:
         if not force and store.has(f"{row.name}/world.json"):
-            return _existing_outcome(row, store)
+            there = store.folder / row.name if isinstance(store, FolderStore) else fetch_manifest(f"{store}/{row.name}")
+            kept = read_world(there).manifest.counts
+            return Outcome(row.name, "kept", kept["buildings"], kept["places"])
         sources = Sources(
             osm=Path(row.osm) if row.osm else locate(row.lat, row.lon, row.radius),
             dem=tuple(Path(p) for p in row.dem.split(";") if p),
@@ -502,10 +504,3 @@ def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Ou
         return Outcome(row.name, "failed", reason=str(error))
     flat = world.manifest.is_flat
     return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2), flat=flat)
-
-
-def _existing_outcome(row: PlaceRow, store: Store) -> Outcome:
-    """Return the outcome of a world that is there."""
-    there = store.folder / row.name if isinstance(store, FolderStore) else fetch_manifest(f"{store}/{row.name}")
-    counts = read_world(there).manifest.counts
-    return Outcome(row.name, "kept", counts["buildings"], counts["places"])

@@ -32,7 +32,7 @@ from vico.world.city import (
     LEVELS as LEVELS_OF_CITY,
 )
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph, read_lanes
+from vico.world.lanes import read_lanes
 from vico.world.model import Point2, Point3, Roads, StageReport
 from vico.world.transit import Transit
 from vico.world.world import write_record
@@ -96,7 +96,12 @@ def make_streets(request: CityRequest, region: RegionMap) -> list[StageReport]:
         What was made and left out.
     """
     (request.out / WHOLE).mkdir(parents=True, exist_ok=True)
-    both = _digest_of_shapes(request)
+    # All that is read, or will be, of the shapes of tiles is in one digest.
+    digests: list[str] = []
+    for tile in _tiles_with_shape(request):
+        folder = request.plans / tile_name(tile)
+        digests += [tile_name(tile), *(read_head(folder / f"{name}{SUFFIX}")[1] for name in (SHAPE, LEVELS))]
+    both = sha256("\n".join(digests).encode()).hexdigest()
     known = request.plans / STREETS / _DONE
     key = sha256(f"{region.key} {request.seed} {both}".encode()).hexdigest()
     content = read_json(known) if known.exists() else {}
@@ -124,7 +129,9 @@ def _output_digests(request: CityRequest) -> dict[str, str]:
 
 def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     """Make the streets of a map and of its tiles' shapes, whose digest is `both`."""
-    shapes = _shapes(request)
+    shapes = _Shapes(
+        {tile: load_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _tiles_with_shape(request)}
+    )
     whole = request.out / WHOLE
     known = request.plans / STREETS / _GROUND
     is_there = known.exists() and all((whole / name).exists() for name in _HEIGHTS)
@@ -158,7 +165,15 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     with stages.timed("waiting"):
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write_record(whole / TRANSIT, transit)
-    _report(stages, roads, lanes, transit)
+    counts = {"roads": len(roads.roads), "junctions": len(roads.junctions), "lanes": len(lanes)}
+    stages.report("roads", counts, closed_roads(roads))
+    counts = {
+        "stops": len(transit.stops),
+        "lines": len(transit.lines),
+        "tram_lines": len(transit.tram_lines),
+        "bike_stations": len(transit.bike_stations),
+    }
+    stages.report("transit", counts, transit.left_out)
     cutter, boxes = NetworkCutter(network.net_xml), _boxes(roads)
     for tile in tiles:
         shift = _Shift(request.grid, tile)
@@ -174,23 +189,8 @@ def _tiles_with_shape(request: CityRequest) -> list[Tile]:
     return [tile for tile in request.grid if (request.plans / tile_name(tile) / f"{SHAPE}{SUFFIX}").exists()]
 
 
-def _digest_of_shapes(request: CityRequest) -> str:
-    """Return a digest of all that is read, or will be, of the shapes of tiles."""
-    digests: list[str] = []
-    for tile in _tiles_with_shape(request):
-        folder = request.plans / tile_name(tile)
-        digests += [tile_name(tile), *(read_head(folder / f"{name}{SUFFIX}")[1] for name in (SHAPE, LEVELS))]
-    return sha256("\n".join(digests).encode()).hexdigest()
-
-
 class _Shapes(dict[Tile, TileShape]):
     """The shapes of tiles; unlike a plain dictionary's, stages don't keep their inputs alive that are of this class."""
-
-
-def _shapes(request: CityRequest) -> _Shapes:
-    return _Shapes(
-        {tile: load_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _tiles_with_shape(request)}
-    )
 
 
 def _levels(request: CityRequest, tile: Tile) -> HeightField:
@@ -199,18 +199,6 @@ def _levels(request: CityRequest, tile: Tile) -> HeightField:
     made = (folder / f"{LEVELS}{SUFFIX}").exists()
     levels: HeightField = load_product(folder, LEVELS if made else "grading")[0]
     return levels
-
-
-def _report(stages: Stages, roads: Roads, lanes: LaneGraph, transit: Transit) -> None:
-    counts = {"roads": len(roads.roads), "junctions": len(roads.junctions), "lanes": len(lanes)}
-    stages.report("roads", counts, closed_roads(roads))
-    counts = {
-        "stops": len(transit.stops),
-        "lines": len(transit.lines),
-        "tram_lines": len(transit.tram_lines),
-        "bike_stations": len(transit.bike_stations),
-    }
-    stages.report("transit", counts, transit.left_out)
 
 
 class _Shift:

@@ -178,7 +178,10 @@ def read_evidence(
         Of whichever kind the source's reader raises; each is one sentence.
     """
     where = f"{frame} {half}"
-    precedence = _precedence(sources)
+    # Which source decides what is read before anything that takes long; where only the map is asked, nothing is.
+    precedence = None
+    if sources.buildings or sources.precedence is not None:
+        precedence = read_precedence(sources.precedence, [path.name for path, _ in checked_files(sources.buildings)])
     with stages.timed("map"):
         if part is None:
             data = read_osm(sources.osm, frame, half)
@@ -329,13 +332,6 @@ def _heights(
         if not part:
             raise
         return None, Dropped(id=sources.dem[0].name, reason=str(error))
-
-
-def _precedence(sources: Sources) -> Precedence | None:
-    """Read which source decides what, before anything that takes long; None where only the map is asked."""
-    if not sources.buildings and sources.precedence is None:
-        return None
-    return read_precedence(sources.precedence, [path.name for path, _ in checked_files(sources.buildings)])
 
 
 def _buildings(

@@ -225,7 +225,13 @@ def map_picture(world: World) -> Image.Image:
         x, y = at(xy)
         r = 1.7 * metre
         draw.ellipse((x - r, y - r, x + r, y + r), fill=(126, 168, 104))
-    _draw_lines(draw, world, at, scale)
+    # A tile's lines use lanes of other tiles, too.
+    lanes = world.lanes
+    for line in world.transit.lines:
+        for there, names in groupby(line.lanes, lambda name: name in lanes.index):
+            points = [at(p) for name in names if there for p in lanes.line(lanes.index[name]).tolist()]
+            if len(points) > 1:
+                draw.line(points, fill=line.colour, width=2 * scale, joint="curve")
     _street_names(image, world, at, metre, scale)
     draw = ImageDraw.Draw(image)
     for place in sorted(world.places, key=lambda p: list(_MARKS).index(p.category)):
@@ -236,18 +242,6 @@ def map_picture(world: World) -> Image.Image:
     canvas.paste(image, (0, 0))
     _legend(ImageDraw.Draw(canvas), world)
     return canvas
-
-
-def _draw_lines(
-    draw: ImageDraw.ImageDraw, world: World, at: Callable[[Sequence[float]], tuple[float, float]], scale: int
-) -> None:
-    """Bus lines along the lanes they use; of a tile's lines those lanes alone that it has."""
-    lanes = world.lanes
-    for line in world.transit.lines:
-        for there, names in groupby(line.lanes, lambda name: name in lanes.index):
-            points = [at(p) for name in names if there for p in lanes.line(lanes.index[name]).tolist()]
-            if len(points) > 1:
-                draw.line(points, fill=line.colour, width=2 * scale, joint="curve")
 
 
 def _street_names(

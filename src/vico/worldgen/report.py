@@ -68,7 +68,11 @@ def report_page(world: World) -> str:
     parts.append("<h2>What is there</h2>" + figures(manifest.counts))
     parts.append("<h2>Places by type</h2>" + _bars(manifest.places_by_type.items(), unit=""))
     parts.append("<h2>What was left out or mended, and why</h2>" + omissions(manifest.stages))
-    parts.append("<h2>Stage by stage</h2>" + _stage_table(manifest.stages))
+    stages = [
+        (_label(s.name), "; ".join(f"{_label(name)} {number:,}" for name, number in s.counts.items()))
+        for s in manifest.stages
+    ]
+    parts.append("<h2>Stage by stage</h2>" + _table(("stage", "made"), stages))
     parts.append("<h2>Seconds a stage</h2>" + _bars(seconds.items(), unit=" s"))
     rows = [
         (
@@ -134,13 +138,6 @@ def _mending(reason: str) -> str:
     if "not in the file" not in reason:
         return ""
     return "; to have it whole, clip anew with whole relations (osmium extract -s smart), or take a larger extract"
-
-
-def _stage_table(stages: Sequence[StageReport]) -> str:
-    rows = [
-        (_label(s.name), "; ".join(f"{_label(name)} {number:,}" for name, number in s.counts.items())) for s in stages
-    ]
-    return _table(("stage", "made"), rows)
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

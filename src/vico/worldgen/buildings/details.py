@@ -327,7 +327,9 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
     for size, at in zip(random.uniform(2.2, 6.5, (4, 2)), random.random((4, 2)), strict=True):
         if len(made) >= min(int(part.polygon.area / 700.0) + 1, 4):
             break
-        box = _box(_spot(room, at), size, _box_direction(part.polygon))
+        west, south, east, north = room.bounds
+        middle = np.array([west + (east - west) * at[0], south + (north - south) * at[1]])
+        box = _box(middle, size, _box_direction(part.polygon))
         if free.contains(overlay.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
             made.append(_solid(box, part.eaves - 0.2, part.eaves + float(random.uniform(1.6, 3.0)), "penthouse"))
     return made
@@ -335,11 +337,6 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
 
 def _solid(polygon: Polygon, low: float, high: float, finish: str) -> PartPlan:
     return PartPlan(polygon, low, high, 0, Roof("flat", 0.0), {}, finish)
-
-
-def _spot(room: Polygon, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    west, south, east, north = room.bounds
-    return np.array([west + (east - west) * at[0], south + (north - south) * at[1]])
 
 
 def _box_direction(polygon: Polygon) -> float:

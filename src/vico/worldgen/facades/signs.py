@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 from vico.world.mesh import Material
 from vico.world.model import Place
 from vico.worldgen.facades.facade_styles import styles
-from vico.worldgen.facades.records import BoardColours, Rgb, SignTrade
+from vico.worldgen.facades.records import BoardColours, Rgb
 
 _INSTEAD = {
     "’": "'", "‘": "'", "`": "'", "´": "'", "“": '"', "”": '"', "„": '"', "«": '"', "»": '"', "–": "-", "—": "-",
@@ -279,17 +279,13 @@ class Boards:
     by_lettering: dict[Lettering, Board] = field(default_factory=dict)
 
 
-def trade_of(place: Place) -> SignTrade:
-    """Return what kind of sign suits a place: by its kind, else by its category, else the last."""
+def colours_of(place: Place) -> BoardColours:
+    """Return the colours of a place's board: of a chain the same everywhere, since they hang on the name alone."""
+    # The sign that suits a place goes by its kind, else by its category, else it is the last.
     trades = list(styles().trades.values())
     of_kind = [trade for trade in trades if place.kind in trade.kinds]
     of_category = [trade for trade in trades if trade.category == place.category]
-    return (of_kind or of_category or trades)[-1]
-
-
-def colours_of(place: Place) -> BoardColours:
-    """Return the colours of a place's board: of a chain the same everywhere, since they hang on the name alone."""
-    boards = trade_of(place).boards
+    boards = (of_kind or of_category or trades)[-1].boards
     return boards[zlib.crc32(place.name.encode()) % len(boards)]
 
 
@@ -305,16 +301,12 @@ def board_text(place: Place) -> str | None:
         if len(text) > 22 and cut in text[3:]:
             text = text[: text.index(cut, 3)]
     if len(text) > _LONGEST_TEXT:
-        text = _cut_at_a_word(text)
+        # Keep as many first words as a board has room for; none ends in "of", "und" or "&".
+        words = text.split()
+        while len(words) > 1 and (len(" ".join(words)) > _LONGEST_TEXT or len(words[-1]) <= 3):
+            words.pop()
+        text = " ".join(words)
     return text.upper() if zlib.crc32(b"case" + place.name.encode()) % 3 == 0 else text
-
-
-def _cut_at_a_word(text: str) -> str:
-    """Return a name's first words, as many as a board has room for: it doesn't end in "of", "und" or "&"."""
-    words = text.split()
-    while len(words) > 1 and (len(" ".join(words)) > _LONGEST_TEXT or len(words[-1]) <= 3):
-        words.pop()
-    return " ".join(words)
 
 
 def paint_boards(places: Sequence[Place], plates: Iterable[Lettering] = ()) -> Boards:

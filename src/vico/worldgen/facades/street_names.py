@@ -132,13 +132,6 @@ def name_plates(streets: Streets, buildings: Sequence[Building], ground: GroundF
     return []
 
 
-def _lettering(name: str, plates: Plates) -> Lettering | None:
-    text = drawable_text(name.split(";")[0])
-    if text is None or len(text) > _MOST_CHARACTERS:
-        return None
-    return Lettering(text, plates.ground, plates.letters, plates.rim, shines=False)
-
-
 def _corners(roads: Roads) -> dict[tuple[float, float], list[tuple[Road, tuple[float, float]]]]:
     """Return where streets of different names meet: the roads there, and the way each leads from it."""
     ends: dict[tuple[float, float], list[tuple[Road, tuple[float, float]]]] = {}
@@ -165,11 +158,12 @@ def _way(line: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
 
 def _arms(streets: Streets) -> Iterator[tuple[tuple[float, float], Road, tuple[float, float], Lettering]]:
     """Yield the arms of all corners, of each name once a direction, in a fixed order."""
+    plates = streets.plates
     for point, here in sorted(_corners(streets.roads).items(), key=lambda one: one[0]):
         for road, way in sorted(here, key=lambda one: (one[0].name or "", one[1])):
-            lettering = _lettering(road.name or "", streets.plates)
-            if lettering is not None:
-                yield point, road, way, lettering
+            text = drawable_text((road.name or "").split(";")[0])
+            if text is not None and len(text) <= _MOST_CHARACTERS:
+                yield point, road, way, Lettering(text, plates.ground, plates.letters, plates.rim, shines=False)
 
 
 def _on_walls(streets: Streets, buildings: Sequence[Building], ground: GroundFloors) -> list[NamePlate]:

@@ -104,7 +104,10 @@ def _settled(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineStr
         The part, and the indices in `near` of what carries it.
     """
     under = [j for j, other in enumerate(near) if other.low < part.low - 0.3 and other.top > part.low - _GAP]
-    resting = _common_area(part.polygon, [near[j].polygon for j in under])
+    others = [near[j].polygon for j in under]
+    resting = 0.0
+    if others:
+        resting = float(overlay.common_area(overlay.union_all(others, grid=0.001), part.polygon))
     if resting >= _RESTING * part.polygon.area:
         tops = [
             near[j].eaves
@@ -136,12 +139,6 @@ def _extend_to_ground(parts: list[PartPlan]) -> list[PartPlan]:
     if not 0.0 < low < _HEADROOM:
         return parts
     return [replace(part, low=0.0) if part.low == low and part.levels else part for part in parts]
-
-
-def _common_area(polygon: Polygon, others: list[Polygon]) -> float:
-    if not others:
-        return 0.0
-    return float(overlay.common_area(overlay.union_all(others, grid=0.001), polygon))
 
 
 def _carries(lower: PartPlan, upper: PartPlan) -> bool:
@@ -370,13 +367,6 @@ def _reason_to_skip(area: OsmArea) -> str | None:
     return None
 
 
-def _shop_points(osm: OsmData) -> NDArray[np.float64]:
-    """Where shops, restaurants and services are mapped as points."""
-    trade = {"restaurant", "cafe", "bar", "pub", "fast_food", "bank", "pharmacy", "ice_cream", "cinema", "theatre"}
-    points = [n.xy for n in osm.nodes if "shop" in n.tags or n.tags.get("amenity") in trade]
-    return np.array(points).reshape(-1, 2)
-
-
 def building_plans(
     osm: OsmData,
     *,
@@ -412,7 +402,10 @@ def building_plans(
     owned = _owners(outlines, parts, dropped)
     parts, owner = [parts[k] for k in owned], list(owned.values())
     shapes = [row[1] for row in outlines]
-    points = _shop_points(osm)
+    # Shops, restaurants and services are mapped as points, too.
+    trade = {"restaurant", "cafe", "bar", "pub", "fast_food", "bank", "pharmacy", "ice_cream", "cinema", "theatre"}
+    trading = [n.xy for n in osm.nodes if "shop" in n.tags or n.tags.get("amenity") in trade]
+    points = np.array(trading).reshape(-1, 2)
     shops = np.zeros(len(outlines), int)
     if len(points) and shapes:
         hits = shapely.STRtree(shapes).query(shapely.points(points), predicate="dwithin", distance=1.5)

@@ -114,12 +114,6 @@ class StreetLevels:
     passages: list[Passage]
 
 
-def street_levels(osm: OsmData) -> StreetLevels:
-    """Decide which ways of a map pass above a street."""
-    above = overpasses(osm)
-    return StreetLevels(above, passages(osm, above))
-
-
 def ways_over_or_under(way: OsmWay, others: list[OsmWay], tree: shapely.STRtree) -> list[tuple[OsmWay, shapely.Point]]:
     """Ways among `others` (the tree's lines, in order) that a way passes over or under, each with the place."""
     line = shapely.LineString(way.line)
@@ -311,4 +305,5 @@ class SiteFacts:
 
 def site_facts(osm: OsmData, waters: list[WaterBody] | None = None) -> SiteFacts:
     """Read the facts of a site off its map; see `SiteFacts` for its waters."""
-    return SiteFacts(osm, street_levels(osm), keeps_left(osm), named_places(osm), waters)
+    above = overpasses(osm)
+    return SiteFacts(osm, StreetLevels(above, passages(osm, above)), keeps_left(osm), named_places(osm), waters)

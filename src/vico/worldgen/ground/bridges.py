@@ -394,7 +394,8 @@ def _draw_deck(
     for end, at in ((0, deck.ends[0]), (len(line) - 1, deck.ends[1])):
         if at and z[end] - terrain(line[end]) > 0.3:
             _abutment(stone, a[end], b[end], float(z[end]), float(min(ground_a[end], ground_b[end])), end > 0)
-    _piers(stone, deck, left, terrain, keep_clear, reach)
+    for pier, bottom, head in pier_boxes(deck, left, terrain, keep_clear, reach):
+        stone.box(pier, bottom, head, "kerb", (178, 175, 170))
 
 
 def _road_top(stone: QuadMeshBuilder, deck: Deck, ends: tuple[int, int], left: Floats, driven: BaseGeometry) -> None:
@@ -503,13 +504,6 @@ def _abutment(stone: QuadMeshBuilder, a: Floats, b: Floats, top: float, ground: 
     """Build a wall across the free end of a deck."""
     corner = [np.r_[b, ground - 0.3], np.r_[a, ground - 0.3], np.r_[a, top], np.r_[b, top]]
     stone.add(corner if far else corner[::-1], "quay")
-
-
-def _piers(
-    stone: QuadMeshBuilder, deck: Deck, left: Floats, terrain: HeightField, keep_clear: BaseGeometry, reach: float
-) -> None:
-    for foot, low, high in pier_boxes(deck, left, terrain, keep_clear, reach):
-        stone.box(foot, low, high, "kerb", (178, 175, 170))
 
 
 def _draw_rails(stone: QuadMeshBuilder, site: SiteFacts, terrain: HeightField, window: Polygon) -> None:

@@ -246,21 +246,6 @@ def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -
     return frozenset(found)
 
 
-def deck_surfaces(decks: Sequence[Deck], bores: Sequence[Bore]) -> Decks | None:
-    """Return usable decks and tunnels as surfaces of the world; None if there are none."""
-    strips: list[tuple[NDArray[np.float64], float, float, float]] = []
-    for deck in decks:
-        if "highway" in deck.way.tags:
-            kind, half = deck.way.tags["highway"], deck.width / 2
-            pavement = 0.0 if kind in ON_FOOT else half - deck_sidewalk_width(deck.way.tags)
-            rise = 0.0 if kind == "steps" else KERB
-            strips.append((np.c_[deck.line, deck.z], half, pavement if kind != "steps" else half, rise))
-    for bore in bores:
-        pavement = 0.0 if bore.on_foot else bore.width / 2 - bore.walk
-        strips.append((np.c_[bore.line, bore.z], bore.width / 2, pavement, KERB))
-    return Decks.of(strips) if strips else None
-
-
 def low_parts(decks: Sequence[Deck], terrain: HeightField) -> list[Polygon]:
     """Return where decks lie too low for people to pass under them, and too high to be the ground, metres."""
     found: list[Polygon] = []
@@ -353,7 +338,18 @@ class Bridges:
 
     def levels(self) -> Decks | None:
         """Return the decks and tunnels that can be used as surfaces of the world; None if there are none."""
-        return deck_surfaces([deck for deck in self.decks if deck.way.id in self.usable], self.bores)
+        decks = [deck for deck in self.decks if deck.way.id in self.usable]
+        strips: list[tuple[NDArray[np.float64], float, float, float]] = []
+        for deck in decks:
+            if "highway" in deck.way.tags:
+                kind, half = deck.way.tags["highway"], deck.width / 2
+                pavement = 0.0 if kind in ON_FOOT else half - deck_sidewalk_width(deck.way.tags)
+                rise = 0.0 if kind == "steps" else KERB
+                strips.append((np.c_[deck.line, deck.z], half, pavement if kind != "steps" else half, rise))
+        for bore in self.bores:
+            pavement = 0.0 if bore.on_foot else bore.width / 2 - bore.walk
+            strips.append((np.c_[bore.line, bore.z], bore.width / 2, pavement, KERB))
+        return Decks.of(strips) if strips else None
 
     def surfaces(
         self, site: SiteFacts, terrain: HeightField, streets: StreetPolygons, window: Polygon

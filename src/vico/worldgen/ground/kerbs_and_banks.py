@@ -147,12 +147,6 @@ def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:
     return shapely.MultiLineString(lines)
 
 
-def lower_side(streets: StreetPolygons, waters: Sequence[Polygon]) -> BaseGeometry:
-    """Return what lies below its surroundings, carriageways and water: its outline is where kerbs and banks are."""
-    shapes = [streets.carriageway, *overlay.on_grid(np.array(list(waters), object), grid=_GRID)]
-    return overlay.union_all(shapes, grid=_GRID)
-
-
 def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[Water], *, cell: float) -> Steps | None:
     """Lay kerbs and banks on a field.
 
@@ -177,7 +171,9 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     half = smooth.half
     n = round(2 * half / cell) + 1
     cell = 2 * half / (n - 1)
-    region = lower_side(streets, [water.polygon for water in waters])
+    # Carriageways and water lie below their surroundings: their outline is where kerbs and banks are.
+    water = overlay.on_grid(np.array([water.polygon for water in waters], object), grid=_GRID)
+    region = overlay.union_all([streets.carriageway, *water], grid=_GRID)
     inside = nodes_in_polygons(polygons_of(region), n, half, cell)
     near = _near(region, n, half, cell, EDGE_RANGE)
     edge = np.where(inside, -near, near)

@@ -293,7 +293,7 @@ def road_markings(
     bays: list[NDArray[np.float64]] = []
     for shape in streets.parking.geoms:
         with drop_on_failure(_name_at("car park", shape)):
-            bays += _car_park(shape)
+            bays += [quad for row in lot_rows(shape) for line in row for quad in ribbon(line, 0.0, 0.1)]
     groups = [
         Quads(clip_quads(lanes if habits.cycle_lane else [], window), habits.cycle_lane or _PAINT, rank=0),
         Quads(clip_quads(zebra + dashes + edges, window), _PAINT),
@@ -531,11 +531,6 @@ def _kerbside_of(
                 lanes += ribbon(path, 0.0, _CYCLE_WIDTH)
                 edges += ribbon(path, -side * (_CYCLE_WIDTH / 2), thick)
     return lanes, edges
-
-
-def _car_park(shape: Polygon) -> list[NDArray[np.float64]]:
-    """Lines between the bays of a car park."""
-    return [quad for row in lot_rows(shape) for line in row for quad in ribbon(line, 0.0, 0.1)]
 
 
 def _lane_lines(street: Street) -> list[tuple[float, bool]]:

@@ -463,7 +463,9 @@ def _surface(
 
 def _draped_surface(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightField) -> Surface:
     """Lay a piece of the plan on its heights."""
-    flat, faces = _compact_vertices(plan.corners, plan.triangles[plan.piece == number])
+    # Points that no triangle of the piece uses are left out.
+    kept, index = np.unique(plan.triangles[plan.piece == number], return_inverse=True)
+    flat, faces = plan.corners[kept], index.reshape(-1, 3)
     z = piece.heights(flat)
     if piece.water >= 0:
         up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
@@ -479,14 +481,6 @@ def _draped_surface(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightF
     uv = np.stack([np.where(east, flat[corner, 0], flat[corner, 1]), z[corner]], axis=1)
     own = np.arange(len(corner)).reshape(-1, 3)
     return _surface(flat[corner], z[corner], normals[corner], own, piece.look, uv)
-
-
-def _compact_vertices(
-    flat: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Keep the points that triangles use, numbered anew."""
-    kept, index = np.unique(faces, return_inverse=True)
-    return flat[kept], index.reshape(-1, 3)
 
 
 def _kerbs(

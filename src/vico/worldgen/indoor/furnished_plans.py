@@ -220,7 +220,11 @@ def furnish_sketch(sketch: Sketch, chance: np.random.Generator, variant: int = 0
         elif room.kind == "lift":
             items = [Furnishing("lift_panel", *_lift_panel(draft))]
         else:
-            items = _furniture(draft, kind)
+            if kind.composition is not None:
+                kind.composition(draft)
+            else:
+                furnish_room(draft, kind.entry.furniture, room_kinds().names)
+            items = draft.items
         dress = small_things_for_room(room.kind, items, chance) if room.kind not in UNFURNISHED else SmallThings((), {})
         spots = _spots(room, draft, items, dress) if room.kind not in UNFURNISHED else ()
         rooms.append(
@@ -243,15 +247,6 @@ def furnish_sketch(sketch: Sketch, chance: np.random.Generator, variant: int = 0
         )
         insides.append(_inside(i, room, kind, (cx, cy, z), size, mine, windows, variant))
     return FloorPlan(sketch.use, tuple(rooms), sketch.size, round(sketch.height, 3), tuple(shell(insides)))
-
-
-def _furniture(draft: RoomDraft, kind: RoomKind) -> list[Furnishing]:
-    """Furnish a room by its kind."""
-    if kind.composition is not None:
-        kind.composition(draft)
-    else:
-        furnish_room(draft, kind.entry.furniture, room_kinds().names)
-    return draft.items
 
 
 def _inner(room: SketchRoom) -> tuple[float, float, float, float]:

@@ -209,14 +209,10 @@ def _well_formed(text: str | bytes, where: str) -> Layout:
 
 def findings_of(layout: Layout) -> list[str]:
     """Return what keeps a layout from being built, one sentence each, by field; empty if nothing does."""
-    wrong = _plan_findings(layout)
-    return wrong or _furniture_findings(layout)
-
-
-def _plan_findings(layout: Layout) -> list[str]:
-    """Check the plan without its furniture; doors are looked at once the rooms are right."""
+    # Doors are looked at once the rooms are right, furniture once the plan is.
     wrong = [*_purpose_findings(layout), *_rooms_findings(layout)]
-    return wrong or [*_doors_findings(layout), *_ways_out_findings(layout), *_unreachable_rooms(layout)]
+    wrong = wrong or [*_doors_findings(layout), *_ways_out_findings(layout), *_unreachable_rooms(layout)]
+    return wrong or _furniture_findings(layout)
 
 
 def _purpose_findings(layout: Layout) -> Iterator[str]:
@@ -230,28 +226,16 @@ def _rooms_findings(layout: Layout) -> Iterator[str]:
     for k, room in enumerate(layout.rooms):
         here = f"rooms.{k} ({room.id})"
         before = layout.rooms[:k]
-        yield from _id_findings(here, room, before)
-        yield from _kind_findings(here, room)
-        yield from _size_findings(here, room)
+        if room.id == "outside" or any(room.id == other.id for other in before):
+            yield f"{here}.id: ids have to differ, and none may be 'outside'"
+        known = _room_kinds()
+        if room.kind not in known and room.furniture is None:
+            yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(known)}"
+        x0, y0, x1, y1 = room.rect
+        if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
+            yield f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least"
         yield from _extent_findings(here, room, layout.size)
         yield from _overlap_findings(here, room, before)
-
-
-def _id_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> Iterator[str]:
-    if room.id == "outside" or any(room.id == other.id for other in before):
-        yield f"{here}.id: ids have to differ, and none may be 'outside'"
-
-
-def _kind_findings(here: str, room: LayoutRoom) -> Iterator[str]:
-    known = _room_kinds()
-    if room.kind not in known and room.furniture is None:
-        yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(known)}"
-
-
-def _size_findings(here: str, room: LayoutRoom) -> Iterator[str]:
-    x0, y0, x1, y1 = room.rect
-    if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
-        yield f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least"
 
 
 def _extent_findings(here: str, room: LayoutRoom, size: Sequence[float]) -> Iterator[str]:

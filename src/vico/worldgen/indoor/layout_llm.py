@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.errors import LlmBudgetError, LlmReplyError, SourceError
-from vico.llm import LanguageModel, Message, system, user
+from vico.llm import LanguageModel, system, user
 from vico.world.heights import HeightField
 from vico.world.model import Building, Dropped, Entrance, Place
 from vico.worldgen.indoor.layout_library import Layout, LayoutRequest, layout_guide, layout_problems, layout_schema
@@ -140,8 +140,23 @@ class LlmLayoutAuthor:
         if self._over is not None:
             return None, self._over
         try:
+            place = {
+                "name": request.name[:120],
+                "kind": request.kind[:60],
+                "category": request.category,
+                "use": request.use,
+                "largest size": list(request.size),
+            }
+            question = (
+                f"The place, as map data describe it:\n{json.dumps(place, ensure_ascii=False)}\n"
+                "Draw its floor plan: what would one find behind a door with this name? Fill about the largest size if "
+                "a place of this kind needs it, less if not."
+            )
             reply = self.model.ask(
-                _messages(request), Layout, check=lambda layout: _faults(layout, request), rounds=self.rounds
+                [system(_briefing()), user(question)],
+                Layout,
+                check=lambda layout: _faults(layout, request),
+                rounds=self.rounds,
             )
         except LlmReplyError as error:
             self._answered()
@@ -242,24 +257,6 @@ def _faults(layout: Layout, request: LayoutRequest) -> list[str]:
     if layout.use != request.use or layout.category is not None:
         wrong.insert(0, f"use: it has to be {request.use!r}, and category null")
     return wrong
-
-
-def _messages(request: LayoutRequest) -> list[Message]:
-    place = {
-        "name": request.name[:120],
-        "kind": request.kind[:60],
-        "category": request.category,
-        "use": request.use,
-        "largest size": list(request.size),
-    }
-    return [
-        system(_briefing()),
-        user(
-            f"The place, as map data describe it:\n{json.dumps(place, ensure_ascii=False)}\n"
-            "Draw its floor plan: what would one find behind a door with this name? Fill about the largest size if a "
-            "place of this kind needs it, less if not."
-        ),
-    ]
 
 
 def _briefing() -> str:

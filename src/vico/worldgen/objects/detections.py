@@ -352,7 +352,10 @@ def _of_class(
             continue
         side = lateral_offsets(rays, members, xy)
         spread = round(float(np.sqrt((side**2).mean())), 3)
-        spots.append(_located_thing(sightings, members, name, xy, spread, "triangulated"))
+        taken = [sightings[k] for k in sorted(members)]
+        score = round(sum(one.score for one in taken) / len(taken), 3)
+        photos = tuple(one.photo for one in taken)
+        spots.append(LocatedThing(taken[0].id, name, np.round(xy, 3), photos, score, spread, "triangulated"))
     for k in alone:
         spot, reason = _alone(sightings[k], rays, k, raised, name, rules)
         if spot is not None and any(math.dist(spot.xy, other.xy) < rules.apart for other in spots):
@@ -362,14 +365,6 @@ def _of_class(
         else:
             spots.append(spot)
     return spots, dropped
-
-
-def _located_thing(
-    sightings: Sequence[Sighting], members: Sequence[int], name: str, xy: Floats, spread: float | None, how: str
-) -> LocatedThing:
-    taken = [sightings[k] for k in sorted(members)]
-    score = round(sum(one.score for one in taken) / len(taken), 3)
-    return LocatedThing(taken[0].id, name, np.round(xy, 3), tuple(one.photo for one in taken), score, spread, how)
 
 
 def _alone(one: Sighting, rays: Rays, k: int, raised: bool, name: str, rules: Rules) -> tuple[LocatedThing | None, str]:

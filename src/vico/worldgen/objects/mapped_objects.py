@@ -265,19 +265,15 @@ def gate_yaws(osm: OsmData) -> dict[int, float]:
 def mapped_placements(osm: OsmData, height: HeightField, seed: int) -> list[Placement]:
     """Wish for everything that is mapped as a point or as a row of trees."""
     zone = planting(osm, height)
-    return [*_point_placements(osm, seed, zone, region(osm)), *row_placements(osm, seed, zone)]
-
-
-def _point_placements(osm: OsmData, seed: int, zone: str, where: str) -> list[Placement]:
-    """Wish for what is mapped as points."""
-    found: list[Placement] = []
+    where = region(osm)
+    points: list[Placement] = []
     gates = gate_yaws(osm)
     for node in osm.nodes:
         with drop_on_failure(f"n{node.id}"):
             wish = _point_placement(node, seed, zone, where, gates.get(node.id))
             if wish is not None:
-                found.append(wish)
-    return found
+                points.append(wish)
+    return [*points, *row_placements(osm, seed, zone)]
 
 
 def _point_placement(node: OsmNode, seed: int, zone: str, where: str, gate: float | None) -> Placement | None:

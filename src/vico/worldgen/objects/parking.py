@@ -115,7 +115,12 @@ def parking_from_osm(
     found = [*_kerb_candidates(osm, streets, site.left_driving), *_lot_candidates(osm, streets)]
     if not found:
         return Parking(Objects.from_rows([]), [])
-    feet = _feet(found)
+    # The ground that a car in each bay may take is shorter and narrower than the bay.
+    less = {"kerb": (0.3, -0.1), "across": (0.1, 0.1), "lot": (0.3, 0.1)}  # along the kerb mirrors stick out
+    sizes = [(one.bay.length - less[one.kind][0], one.bay.width - less[one.kind][1]) for one in found]
+    feet = np.asarray(
+        shapely.polygons([_rectangle(one.bay, *size) for one, size in zip(found, sizes, strict=True)]), object
+    )
     keep = _standing(found, feet, streets, osm.half) & _on_level_ground(found, height)
     keep &= _clear(feet, _kept_free(osm, streets, lanes, transit, solids, objects))
     chosen = _apart(np.flatnonzero(keep), feet)
@@ -155,31 +160,27 @@ def _kerb_candidates(osm: OsmData, streets: StreetPolygons, left_driving: bool) 
         if raised or not shapely.intersects(window, shapely.LineString(street.line)):
             continue
         with drop_on_failure(f"w{street.way}"):
-            yield from _along_street(street, tags, breaks, left_driving)
-
-
-def _along_street(street: Street, tags: Tags, breaks: BaseGeometry, left_driving: bool) -> Iterator[_Candidate]:
-    turned = tags.get("oneway") == "-1"
-    depths = {"left": street.parking_left, "right": street.parking_right}
-    free = street.width - street.parking_left - street.parking_right
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        depth = depths[side]
-        mapped = {"left": "right", "right": "left"}[side] if turned else side
-        if not depth:
-            if not _by_habit(street, _parking_tag(tags, mapped), free):
-                continue
-            depth = _HABIT_DEPTH
-            free -= depth
-        elif _for_loading(tags, mapped):
-            continue
-        against = not street.oneway and (side == "right" if left_driving else side == "left")
-        kind = "across" if is_perpendicular_parking(street, depth) else "kerb"
-        for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
-            if shapely.dwithin(breaks, shapely.Polygon(_rectangle(bay, bay.length, bay.width)), _JUNCTION):
-                continue
-            turn = math.pi if against and kind == "kerb" else 0.0
-            bay = bay._replace(yaw=math.remainder(bay.yaw + turn, 2 * math.pi))
-            yield _Candidate(f"w{street.way}.{side}.{k}", f"w{street.way}.{side}", kind, bay)
+            turned = tags.get("oneway") == "-1"
+            depths = {"left": street.parking_left, "right": street.parking_right}
+            free = street.width - street.parking_left - street.parking_right
+            for side, sign in (("left", 1.0), ("right", -1.0)):
+                depth = depths[side]
+                mapped = {"left": "right", "right": "left"}[side] if turned else side
+                if not depth:
+                    if not _by_habit(street, _parking_tag(tags, mapped), free):
+                        continue
+                    depth = _HABIT_DEPTH
+                    free -= depth
+                elif _for_loading(tags, mapped):
+                    continue
+                against = not street.oneway and (side == "right" if left_driving else side == "left")
+                kind = "across" if is_perpendicular_parking(street, depth) else "kerb"
+                for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
+                    if shapely.dwithin(breaks, shapely.Polygon(_rectangle(bay, bay.length, bay.width)), _JUNCTION):
+                        continue
+                    turn = math.pi if against and kind == "kerb" else 0.0
+                    bay = bay._replace(yaw=math.remainder(bay.yaw + turn, 2 * math.pi))
+                    yield _Candidate(f"w{street.way}.{side}.{k}", f"w{street.way}.{side}", kind, bay)
 
 
 def _by_habit(street: Street, said: str | None, free: float) -> bool:
@@ -209,15 +210,6 @@ def _rectangle(bay: Bay, length: float, width: float) -> NDArray[np.float64]:
     c, s = math.cos(bay.yaw), math.sin(bay.yaw)
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length / 2, width / 2)
     return np.asarray(bay.centre) + corners @ np.array([[c, s], [-s, c]])
-
-
-def _feet(found: Sequence[_Candidate]) -> NDArray[np.object_]:
-    """Ground that a car in each bay may take."""
-    less = {"kerb": (0.3, -0.1), "across": (0.1, 0.1), "lot": (0.3, 0.1)}  # along the kerb mirrors stick out
-    sizes = [(one.bay.length - less[one.kind][0], one.bay.width - less[one.kind][1]) for one in found]
-    return np.asarray(
-        shapely.polygons([_rectangle(one.bay, *size) for one, size in zip(found, sizes, strict=True)]), object
-    )
 
 
 def _standing(

@@ -266,7 +266,12 @@ def bake(
     shares = coverage(coarse)
     pieces = coarse.pieces
     expected = _expectations(coarse, offsets, cage)
-    by_entity = _entity_coverage(coarse)
+    known: dict[int, int] = {}
+    inside: dict[int, int] = {}
+    for chart in coarse.charts:
+        known[chart.entity] = known.get(chart.entity, 0) + int(np.count_nonzero(coarse.known[chart.page][chart.box]))
+        inside[chart.entity] = inside.get(chart.entity, 0) + int(np.count_nonzero(coarse.inside[chart.page][chart.box]))
+    by_entity = {entity: known[entity] / max(inside[entity], 1) for entity in sorted(known)}
     patches = np.array([chart.patch for chart in coarse.charts], np.int64)
     wanted = np.zeros(pieces, np.bool_)
     wanted[patches[(shares >= least) & (shares > 0)]] = True
@@ -497,12 +502,3 @@ def _expectations(atlas: Atlas, offsets: Sequence[NDArray[np.float32]], cage: fl
         expected.luminance[k] = np.median(0.299 * r + 0.587 * g + 0.114 * b)
         expected.green[k] = np.median(2 * g - r - b)
     return expected
-
-
-def _entity_coverage(atlas: Atlas) -> dict[int, float]:
-    known: dict[int, int] = {}
-    inside: dict[int, int] = {}
-    for chart in atlas.charts:
-        known[chart.entity] = known.get(chart.entity, 0) + int(np.count_nonzero(atlas.known[chart.page][chart.box]))
-        inside[chart.entity] = inside.get(chart.entity, 0) + int(np.count_nonzero(atlas.inside[chart.page][chart.box]))
-    return {entity: known[entity] / max(inside[entity], 1) for entity in sorted(known)}

@@ -193,7 +193,16 @@ class StreetAddresses:
     @cached_property
     def addresses(self) -> dict[str, str]:
         """Street and number by building: its own tags, else the address points in it."""
-        return _addresses(self._finder)
+        finder = self._finder
+        found: dict[str, str] = {}
+        for building in finder.buildings:
+            if text := _address(finder.tags_of(building)):
+                found[building.id] = text
+        for node in finder.osm.nodes:
+            text = _address(node.tags)
+            if text and (at := finder.building_at(node.xy, 1.5)) is not None:
+                found.setdefault(finder.buildings[at].id, text)
+        return found
 
     def nearest(self, xy: Sequence[float]) -> str | None:
         """Name of the street nearest to a point, None where no street has one."""
@@ -217,19 +226,6 @@ def unused_name(name: str, used: set[str]) -> str:
     chosen = next(candidate for candidate in candidates if candidate not in used)
     used.add(chosen)
     return chosen
-
-
-def _addresses(finder: DoorFinder) -> dict[str, str]:
-    """Street and number by building: its own tags, else the address points in it."""
-    found: dict[str, str] = {}
-    for building in finder.buildings:
-        if text := _address(finder.tags_of(building)):
-            found[building.id] = text
-    for node in finder.osm.nodes:
-        text = _address(node.tags)
-        if text and (at := finder.building_at(node.xy, 1.5)) is not None:
-            found.setdefault(finder.buildings[at].id, text)
-    return found
 
 
 def _address(tags: Tags) -> str | None:

@@ -318,17 +318,13 @@ class NetworkCutter:
         found = kept
         while found:
             links = (link for link in self._leaving(found) if link.get("to") in kept and link.get("via"))
-            found = {_edge(str(link.get("via"))) for link in links} - inside
+            found = {str(link.get("via")).rpartition("_")[0] for link in links} - inside
             inside |= found
         return inside | {edge for junction in known for edge in self._walked.get(str(junction), ())}
 
     def _leaving(self, edges: Iterable[Any]) -> list[Element]:
         """Return the connections that leave some edges, in the order of the file."""
         return [self._of("connection")[k] for k in sorted(k for name in edges for k in self._links_from.get(name, ()))]
-
-
-def _edge(lane: str) -> str:
-    return lane.rpartition("_")[0]
 
 
 def _box(edge: Element) -> tuple[float, float, float, float]:

@@ -174,15 +174,7 @@ def _join(chain: list[str], paths: dict[str, _Path]) -> None:
     t = np.linspace(0.0, 1.0, math.ceil((1.7 * bends + 0.4) / _PIECE) + 2)[:, None]
     curve = (1 - t) ** 3 * whole[0] + 3 * t * (1 - t) ** 2 * handles[0]
     curve += 3 * t**2 * (1 - t) * handles[1] + t**3 * whole[-1]
-    _share_out(curve, inner)
-
-
-def _unit(heading: float) -> Floats:
-    return np.array([math.cos(heading), math.sin(heading)])
-
-
-def _share_out(curve: Floats, inner: list[_Path]) -> None:
-    """Give the lanes of a way through a junction their parts of a curve, as long as they were."""
+    # Each lane gets its part of the curve, as long as it was.
     sizes = np.array([np.hypot(*np.diff(path.line, axis=0).T).sum() for path in inner])
     along = arc_lengths(curve)
     marks = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum() * along[-1]
@@ -190,6 +182,10 @@ def _share_out(curve: Floats, inner: list[_Path]) -> None:
         at = np.concatenate([[low], along[(along > low + 0.05) & (along < high - 0.05)], [high]])
         path.line = points_along(curve, at, along)
         path.changed = True
+
+
+def _unit(heading: float) -> Floats:
+    return np.array([math.cos(heading), math.sin(heading)])
 
 
 def _with_heights(line: Floats, heights: Floats) -> Floats:

@@ -102,7 +102,13 @@ def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes
         number = str(next(fresh)) if name in used else name
         used.add(number)
         ways[turn.junction].append(_way(turn, number, streets))
-        connections[turn.junction].append(_connection(turn, number, len(connections[turn.junction])))
+        own = connections[turn.junction]
+        connection = Element(
+            "connection", id=str(len(own)), incomingRoad=turn.before, connectingRoad=number, contactPoint="start"
+        )
+        for at, (one, _, _) in enumerate(turn.lanes):
+            connection.append(Element("laneLink", {"from": str(one), "to": str(-1 - at)}))
+        own.append(connection)
     _write_streets(streets, turns)
     for junction in root.findall("junction"):
         junction[:] = connections[str(junction.get("id"))]
@@ -318,13 +324,6 @@ def _blend(start: float, end: float, length: float) -> dict[str, str]:
     """Return the polynomial that goes smoothly from one value to another along a road."""
     c, d = 3 * (end - start) / length**2, -2 * (end - start) / length**3
     return {"a": f"{start:.3f}", "b": "0", "c": f"{c:.12g}", "d": f"{d:.12g}"}
-
-
-def _connection(turn: _Turn, number: str, k: int) -> Element:
-    connection = Element("connection", id=str(k), incomingRoad=turn.before, connectingRoad=number, contactPoint="start")
-    for at, (one, _, _) in enumerate(turn.lanes):
-        connection.append(Element("laneLink", {"from": str(one), "to": str(-1 - at)}))
-    return connection
 
 
 def _plan(plan: Element, curves: Sequence[Curve]) -> None:

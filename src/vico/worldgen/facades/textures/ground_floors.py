@@ -528,7 +528,10 @@ def paint_doors(random: np.random.Generator) -> NDArray[np.uint8]:
     _portal(canvas)
     _gate(canvas)
     for k in range(8):
-        _vitrine(canvas, k)
+        x, y = _corner(f"vitrine_{k}")
+        canvas.rect(x, y, x + 256, y + 256, (52, 50, 48))
+        show_window(canvas, x + 6, y + 6, x + 250, y + 250, kind=k % 4, lamp=0.95)
+        canvas.rect(x + 126, y + 6, x + 130, y + 250, (52, 50, 48))
     _plain_cells(canvas)
     return canvas.texture()
 
@@ -604,13 +607,6 @@ def _gate(canvas: Canvas) -> None:
         canvas.shade(x, y + k * 25.6, x + 256, y + k * 25.6 + 3, 0.7)
     canvas.shade(x, y + 246, x + 256, y + 256, 0.5)
     _handle(canvas, x + 126, y + 36, 6)
-
-
-def _vitrine(canvas: Canvas, k: int) -> None:
-    x, y = _corner(f"vitrine_{k}")
-    canvas.rect(x, y, x + 256, y + 256, (52, 50, 48))
-    show_window(canvas, x + 6, y + 6, x + 250, y + 250, kind=k % 4, lamp=0.95)
-    canvas.rect(x + 126, y + 6, x + 130, y + 250, (52, 50, 48))
 
 
 def _plain_cells(canvas: Canvas) -> None:

@@ -181,14 +181,6 @@ def flat_ground(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.zeros(np.asarray(xy).shape[:-1])
 
 
-def pose_on_terrain(image: StreetImage, ground: Ground) -> Pose:
-    """Return the pose a photo's metadata give, lifted on the terrain where its height is known above ground only."""
-    position = np.asarray(image.position, np.float64).copy()
-    if image.eye is not None:
-        position[2] = float(np.asarray(ground(position[None, :2])).ravel()[0]) + image.eye
-    return Pose(position, np.asarray(image.rotation, np.float64))
-
-
 def prepare_photo(
     image: StreetImage, photograph: Photographer, config: StreetviewConfig, ground: Ground
 ) -> tuple[PhotoOutcome, Shot | None]:
@@ -201,7 +193,11 @@ def prepare_photo(
     lens = image.intrinsics.copy()
     lens[0] *= size[0] / width
     lens[1] *= size[1] / height
-    metadata = pose_on_terrain(image, ground)
+    # Where metadata give the height above ground only, the pose is lifted on the terrain.
+    position = np.asarray(image.position, np.float64).copy()
+    if image.eye is not None:
+        position[2] = float(np.asarray(ground(position[None, :2])).ravel()[0]) + image.eye
+    metadata = Pose(position, np.asarray(image.rotation, np.float64))
     outcome = PhotoOutcome(image.id, image.source, image.attribution, used=False)
     pose = seen_from = metadata
     fit: PoseFit | None = None
