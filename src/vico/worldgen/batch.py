@@ -78,7 +78,7 @@ _THOUSANDS = re.compile(r"[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*(?![\d.,])")
 _UNIT_OF_HEADER = re.compile(r"(?<![^\W_])(km|ft|feet|mi)(?![^\W_])", re.IGNORECASE)
 # 52.1, 52,1°, N 52.1, 52°06'00.0"N
 _ANGLE = re.compile(
-    r"""([NSEW])?\s*([+-]?\d[\d.,]*)\s*°?(?:\s*(\d[\d.,]*)\s*['′’])?(?:\s*(\d[\d.,]*)\s*(?:"|″|”|''))?\s*([NSEW])?""",
+    r"""(?P<before>[NSEW])?\s*([+-]?\d[\d.,]*)\s*°?(?:\s*(\d[\d.,]*)\s*['′’])?(?:\s*(\d[\d.,]*)\s*(?:"|″|”|''))?\s*(?P<after>[NSEW])?""",
     re.IGNORECASE,
 )
 
@@ -236,7 +236,7 @@ def _degrees(text: str, what: str, letters: str) -> float:
     parts = [] if match is None else [decimal(part) for part in match.group(2, 3, 4) if part is not None]
     if match is None or None in parts:
         raise ValueError(f"{what} {text[:40]!r} is no number of degrees")
-    letter = (match[1] or match[5] or "").upper()
+    letter = (match["before"] or match["after"] or "").upper()
     if letter and letter not in letters:
         raise ValueError(f"{what} {text[:40]!r} is none; latitude and longitude look exchanged")
     value = sum(abs(part or 0.0) / 60.0**k for k, part in enumerate(parts))
@@ -440,7 +440,7 @@ def build_many(
     store = FolderStore(out) if isinstance(out, Path) else out
     outcomes: dict[int, Outcome] = {}
 
-    def done(index: int, answer: Answer) -> None:
+    def record(index: int, answer: Answer) -> None:
         name = rows[index].name
         content = answer.content or asdict(Outcome(name, "failed", reason=answer.reason))
         outcomes[index] = Outcome(**content)
@@ -452,7 +452,7 @@ def build_many(
     options = {"out": str(store), "locate": f"{locate.__module__}:{locate.__qualname__}", "force": force}
     with open_executor(workers=workers, ray=ray) as executor, shared_store_marker(store, executor) as seen:
         service = Service("vico.worldgen.batch:builder", {**options, "seen": seen})
-        executor.run(service, [Task(asdict(row)) for row in rows], done=done)
+        executor.run(service, [Task(asdict(row)) for row in rows], done=record)
     return [outcomes[index] for index in range(len(rows))]
 
 

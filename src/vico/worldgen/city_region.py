@@ -145,7 +145,7 @@ def divide_waters(request: CityRequest, region: RegionMap, ground: HeightField) 
     numbers would come than next to it.
     """
     stages = Stages(request.plans)
-    stages.given(region, region.key)
+    stages.register(region, region.key)
     bodies = stages.run("bodies", _bodies_of_water, region, ground)
     outlines = shapely.STRtree([body.outline for body in bodies])
     half = request.grid.size / 2 + HALO
@@ -178,7 +178,7 @@ _MORE = 10.0  # metres beyond what a tile knows of the ground that it is told of
 def tiles_with_tunnels(request: CityRequest, region: RegionMap) -> list[Tile]:
     """Return the tiles in or close to which there are tunnels that could be used."""
     stages = Stages(request.plans)
-    stages.given(region, region.key)
+    stages.register(region, region.key)
     found = stages.run("tunnels", _tiles_with_tunnels, region, request.grid)
     return [(column, row) for column, row in found]
 
@@ -196,9 +196,9 @@ def divide_tunnels(request: CityRequest, region: RegionMap, tiles: Sequence[Tile
         Those with tunnels: their ground and streets have been joined with their neighbours'.
     """
     stages = Stages(request.plans)
-    stages.given(region, region.key)
+    stages.register(region, region.key)
     heads = [read_head(request.plans / tile_name(tile) / f"{JOINED}{SUFFIX}")[1] for tile in tiles]
-    ground = stages.given(_JoinedTiles(request, tiles), "\n".join(heads))
+    ground = stages.register(_JoinedTiles(request, tiles), "\n".join(heads))
     bores = stages.run("bores", _bores, region, ground)
     for tile in request.grid:
         store_product(request.plans / tile_name(tile), BORES, _bores_near(bores, tile, request.grid))

@@ -141,7 +141,7 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     stages = Stages(request.plans / STREETS)
     given = stages.given
     data = given(data, f"{data.sha256} {data.frame} {data.half} {data.box}")
-    with stages.timed("facts"):
+    with stages.timer("facts"):
         site = given(site_facts(data), f"facts {stages.digest(data)}")
     levels = given(whole_ground(whole, data.half), f"levels {both}")
     height = given(replace(levels, decks=None, stairs=None), f"ground {both}")
@@ -162,7 +162,7 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     lanes = given(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
     mapped = stages.run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=request.seed)
     release_pages(levels)
-    with stages.timed("waiting"):
+    with stages.timer("waiting"):
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write_record(whole / TRANSIT, transit)
     counts = {"roads": len(roads.roads), "junctions": len(roads.junctions), "lanes": len(lanes)}
@@ -174,7 +174,9 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
         "bike_stations": len(transit.bike_stations),
     }
     stages.report("transit", counts, transit.left_out)
-    cutter, boxes = NetworkCutter(network.net_xml), _boxes(roads)
+    cutter = NetworkCutter(network.net_xml)
+    lines = [np.array(road.line) for road in roads.roads]
+    boxes = np.array([[*line.min(axis=0), *line.max(axis=0)] for line in lines]).reshape(-1, 4)
     for tile in tiles:
         shift = _Shift(request.grid, tile)
         net = cutter.within(half=request.grid.size / 2 + _AROUND, east=shift.by[0], north=shift.by[1])
@@ -222,12 +224,6 @@ class _Shift:
         half = self._size / 2 + _AROUND
         low, high = boxes[:, :2] - self.by, boxes[:, 2:] - self.by
         return np.flatnonzero((low <= half).all(axis=1) & (high >= -half).all(axis=1))
-
-
-def _boxes(roads: Roads) -> NDArray[np.float64]:
-    """Return the box of every road: west, south, east and north, metres, shape ``(n, 4)``."""
-    lines = [np.array(road.line) for road in roads.roads]
-    return np.array([[*line.min(axis=0), *line.max(axis=0)] for line in lines]).reshape(-1, 4)
 
 
 def _roads_in(roads: Roads, boxes: NDArray[np.float64], shift: _Shift) -> Roads:

@@ -182,16 +182,16 @@ def read_evidence(
     precedence = None
     if sources.buildings or sources.precedence is not None:
         precedence = read_precedence(sources.precedence, [path.name for path, _ in checked_files(sources.buildings)])
-    with stages.timed("map"):
+    with stages.timer("map"):
         if part is None:
             data = read_osm(sources.osm, frame, half)
-            stages.given(data, f"{data.sha256} {where}")
+            stages.register(data, f"{data.sha256} {where}")
         else:
-            data = stages.given(*part)
+            data = stages.register(*part)
         finest = precedence is None or precedence.terrain == "finest"
         samples, without = _heights(sources, frame, half, finest_first=finest, part=part is not None)
         if samples is not None:
-            stages.given(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
+            stages.register(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
     _report_map(data, samples, without, stages)
     credits = [
         Source(
@@ -210,22 +210,23 @@ def read_evidence(
         ]
     tiles = None
     if sources.tiles is not None:
-        with stages.timed("tiles"):
+        with stages.timer("tiles"):
             tiles = _tile_mesh(sources.tiles, frame, half, stages, credits)
     images: list[StreetImage] = []
     if sources.photos is not None:
-        with stages.timed("photos"):
+        with stages.timer("photos"):
             images = _photos(sources.photos, frame, half, stages, credits)
     found: list[FoundPlace] = []
     if sources.places:
-        with stages.timed("found places"):
+        with stages.timer("found places"):
             found = _places(sources.places, frame, half, stages, credits)
     feeds = []
     if sources.gtfs:
-        with stages.timed("timetables"):
-            feeds = [read_gtfs(path, frame, half, as_of=_day_of(data)) for path in sources.gtfs]
+        with stages.timer("timetables"):
+            as_of = None if data.timestamp is None else date.fromisoformat(data.timestamp[:10])
+            feeds = [read_gtfs(path, frame, half, as_of=as_of) for path in sources.gtfs]
         for path, feed in zip(sources.gtfs, feeds, strict=True):
-            stages.given(feed, f"{feed.sha256} {where}")
+            stages.register(feed, f"{feed.sha256} {where}")
             credits.append(
                 Source(
                     kind="timetable",
@@ -244,11 +245,11 @@ def read_evidence(
         stages.report("timetables", {"feeds": len(feeds)}, silent + broken)
     buildings: list[FoundBuildings] = []
     if sources.buildings:
-        with stages.timed("found buildings"):
+        with stages.timer("found buildings"):
             buildings = _buildings(sources, frame, half, stages, credits)
     detections = None
     if sources.detections is not None:
-        with stages.timed("detections file"):
+        with stages.timer("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
 
@@ -281,7 +282,7 @@ def _report_map(data: OsmData, samples: HeightSamples | None, without: Dropped |
         stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
     if samples is not None and (samples.voids or samples.doubtful):
         told = [Dropped(id=name, reason=reason) for name, reason in _void_notes(samples)]
-        stages.report("map", {"heights_void": sum(row[4] for row in samples.voids)}, told)
+        stages.report("map", {"heights_void": sum(count for *_, count, _ in samples.voids)}, told)
 
 
 def _void_notes(samples: HeightSamples) -> list[tuple[str, str]]:
@@ -296,10 +297,9 @@ def _void_notes(samples: HeightSamples) -> list[tuple[str, str]]:
             lies = f"lie {abs(step):.0f} m {'below' if step > 0 else 'above'} the ground on nearly all sides"
             told.append((name, f"{what} {lies}; {said}: gdal_edit.py -a_nodata {height:g} {name}"))
         if len(rows) > _SHOWN_OUTLIERS:
-            more = len(rows) - _SHOWN_OUTLIERS
-            told.append(
-                (rows[-1][0], f"{more} more such patches, {sum(r[4] for r in rows[_SHOWN_OUTLIERS:]):,} pixels")
-            )
+            rest = rows[_SHOWN_OUTLIERS:]
+            pixels = sum(count for *_, count, _ in rest)
+            told.append((rows[-1][0], f"{len(rest)} more such patches, {pixels:,} pixels"))
     return told
 
 
@@ -313,11 +313,6 @@ def _outlier_notes(samples: HeightSamples) -> list[tuple[str, str]]:
         what = "1 height stands" if len(rows) == 1 else f"{len(rows)} heights stand"
         told.append((name, f"{what} far above or below all around, left out and filled in: {shown}{more}"))
     return told
-
-
-def _day_of(data: OsmData) -> date | None:
-    """Return the day that a map is of, if it says."""
-    return None if data.timestamp is None else date.fromisoformat(data.timestamp[:10])
 
 
 def _heights(
@@ -364,7 +359,7 @@ def _detections(
 ) -> Detections:
     photos = None if sources.photos in (None, *SERVICES) else Path(str(sources.photos))
     found = read_detections(path, frame, half, photos=photos)
-    stages.given(found, f"{found.sha256} {frame} {half}")
+    stages.register(found, f"{found.sha256} {frame} {half}")
     credits.append(
         Source(
             kind="detections",
@@ -385,7 +380,7 @@ def _tile_mesh(source: str, frame: LocalFrame, half: float, stages: Stages, cred
         error=_TILE_ERROR,
         margin=_TILE_MARGIN,
     )
-    stages.given(mesh, digest_of(mesh))
+    stages.register(mesh, digest_of(mesh))
     dropped = [Dropped(id=uri, reason=reason) for uri, reason in report.left_out]
     stages.report("tiles", {"tiles": report.read, "triangles": len(mesh.triangles)}, dropped)
     attribution = "; ".join(mesh.attributions) or _file_name(source)

@@ -174,7 +174,7 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions, kind: Folder
             world = make_world(evidence, request, folder, stages, ahead)
         del evidence  # the mesh of a photographed city is large, and so are its pictures
         if part is None:
-            with stages.timed("previews"):
+            with stages.timer("previews"):
                 stages.report("previews", write_previews(world, folder, views=request.previews))
         stages.sweep()
         if not options.keep_stages:

@@ -128,7 +128,7 @@ class WorldWriter:
         write_bytes(net, network.net_xml)
         if network.xodr is not None:
             write_bytes(self.folder / "roads.xodr", network.xodr)
-        lanes = self._stages.given(read_lanes(net), sha256_of(net))
+        lanes = self._stages.register(read_lanes(net), sha256_of(net))
         self._stages.report(
             "roads",
             {
@@ -211,7 +211,7 @@ class WorldWriter:
     def meshes(self, layers: Layers, models: dict[str, Sequence[Surface]]) -> None:
         """Write surfaces and prototypes."""
         meshes = self.folder / "meshes"
-        with self._stages.timed("write"):
+        with self._stages.timer("write"):
             write_glb(meshes / "ground.glb", {"ground": layers.ground})
             write_glb(meshes / "buildings.glb", {"walls": layers.walls, "doors": layers.fronts})
             write_glb(meshes / "roofs.glb", {"roofs": layers.roofs})

@@ -214,7 +214,7 @@ def _raised_part(part: PartPlan, model: NDArray[np.float64], seen: NDArray[np.fl
     levels = part.levels
     if levels and quantity(part.tags, "building:levels") is None:
         levels = max(round((eaves - part.low - 0.6) / STOREY), 1)
-    return replace(part, eaves=eaves, levels=levels, roof=part.roof.risen(round(new_rise, 3)))
+    return replace(part, eaves=eaves, levels=levels, roof=part.roof.with_height(round(new_rise, 3)))
 
 
 def _robust_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
@@ -290,7 +290,7 @@ def moved_to_mesh(
             shift, scale = _best_move(walls.place[mine] - pivot, walls.normal[mine], walls.outward[mine], len(own) == 1)
             near = shapely.STRtree([shapes[k] for k in range(len(plans)) if group[k] != g])
             for _ in range(4):
-                new = [_displaced(plans[k], shift, scale, pivot) for k in own]
+                new = [_move_building(plans[k], shift, scale, pivot) for k in own]
                 outlines = [overlay.union_all([plan.outline, *(part.polygon for part in plan.parts)]) for plan in new]
                 grown = sum(
                     float(overlay.common_area(shape, near.geometries[i]))
@@ -370,20 +370,20 @@ def _best_move(
     return shift, scale
 
 
-def _displaced(
+def _move_building(
     plan: BuildingPlan, shift: NDArray[np.float64], scale: float, pivot: NDArray[np.float64]
 ) -> BuildingPlan:
     def move(xy: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(pivot + scale * (xy - pivot) + shift, np.float64)
 
-    def moved(polygon: Polygon) -> Polygon:
+    def place(polygon: Polygon) -> Polygon:
         return shapely.transform(polygon, move)
 
     return replace(
         plan,
-        outline=moved(plan.outline),
-        parts=[replace(part, polygon=moved(part.polygon), roof=part.roof.moved(move)) for part in plan.parts],
-        rooftop=[replace(part, polygon=moved(part.polygon)) for part in plan.rooftop],
+        outline=place(plan.outline),
+        parts=[replace(part, polygon=place(part.polygon), roof=part.roof.transform(move)) for part in plan.parts],
+        rooftop=[replace(part, polygon=place(part.polygon)) for part in plan.rooftop],
     )
 
 

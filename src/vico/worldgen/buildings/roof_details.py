@@ -310,14 +310,14 @@ def _fringe(
     for shape, slope in shapes:
         rings = [ring - centre for ring in rings_of(shape)]
 
-        def lifted(
+        def lift(
             points: NDArray[np.float64], slope: Slope = slope, centre: NDArray[np.float64] = centre
         ) -> NDArray[np.float64]:
             moved = np.array(points, np.float64)
             moved[:, 2] = slope.height(moved[:, :2] + centre) - np.where(moved[:, 2] > 0.5, 0.0, thick)
             return moved
 
-        solid = CrossSection(rings, manifold3d.FillRule.Positive).extrude(1.0).warp_batch(lifted)
+        solid = CrossSection(rings, manifold3d.FillRule.Positive).extrude(1.0).warp_batch(lift)
         if solid.is_empty():
             continue
         solids.append(solid)

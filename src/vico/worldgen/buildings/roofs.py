@@ -425,7 +425,7 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
         return _with_parapet(polygon, low, eaves, roof.height) if roof.height > 0.05 else prism(rings, low, eaves)
     if roof.height <= 0.05:
         return prism(rings, low, eaves)
-    # The roof is made over eaves at 0: its highest point is then stretched to the height asked, exactly.
+    # The roof is made over eaves at 0: its highest point is then stretch to the height asked, exactly.
     if roof.shape == "skillion":
         solid = _skillion(rings, low - eaves, roof)
     elif roof.shape in ("dome", "onion", "pyramidal"):
@@ -451,12 +451,12 @@ def _as_high_as(solid: Manifold, height: float) -> Manifold:
         return solid
     share = height / top
 
-    def stretched(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stretch(points: NDArray[np.float64]) -> NDArray[np.float64]:
         result = np.array(points, np.float64)
         result[:, 2] = np.where(result[:, 2] > 0.0, result[:, 2] * share, result[:, 2])
         return result
 
-    return solid.warp_batch(stretched)
+    return solid.warp_batch(stretch)
 
 
 def _with_parapet(polygon: Polygon, low: float, eaves: float, height: float) -> Manifold:

@@ -86,7 +86,7 @@ def part_mesh(part: PartPlan, seat: Footing) -> Mesh:
     def near_origin(xy: NDArray[np.float64]) -> NDArray[np.float64]:
         return xy - np.array([x, y])
 
-    local, roof = shapely.transform(part.polygon, near_origin), part.roof.moved(near_origin)
+    local, roof = shapely.transform(part.polygon, near_origin), part.roof.transform(near_origin)
     solid = building_solid(local, low - eaves, 0.0, roof).simplify(0.002)
     body = solid.to_mesh64()
     vertices = np.asarray(body.vert_properties, np.float64)[:, :3]

@@ -528,7 +528,7 @@ def _tint(family: Family, tags: Mapping[str, str], draws: _Draws) -> Rgb:
     if given is None or not family.painted:
         return _colour_by_draw(_palette(family), draws.tint)
     # The pictures are paler than white plaster; brick is red of its own, so only a brick's shade is taken over.
-    return _mix_colours(_WHITE, _compensate_grey(given), 0.5 if family.own_colour else 1.0)
+    return mix_colours(_WHITE, _compensate_grey(given), 0.5 if family.own_colour else 1.0)
 
 
 def _ground_floor(family: Family, use: str, levels: int, draws: _Draws) -> str:
@@ -546,7 +546,7 @@ def _ground_tint(family: Family, ground: GroundFloor, tint: Rgb, draws: _Draws) 
         return _WHITE
     if family.own_colour and not ground.as_wall:
         return _colour_by_draw(styles().stone, draws.bay)
-    return _mix_colours(_PALE_STONE, tint, 0.3) if ground.stone and draws.variant < 0.5 else tint
+    return mix_colours(_PALE_STONE, tint, 0.3) if ground.stone and draws.variant < 0.5 else tint
 
 
 def _roof(family: Family, tags: Mapping[str, str], region: RegionalStyle, draws: _Draws) -> tuple[str, Rgb]:
@@ -573,7 +573,7 @@ def _back(family: Family, tint: Rgb, area: float, region: RegionalStyle, draws: 
         return family.name, tint
     if family.back == "wall_back_brick" or draws.variant < region.brick_backs:
         return "wall_back_brick", _BACK_BRICK
-    return "wall_back", _mix_colours(_BACK_PLASTER, tint, 0.5)
+    return "wall_back", mix_colours(_BACK_PLASTER, tint, 0.5)
 
 
 def _reach(family: Family, levels: int, region: RegionalStyle, draws: _Draws) -> float:
@@ -612,7 +612,8 @@ def distinct_styles(
     return made
 
 
-def _mix_colours(a: Rgb, b: Rgb, share: float) -> Rgb:
+def mix_colours(a: Rgb, b: Rgb, share: float) -> Rgb:
+    """Return a colour between two: `share` of the second."""
     r, g, b_ = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
     return r, g, b_
 

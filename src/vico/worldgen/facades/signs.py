@@ -212,7 +212,10 @@ def draw_text(text: str, size: int, *, bold: bool = True) -> NDArray[np.uint8]:
     return np.asarray(image.resize((image.width // 2, height), Image.Resampling.BOX))
 
 
-_ROW, _FONT, _PAGE, _MOST_PAGES = 48, 30, 2048, 2
+_ROW = 48  # pixels, height of a board
+_FONT = 30  # pixels, size of its letters
+_PAGE = 2048  # pixels, side of a page of boards
+_MOST_PAGES = 2
 _MOST_BOARDS = 6000
 _RIM = 2  # pixels
 

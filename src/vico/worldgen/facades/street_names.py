@@ -25,11 +25,16 @@ _ABOVE = 0.02  # metres above the ground floor: over its band, below windows
 _ALONG, _ASIDE = 26.0, 10.0
 _PARALLEL = math.cos(math.radians(25.0))
 _LEAST_WALL = 3.0  # metres
-# Of the ground before a wall, metres below a plate: where houses stand on slopes, a storey may be below the street.
-_BEFORE, _LEAST_UP, _MOST_UP = 1.0, 2.0, 7.0
-# Of posts: metres from the corner at most, and heights that carry a name.
-_NEAR, _LOW, _HIGH = 16.0, 3.2, 14.0
-_ON_LAMP, _GAP, _THICK = 3.1, 0.05, 0.02  # metres
+_BEFORE = 1.0  # metres before a wall at which the ground below a plate is looked up
+# Metres of a plate above that ground: where houses stand on slopes, a storey may be below the street.
+_LEAST_UP = 2.0
+_MOST_UP = 7.0
+_NEAR = 16.0  # metres from the corner to a post at most
+_LOW = 3.2  # metres, the least height of a post that carries a name
+_HIGH = 14.0  # and the greatest
+_ON_LAMP = 3.1  # metres above the ground on a post
+_GAP = 0.05  # metres
+_THICK = 0.02  # metres
 _POSTS = ("street_lamp", "traffic_signals")  # those that are taken first come first
 _MOST_CHARACTERS = 36
 _NO_STREETS = ("service", "_link")  # kinds of roads whose names are those of ramps and ways out

@@ -73,7 +73,7 @@ def support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: lis
         near = [j for j in sorted(tree.query(parts[k].polygon, predicate="intersects").tolist()) if j != k]
         crossed = [ways[j] for j in passages.query(parts[k].polygon, predicate="intersects").tolist()]
         with drop_on_failure(name[k], dropped):
-            settled[k], below = _settled(parts[k], [settled[j] for j in near], crossed)
+            settled[k], below = _settle_part(parts[k], [settled[j] for j in near], crossed)
             carrying.update(near[j] for j in below)
             continue
         failed.add(name[k])
@@ -86,7 +86,7 @@ def support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: lis
     return [plan for plan in made if plan.id not in failed]
 
 
-def _settled(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineString]) -> tuple[PartPlan, list[int]]:
+def _settle_part(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineString]) -> tuple[PartPlan, list[int]]:
     """Let a part that begins above the ground come to rest, if nothing holds it up there.
 
     Parameters

@@ -149,7 +149,6 @@ _INHERITED = {
     "roof:material",
     "name",
 }
-_HIPPED = ("hipped", "half-hipped", "side_hipped", "side_half-hipped", "hipped-and-gabled", "gabled", "crosspitched")
 
 
 def part_of(
@@ -472,7 +471,9 @@ def _parts(cells: Sequence[RoofCell], facets: Sequence[RoofFacet], tags: Mapping
             made.append(plain)
             continue
         over = tuple(facets[k].moved(up=-eaves) for k in sorted(under))
-        solid = measured_solid(_near_origin(piece), -eaves, [_near(facet, piece) for facet in over])
+        x, y = _middle(piece)
+        near_origin = shapely.transform(piece, lambda xy, middle=(x, y): xy - middle)
+        solid = measured_solid(near_origin, -eaves, [facet.moved(east=-x, north=-y) for facet in over])
         *_, top = solid.bounding_box()
         roof = Roof(form.shape, round(max(top, 0.0), 3), None, over)
         made.append(replace(plain, eaves=eaves, roof=roof))
@@ -488,16 +489,6 @@ def _spread(facets: Sequence[RoofFacet]) -> float:
 def _middle(polygon: Polygon) -> tuple[float, float]:
     x, y = (round(v) for v in polygon.centroid.coords[0])
     return float(x), float(y)
-
-
-def _near_origin(polygon: Polygon) -> Polygon:
-    x, y = _middle(polygon)
-    return shapely.transform(polygon, lambda xy: xy - (x, y))
-
-
-def _near(facet: RoofFacet, polygon: Polygon) -> RoofFacet:
-    x, y = _middle(polygon)
-    return facet.moved(east=-x, north=-y)
 
 
 def _levels(tags: Mapping[str, str], eaves: float) -> int:

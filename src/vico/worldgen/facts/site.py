@@ -75,7 +75,7 @@ _THROUGH = {
     for link in ("", "_link")
 } | {"living_street", "busway"}
 _FLIGHTS = 4  # of stairs one after the other that lead to a deck
-_RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
+RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
 
 
 CLEARANCE = 4.7
@@ -144,7 +144,7 @@ def overpasses(osm: OsmData) -> frozenset[int]:
         way
         for way in osm.ways
         if is_bridge(way.tags)
-        and ("highway" in way.tags or way.tags.get("railway") in _RAILS)
+        and ("highway" in way.tags or way.tags.get("railway") in RAILS)
         and level_of(way.tags) > 0
         and not (way.closed and way.tags.get("area") == "yes")
     ]

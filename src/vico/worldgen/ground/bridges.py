@@ -25,7 +25,7 @@ from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, merge_surfaces, surface_of_quads
 from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, union_named
-from vico.worldgen.facts.site import ON_FOOT, SLAB, SLAB_ON_FOOT, SiteFacts, is_bridge, on_the_ground
+from vico.worldgen.facts.site import ON_FOOT, RAILS, SLAB, SLAB_ON_FOOT, SiteFacts, is_bridge, on_the_ground
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
 from vico.worldgen.ground.grading import Network, deck_clearance_constraints, ramp_slope
 from vico.worldgen.ground.kerbs_and_banks import KERB
@@ -103,8 +103,7 @@ _KERBED_END, _TAPER = 3.5, 8.0  # metres: a street's kerbs go on under a deck, a
 FILLED = 2.6
 """Metres: a ramp lower than this is an embankment between walls."""
 
-_RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
-_TRACK_WIDTH = 4.6
+TRACK_WIDTH = 4.6  # metres
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def deck_width(way: OsmWay) -> float:
     """Of a deck, its sidewalks included, metres."""
     kind = way.tags.get("highway")
     if kind is None:
-        return _TRACK_WIDTH
+        return TRACK_WIDTH
     if kind in ON_FOOT:
         return min(max(quantity(way.tags, "width") or 2.6, 1.6), 10.0)
     return carriageway_width(way.tags) + 2 * deck_sidewalk_width(way.tags)
@@ -177,7 +176,7 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
         wide[row] = np.maximum(wide[row], deck_width(way) / 2)
     level = [row for way, row in zip(ways, network.rows, strict=True) if way.tags.get("highway") != "steps"]
     beside = network.abreast(wide, level, _ABREAST)
-    found = network.levelled(ground, weight, length=15.0, spacing=_SPACING, abreast=beside)
+    found = network.fit_heights(ground, weight, length=15.0, spacing=_SPACING, abreast=beside)
     high, least = deck_clearance_constraints(
         network.points, np.arange(len(found)), found, site.levels.passages, terrain
     )
@@ -186,7 +185,7 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
         wanted = ground.copy()
         wanted[high], weight[high] = least, 30.0
         for _ in range(2):
-            found = network.levelled(wanted, weight, length=10.0, spacing=_SPACING, abreast=beside)
+            found = network.fit_heights(wanted, weight, length=10.0, spacing=_SPACING, abreast=beside)
             low = (found < bound - 0.02) & (weight < 1.0)
             wanted[low], weight[low] = bound[low], 10.0
         found[high] = np.maximum(found[high], least)
@@ -222,7 +221,7 @@ def pier_free_area(osm: OsmData, streets: StreetPolygons) -> BaseGeometry:
     """Return where no pier may stand: streets and railways at ground level, with a metre beside them."""
     kept = [NamedShape("carriageways", streets.carriageway)]
     for way in osm.ways:
-        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and not is_bridge(way.tags):
+        if way.tags.get("railway") in RAILS and on_the_ground(way.tags) and not is_bridge(way.tags):
             with drop_on_failure(f"w{way.id}"):
                 kept.append(NamedShape(f"w{way.id}", overlay.buffer(shapely.LineString(way.line), 1.8)))
     return overlay.buffer(union_named(kept), 1.0, quad_segs=2)
@@ -429,7 +428,7 @@ def _cut_pavement(stone: QuadMeshBuilder, corners: Sequence[Floats], driven: Bas
     start, end = corners[0], corners[1]
     run = end[:2] - start[:2]
 
-    def lifted(xy: Floats, by: float) -> Floats:
+    def lift(xy: Floats, by: float) -> Floats:
         share = np.clip((np.asarray(xy)[:2] - start[:2]) @ run / max(float(run @ run), 1e-9), 0.0, 1.0)
         return np.r_[np.asarray(xy)[:2], start[2] + share * (end[2] - start[2]) + by]
 
@@ -437,10 +436,10 @@ def _cut_pavement(stone: QuadMeshBuilder, corners: Sequence[Floats], driven: Bas
     for shape in polygons_of(left, 0.02):
         flat, faces = triangulate([shape])
         for a, b, c in flat[faces]:
-            stone.add([lifted(a, KERB), lifted(b, KERB), lifted(c, KERB), lifted(c, KERB)], look)
+            stone.add([lift(a, KERB), lift(b, KERB), lift(c, KERB), lift(c, KERB)], look)
         ring = np.asarray(shapely.geometry.polygon.orient(shape).exterior.coords)
         for a, b in pairwise(ring):
-            stone.add([lifted(a, 0.0), lifted(b, 0.0), lifted(b, KERB), lifted(a, KERB)], "kerb")
+            stone.add([lift(a, 0.0), lift(b, 0.0), lift(b, KERB), lift(a, KERB)], "kerb")
 
 
 def _on_foot(tags: dict[str, str]) -> bool:

@@ -27,6 +27,7 @@ from vico.worldgen.facts.site import ON_FOOT, SiteFacts, on_the_ground
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges import (
     PARAPET,
+    TRACK_WIDTH,
     Deck,
     QuadMeshBuilder,
     bridge_surfaces,
@@ -46,7 +47,6 @@ _DARK: tuple[int, int, int] = (26, 27, 29)
 _LEAST_TUNNEL = 12.0  # metres: the mouths of a shorter one would stand back to back
 _BEHIND = 7.0  # metres into a tunnel where the ground tells whether there is a hill
 _FOOT_HEADROOM, _HEADROOM = 2.8, 4.8
-_TRACK_WIDTH = 4.6  # metres
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _mouths(
 ) -> list[Portal]:
     """Return the mouths of a tunnel that lie in the open: streets lead to their nodes (`walked`), nothing is built."""
     foot = way.tags.get("highway") in ON_FOOT
-    width = deck_width(way) - (1.0 if foot else 2.0) if "highway" in way.tags else _TRACK_WIDTH
+    width = deck_width(way) - (1.0 if foot else 2.0) if "highway" in way.tags else TRACK_WIDTH
     width = max(width, 2.2)
     found: list[Portal] = []
     for end, beyond, node in ((0, 1, way.nodes[0]), (-1, -2, way.nodes[-1])):
@@ -134,7 +134,7 @@ def _end_of(way: OsmWay, here: Floats, inward: Floats) -> BaseGeometry:
     out = line[1] - line[0]
     if float(dot(out, inward)) > -0.7 * float(np.hypot(*out)):
         return shapely.Point()
-    return overlay.buffer(shapely.Point(here), (deck_width(way) if "highway" in way.tags else _TRACK_WIDTH) / 2 + 3.0)
+    return overlay.buffer(shapely.Point(here), (deck_width(way) if "highway" in way.tags else TRACK_WIDTH) / 2 + 3.0)
 
 
 def portal_feet(portals: Sequence[Portal]) -> list[Polygon]:

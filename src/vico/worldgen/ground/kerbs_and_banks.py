@@ -28,8 +28,11 @@ from vico.worldgen.facts.streets import Crossing, StreetPolygons
 
 Floats = NDArray[np.float64]
 
-_FREEBOARD, _FREEBOARD_SMALL, _BRIM = 1.3, 0.4, 0.12  # metres from banks down to waters, ponds, basins
-_SMALL, _BASIN = 2500.0, 150.0  # square metres
+_FREEBOARD = 1.3  # metres from banks down to waters
+_FREEBOARD_SMALL = 0.4  # to ponds
+_BRIM = 0.12  # to basins
+_SMALL = 2500.0  # square metres, of ponds at most
+_BASIN = 150.0  # and of basins
 _PARTED = 24.0  # metres between pieces that only a bridge parts
 _CORNER = 1.0  # metres
 _MOST_SAMPLES = 400  # points of a body's banks

@@ -214,8 +214,10 @@ _YELLOW = (226, 184, 70)
 _FADED = (206, 205, 200)
 _CYCLE_WIDTH = 1.5
 _STEEL, _GROOVE, _SLEEPERS = (134, 131, 127), (46, 45, 44), (84, 77, 70)
-# Metres: breadth of a rail's head and of the groove beside it; between sleepers; a sleeper along and across the track.
-_HEAD, _GROOVE_WIDTH, _SLEEPER_GAP, _SLEEPER = 0.075, 0.05, 0.65, (0.26, 2.5)
+_HEAD = 0.075  # metres, breadth of a rail's head
+_GROOVE_WIDTH = 0.05  # metres, breadth of the groove beside it
+_SLEEPER_GAP = 0.65  # metres from sleeper to sleeper
+_SLEEPER = (0.26, 2.5)  # metres, a sleeper along and across the track
 _LINED = {"motorway", "trunk", "primary", "secondary", "tertiary"}
 _OVERPAINTED = 0.2  # share of a mark that lies on another crossing, above which it is left out
 _AT_KERB = 0.8  # metres from a kerb within which lines follow it

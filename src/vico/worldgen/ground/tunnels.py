@@ -107,11 +107,11 @@ class Bore:
         """Return where it lies, between its walls, metres."""
         return _strip(self.line, np.ones(len(self.line), bool), self.width / 2)
 
-    def roofed(self) -> BaseGeometry:
+    def roofed_area(self) -> BaseGeometry:
         """Return where it lies under a roof, metres."""
         return _strip(self.line, self.covered, self.width / 2, both=True)
 
-    def driven(self) -> BaseGeometry:
+    def carriageway(self) -> BaseGeometry:
         """Return where its carriageway lies, metres; nowhere if nothing drives in it."""
         inner = 0.0 if self.on_foot else self.width / 2 - self.walk
         return _strip(self.line, np.full(len(self.line), inner > 0.0), inner)
@@ -258,7 +258,7 @@ def _floor(
     weight = np.where(is_mouth & is_known, 30.0, 0.0)
     if not weight.any():
         return np.asarray(ground - roof)
-    straight = network.levelled(ground, weight, length=25.0, spacing=_SPACING)
+    straight = network.fit_heights(ground, weight, length=25.0, spacing=_SPACING)
     straight[is_mouth & is_known] = ground[is_mouth & is_known]
     # How low the floor can be at each point, coming down from the mouths, and how low it has to be for what is ahead.
     everywhere, unbounded = np.arange(len(ground)), np.full(len(ground), -np.inf)
@@ -444,8 +444,8 @@ def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) 
     reach = min(terrain.half - 0.5, float(window.bounds[2]))
     window = shapely.box(-reach, -reach, reach, reach)
     plan = overlay.intersection(overlay.union_all([bore.plan() for bore in bores]), window)
-    roofed = overlay.intersection(overlay.union_all([bore.roofed() for bore in bores]), plan)
-    driven = overlay.intersection(overlay.union_all([bore.driven() for bore in bores]), plan)
+    roofed = overlay.intersection(overlay.union_all([bore.roofed_area() for bore in bores]), plan)
+    driven = overlay.intersection(overlay.union_all([bore.carriageway() for bore in bores]), plan)
     raised = overlay.difference(plan, driven)
     for piece in _pieces(bores):
         _lay(stone, overlay.intersection(piece.plan, driven), piece, 0.0, "carriageway")
@@ -461,7 +461,8 @@ def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) 
         if ways_in.intersects(middle) or np.abs((a + b) / 2).max() > reach - _AT:
             continue
         if roofed.distance(middle) < _AT:
-            _tube_wall(stone, a, b, floors)
+            low, headroom = floors.at(np.stack([a, b]))
+            _upright(stone, a, b, low, low + headroom, _TILES)
         else:
             _cut_wall(stone, a, b, floors, terrain)
     inner = overlay.buffer(plan, -4 * _AT)
@@ -518,11 +519,6 @@ def _upright(
 ) -> None:
     """Build an upright face from `a` to `b` that is seen from the left of that way."""
     stone.add([np.r_[b, low[1]], np.r_[a, low[0]], np.r_[a, high[0]], np.r_[b, high[1]]], look, tint)
-
-
-def _tube_wall(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors) -> None:
-    low, headroom = floors.at(np.stack([a, b]))
-    _upright(stone, a, b, low, low + headroom, _TILES)
 
 
 def _cut_wall(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors, terrain: HeightField) -> None:

@@ -61,7 +61,7 @@ class LayoutPiece(_Strict):
     yaw: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
 
     @model_validator(mode="after")
-    def _known(self) -> LayoutPiece:
+    def _check_model(self) -> LayoutPiece:
         if self.model not in furniture_models():
             raise ValueError(
                 f"there is no furniture called {self.model!r}; see vico.assets.models.library.furniture_models"
@@ -339,12 +339,8 @@ def _furniture_findings(layout: Layout) -> list[str]:
     for made in plan.rooms:
         if not made.spots:
             wrong.append(f"rooms ({made.kind}): furniture stands in its doorway: leave 1 m before each door free")
-    return wrong or _walking_findings(plan)
-
-
-def _walking_findings(plan: FloorPlan) -> list[str]:
     rooms, objects = rooms_of_plan(plan)
-    return [f"{f.where}: {f.what}" for f in walkable_inside(rooms, objects)]
+    return wrong or [f"{f.where}: {f.what}" for f in walkable_inside(rooms, objects)]
 
 
 @dataclass(frozen=True)

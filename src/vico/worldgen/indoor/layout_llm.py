@@ -109,8 +109,8 @@ class LlmLayoutAuthor:
         InputError
             If a recording is replayed that holds no answer.
         """
-        layout, reason = self._drawn(request)
-        return self._told(request, layout, reason)
+        layout, reason = self._ask_for_plan(request)
+        return self._book_plan(request, layout, reason)
 
     def draw_all(self, requests: Sequence[LayoutRequest]) -> dict[LayoutRequest, str]:
         """Draw many plans, some at a time; requests that got none are missing, and are in `dropped`.
@@ -121,7 +121,7 @@ class LlmLayoutAuthor:
         for request in requests:
             groups.setdefault(replace(request, place=""), []).append(request)
         with ThreadPoolExecutor(1 if self.model.recorded else max(1, self.workers)) as pool:
-            waiting = [pool.submit(self._drawn, members[0]) for members in groups.values()]
+            waiting = [pool.submit(self._ask_for_plan, members[0]) for members in groups.values()]
             try:
                 drawn = [one.result() for one in waiting]
             except BaseException:
@@ -130,12 +130,12 @@ class LlmLayoutAuthor:
         plans: dict[LayoutRequest, str] = {}
         for members, (layout, reason) in zip(groups.values(), drawn, strict=True):
             for request in members:
-                text = self._told(request, layout, reason)
+                text = self._book_plan(request, layout, reason)
                 if text is not None:
                     plans[request] = text
         return plans
 
-    def _drawn(self, request: LayoutRequest) -> tuple[Layout | None, str]:
+    def _ask_for_plan(self, request: LayoutRequest) -> tuple[Layout | None, str]:
         """Return a plan, or why there is none."""
         if self._over is not None:
             return None, self._over
@@ -159,7 +159,7 @@ class LlmLayoutAuthor:
                 rounds=self.rounds,
             )
         except LlmReplyError as error:
-            self._answered()
+            self._note_answer()
             return None, str(error)
         except LlmBudgetError as error:
             self._over = str(error)
@@ -172,14 +172,14 @@ class LlmLayoutAuthor:
                 if self._failed >= _PATIENCE:
                     self._over = f"{error}; not asked again after {_PATIENCE} places"
             return None, str(error)
-        self._answered()
+        self._note_answer()
         return reply.value, ""
 
-    def _answered(self) -> None:
+    def _note_answer(self) -> None:
         with self._lock:
             self._heard, self._failed = True, 0
 
-    def _told(self, request: LayoutRequest, layout: Layout | None, reason: str) -> str | None:
+    def _book_plan(self, request: LayoutRequest, layout: Layout | None, reason: str) -> str | None:
         """Book a plan, or that there is none."""
         if layout is not None:
             self.drawn += 1

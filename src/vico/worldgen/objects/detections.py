@@ -139,7 +139,7 @@ class Rays:
     score: Floats
     photo: NDArray[np.int64]
 
-    def taken(self, which: NDArray[np.bool_]) -> Rays:
+    def select(self, which: NDArray[np.bool_]) -> Rays:
         """Return some of them."""
         return Rays(*(getattr(self, one.name)[which] for one in fields(self)))
 
@@ -343,7 +343,7 @@ def _of_class(
             for k in np.flatnonzero(floating).tolist()
         ]
         sightings = [sightings[k] for k in np.flatnonzero(~floating).tolist()]
-        rays = rays.taken(~floating)
+        rays = rays.select(~floating)
     alone: list[int] = []
     for xy, members in agreeing_places(rays, rules):
         few = len(members) < (rules.raised_photos if raised else 2)

@@ -22,7 +22,7 @@ from vico.io.compiled import compiled
 from vico.threads import in_order
 from vico.world.mesh import Surface
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.photos.atlas import Atlas, Chart, coverage, unwrap
+from vico.worldgen.photos.atlas import Atlas, coverage, unwrap
 
 _AT_ONCE = 1 << 17  # triangles
 
@@ -280,16 +280,14 @@ def bake(
     chart_of = np.zeros(pieces, np.int64)
     chart_of[patches] = np.arange(len(patches))
     old = chart_of[[chart.patch for chart in atlas.charts]]
-    scale = np.array([_scale(coarse.charts[o], c) for o, c in zip(old, atlas.charts, strict=True)]).reshape(-1, 3)
+    # An offset's constant stays, its slopes change with the size of a texel.
+    ratios = [
+        np.linalg.norm(c.right) / np.linalg.norm(coarse.charts[o].right) for o, c in zip(old, atlas.charts, strict=True)
+    ]
+    scale = np.array([(1.0, float(ratio), float(ratio)) for ratio in ratios]).reshape(-1, 3)
     fine = _Expected(expected.offset[old] * scale, expected.luminance[old], expected.green[old])
     rays += _paint(atlas, fine, sight, photos, cage, progress=progress)
     return BakeResult(new_walls, new_roofs, atlas, by_entity, pieces, rays)
-
-
-def _scale(coarse: Chart, fine: Chart) -> tuple[float, float, float]:
-    """Factors of an offset's constant and slopes from one chart of a piece to another."""
-    ratio = float(np.linalg.norm(fine.right) / np.linalg.norm(coarse.right))
-    return 1.0, ratio, ratio
 
 
 def _batches(atlas: Atlas) -> Iterator[_Batch]:

@@ -446,7 +446,7 @@ def find_sun(atlas: Atlas, sight: RayCaster) -> Sun | None:
         for azimuth in np.radians(_AZIMUTHS)
     ]
 
-    def explained(sun: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def fit_brightness(sun: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         shine = _shine(points, normals, sun, sight)
         centred = _within(shine, group)
         spread = float(centred @ centred)
@@ -454,7 +454,7 @@ def find_sun(atlas: Atlas, sight: RayCaster) -> Sun | None:
         return (along * along / spread if spread > 1e-6 and along > 0.0 else 0.0), shine
 
     best: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
-    for sun, (share, shine) in zip(suns, in_order(explained, suns), strict=True):
+    for sun, (share, shine) in zip(suns, in_order(fit_brightness, suns), strict=True):
         if share > (0.0 if best is None else best[0]):
             best = share, sun, shine
     if best is None or not best[0] >= _LEAST_EXPLAINED * max(total, 1e-9):

@@ -208,7 +208,7 @@ class StreetAddresses:
         """Name of the street nearest to a point, None where no street has one."""
         return self._named[int(self._tree.nearest(shapely.Point(xy)))][0] if self._named else None
 
-    def invented(self, named: NamedPlace) -> NamedPlace:
+    def with_invented_name(self, named: NamedPlace) -> NamedPlace:
         """Give a place a name of our making: what it is, and the address of the building it is in."""
         at = self._finder.building_at(named.xy, MATCH)
         if at is None:
@@ -216,7 +216,7 @@ class StreetAddresses:
         building = self._finder.buildings[at]
         address = self.addresses.get(building.id)
         street = None if address else self.nearest(shapely.Polygon(building.footprint[0]).centroid.coords[0])
-        name = place_names().called(place_names().of(named.kind), where=address, street=street)
+        name = place_names().describe(place_names().of(named.kind), where=address, street=street)
         return replace(named, name=unused_name(name, self._used))
 
 
@@ -306,7 +306,7 @@ def _make_place(
         return named, reason
     named = told.refined.get(named.id, named)
     if not named.name:
-        named = streets.invented(named)
+        named = streets.with_invented_name(named)
     return named, finder.outdoors(named) if finder.is_outdoors(named) else finder.indoors(named)
 
 
@@ -348,7 +348,7 @@ def _homes(finder: DoorFinder, streets: StreetAddresses) -> list[Place]:
                 return
             where = address or tags.get("name")
             street = None if where else streets.nearest(door.position[:2])
-            name = place_names().called(place_names().home, where=where, street=street)
+            name = place_names().describe(place_names().home, where=where, street=street)
             homes.append(
                 Place(
                     id=f"{building.id}.home{k}",

@@ -106,12 +106,16 @@ def write_ground(folder: Path, grid: TileGrid, levels_of: Callable[[Tile], Heigh
     stairs: list[Stairs] = []
     with ExitStack() as files:
 
-        def made(name: str, samples: int, kind: Any, fill: float = 0) -> NDArray[Any]:
+        def array(name: str, samples: int, kind: Any, fill: float = 0) -> NDArray[Any]:
             side = sides * (samples - 1) + 1
             return files.enter_context(new_array(folder / name, (side, side), kind, fill))
 
-        heights = made(SMOOTH, smooth, np.float32)
-        steps = [made(EDGE, stepped, np.int8, 127), made(LOW, stepped, np.int16), made(HIGH, stepped, np.int16)]
+        heights = array(SMOOTH, smooth, np.float32)
+        steps = [
+            array(EDGE, stepped, np.int8, 127),
+            array(LOW, stepped, np.int16),
+            array(HIGH, stepped, np.int16),
+        ]
         for tile in grid:
             levels = levels_of(tile)
             field, (x, y) = crop_heights(levels, half=grid.size / 2), grid.centre(tile)

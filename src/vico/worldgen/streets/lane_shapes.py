@@ -26,6 +26,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geometry import arc_lengths, distance, distances, points_along
+from vico.world.opendrive import wrap_angle
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def round_corners(line: Floats, radius: float = _RADIUS) -> Floats:
     heading = np.arctan2(step[:, 1], step[:, 0])
     found = [line[:1]]
     for k in range(1, len(line) - 1):
-        turn = abs(_wrap_angle(float(heading[k] - heading[k - 1])))
+        turn = abs(wrap_angle(float(heading[k] - heading[k - 1])))
         if turn < _BEND:
             found.append(line[k : k + 1])
             continue
@@ -104,10 +105,6 @@ def _arc(start: Floats, corner: Floats, end: Floats, turn: float) -> Floats:
     """Return points of the curve from `start` to `end` that touches both sides of a corner."""
     t = np.linspace(0.0, 1.0, max(math.ceil(turn / _PIECE), 2) + 1)[:, None]
     return (1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end
-
-
-def _wrap_angle(angle: float) -> float:
-    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def _path(shape: str, *, inside: bool) -> _Path:
@@ -160,17 +157,17 @@ def _join(chain: list[str], paths: dict[str, _Path]) -> None:
     whole = np.concatenate([inner[0].line, *(path.line[1:] for path in inner[1:])])
     chord = distance(whole[-1], whole[0])
     start, end = _heading(before.line, -1), _heading(after.line, 0)
-    turn = abs(_wrap_angle(end - start))
+    turn = abs(wrap_angle(end - start))
     if chord < _SHORTEST or (turn > _TURNS_BACK and chord > _WIDE):
         return
     headings = [start, *np.arctan2(*np.diff(whole, axis=0)[np.hypot(*np.diff(whole, axis=0).T) > 0.01].T[::-1]), end]
-    if max(abs(_wrap_angle(b - a)) for a, b in pairwise(headings)) < _JOINT:
+    if max(abs(wrap_angle(b - a)) for a, b in pairwise(headings)) < _JOINT:
         return
     # So long are the handles of a curve that is nearly an arc.
     reach = chord * (2 / 3 * math.tan(turn / 4) / math.sin(turn / 2) if turn > 0.01 else 1 / 3)
     handles = whole[0] + reach * _unit(start), whole[-1] - reach * _unit(end)
     across = math.atan2(*(whole[-1] - whole[0])[::-1])
-    bends = abs(_wrap_angle(across - start)) + abs(_wrap_angle(end - across))
+    bends = abs(wrap_angle(across - start)) + abs(wrap_angle(end - across))
     t = np.linspace(0.0, 1.0, math.ceil((1.7 * bends + 0.4) / _PIECE) + 2)[:, None]
     curve = (1 - t) ** 3 * whole[0] + 3 * t * (1 - t) ** 2 * handles[0]
     curve += 3 * t**2 * (1 - t) * handles[1] + t**3 * whole[-1]
@@ -346,15 +343,9 @@ def _read(lane: Element) -> tuple[Floats, float]:
 def _shape_text(line: Floats, before: Floats) -> bytes:
     """Return a line as a shape, with heights where the line before had them."""
     if before.shape[1] > 2:
-        z = np.interp(_shares(line), _shares(before[:, :2]), before[:, 2])
+        z = np.interp(_shares_of_length(line), _shares_of_length(before[:, :2]), before[:, 2])
         return " ".join(f"{x:.3f},{y:.3f},{h:.3f}" for (x, y), h in zip(line, z, strict=True)).encode()
     return " ".join(f"{x:.3f},{y:.3f}" for x, y in line).encode()
-
-
-def _shares(line: Floats) -> Floats:
-    """How far along a line its points are, from 0 to 1."""
-    along = arc_lengths(line)
-    return along / max(float(along[-1]), 1e-9)
 
 
 def _offset(line: shapely.LineString, shift: float, out: float, walls: shapely.STRtree) -> shapely.LineString:

@@ -140,12 +140,12 @@ def road_network(
     binary = netconvert_binary()
     for _ in range(_MOST_REFUSED):
         try:
-            return _converted(binary, site, used, height, kerbs)
+            return _convert(binary, site, used, height, kerbs)
         except NetconvertError as error:
             culprit = _culprit(binary, site, used, height)
             leave_out(f"w{culprit}", f"{FAILED}: {error}")
             used = [street for street in used if street.way != culprit]
-    return _converted(binary, site, used, height, kerbs) if used else empty_network(osm.frame, osm.half)
+    return _convert(binary, site, used, height, kerbs) if used else empty_network(osm.frame, osm.half)
 
 
 def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None) -> int:
@@ -154,14 +154,14 @@ def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], he
     while bad - good > 1:
         middle = (good + bad) // 2
         try:
-            _converted(binary, site, streets[:middle], height)
+            _convert(binary, site, streets[:middle], height)
             good = middle
         except NetconvertError:
             bad = middle
     return streets[bad - 1].way
 
 
-def _converted(
+def _convert(
     binary: Path,
     site: SiteFacts,
     streets: Sequence[NetworkStreet],

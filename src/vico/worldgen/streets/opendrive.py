@@ -81,7 +81,11 @@ def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes
     """
     root = fromstring(content, forbid_dtd=True)
     roads = {str(road.get("id")): road for road in root.findall("road")}
-    streets = {name: _street(road) for name, road in roads.items() if road.get("junction") == "-1"}
+    streets = {
+        name: _Street(road, reference_line(road), lane_borders(road, at_end=False))
+        for name, road in roads.items()
+        if road.get("junction") == "-1"
+    }
     turns = [turn for junction in root.findall("junction") for turn in _turns(junction, roads, streets)]
     joined = {end for turn in turns for end in ((turn.before, True), (turn.after, False))}
     for name, street in list(streets.items()):
@@ -117,10 +121,6 @@ def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes
 
 def _length(curves: Iterable[Curve]) -> float:
     return sum(curve.length for curve in curves)
-
-
-def _street(road: Element) -> _Street:
-    return _Street(road, reference_line(road), lane_borders(road, at_end=False))
 
 
 def _turns(junction: Element, roads: Mapping[str, Element], streets: Mapping[str, _Street]) -> Iterator[_Turn]:

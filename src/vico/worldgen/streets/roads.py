@@ -44,7 +44,6 @@ SIDEWALK_WIDTH = 2.0
 MAX_LANES_EACH_WAY = 3
 _NO_SIDEWALK = {"motorway", "trunk", "service", "busway"}
 _PRIVATE = {"no", "private", "agricultural", "forestry", "military"}
-_MINOR_SERVICE = {"driveway", "parking_aisle", "drive-through", "emergency_access"}
 
 
 @dataclass(frozen=True)

@@ -238,9 +238,9 @@ class Drive:
 
     def metres_round(self, loop: Sequence[Berth]) -> float:
         """Cost of a closed drive past berths but for turns on the spot, which are as long as they are."""
-        return self.round(loop) - (_U_TURN_COST * self.driven(loop)[1] if len(loop) > 1 else 0.0)
+        return self.round(loop) - (_U_TURN_COST * self.lanes_and_turns(loop)[1] if len(loop) > 1 else 0.0)
 
-    def driven(self, loop: Sequence[Berth]) -> tuple[set[int], int]:
+    def lanes_and_turns(self, loop: Sequence[Berth]) -> tuple[set[int], int]:
         """Lanes of a closed drive, and how often it turns on the spot."""
         lanes = [i for a, b in zip(loop, [*loop[1:], loop[0]], strict=True) for i in self.lanes_between(a, b)]
         return {berth.lane for berth in loop} | set(lanes), int(self.uturn[lanes].sum())

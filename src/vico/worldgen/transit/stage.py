@@ -207,7 +207,7 @@ class _DrivenLine:
         )
 
     @property
-    def timed(self) -> bool:
+    def has_timetable(self) -> bool:
         """Whether the sources say when its buses leave the first stop."""
         return bool(self.departures) or (self.route is not None and self.route.interval is not None)
 
@@ -387,7 +387,7 @@ def _choose_driven_lines(
             if isinstance(fit, str):
                 left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
             else:
-                ways.append(fit[1].driven(fit[0]))
+                ways.append(fit[1].lanes_and_turns(fit[0]))
                 fits.append((route, *fit))
 
     def rank(k: int) -> tuple[bool, bool, bool, float, int]:
@@ -440,7 +440,7 @@ def _goes_along(route: Route, loop: tuple[Berth, ...], line: _DrivenLine) -> boo
     """Whether a route can be driven as one with a chosen line: the same round, or without timetables a part of it."""
     if len(line.names) >= _MOST_NAMES or bool(route.departures) != bool(line.departures):
         return False
-    return line.loop == loop or (not line.timed and route.interval is None and set(loop) <= set(line.loop))
+    return line.loop == loop or (not line.has_timetable and route.interval is None and set(loop) <= set(line.loop))
 
 
 def _waiting_apart(chosen: Sequence[_DrivenLine], left_out: list[Dropped]) -> list[_DrivenLine]:
@@ -451,18 +451,18 @@ def _waiting_apart(chosen: Sequence[_DrivenLine], left_out: list[Dropped]) -> li
     no long wait (see `times`), and go anywhere.
     """
     brief = [line.timing.idle <= _LONG_WAIT for line in chosen]
-    ways = [line.drive.driven(line.loop)[0] for line in chosen]
+    ways = [line.drive.lanes_and_turns(line.loop)[0] for line in chosen]
 
     def start(k: int, kept: Sequence[int]) -> int:
         """Choose line k's stop in a lane of its own among these, best with a lane beside it; -1 if it has none."""
         others = {lane for i in kept if i != k for lane in ways[i]}
-        loop = chosen[k].loop[:1] if chosen[k].timed else chosen[k].loop
+        loop = chosen[k].loop[:1] if chosen[k].has_timetable else chosen[k].loop
         own = [n for n, berth in enumerate(loop) if brief[k] or berth.lane not in others]
         # Cars get past where they may change lanes.
         return min(own, key=lambda n: chosen[k].drive.lanes.left[loop[n].lane] < 0, default=-1)
 
     kept: list[int] = []
-    for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].timed, k)):
+    for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].has_timetable, k)):
         if all(start(i, [*kept, k]) >= 0 for i in [*kept, k]):
             kept.append(k)
             continue
@@ -514,7 +514,7 @@ def _fit_route(
         cost = drive.round(loop)
         if cost < best[0] and drive.metres_round(loop) < longest:
             best = (cost, loop)
-            if not drive.driven(loop)[1]:
+            if not drive.lanes_and_turns(loop)[1]:
                 break
     if not best[1]:
         return f"no closed drive of {longest / 1000:g} km past its stops"

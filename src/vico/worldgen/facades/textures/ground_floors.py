@@ -230,7 +230,7 @@ def _cafes(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _rusticated(random: np.random.Generator) -> Picture:
+def _rustication(random: np.random.Generator) -> Picture:
     """Grooved blocks over a plinth, windows in surrounds with keystones."""
     canvas = blocks(_PX, _W, random, 32, 128, (226, 223, 217))
     canvas.rect(0, 0, _W, 34, (158, 154, 150))
@@ -265,7 +265,7 @@ def _plain(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _shuttered(random: np.random.Generator) -> Picture:
+def _shutter(random: np.random.Generator) -> Picture:
     """Render with shuttered windows, stone frames and an iron grille now and then."""
     canvas = plaster(_PX, _W, random, (214, 210, 202))
     canvas.rect(0, 0, _W, 44, (188, 180, 168))
@@ -459,9 +459,9 @@ def _shed(random: np.random.Generator) -> Picture:
 GROUNDS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "ground_shops": _shops,
     "ground_cafes": _cafes,
-    "ground_rusticated": _rusticated,
+    "ground_rusticated": _rustication,
     "ground_plain": _plain,
-    "ground_shuttered": _shuttered,
+    "ground_shuttered": _shutter,
     "ground_stucco": _stucco,
     "ground_granite": _granite,
     "ground_brick": _brick_ground,

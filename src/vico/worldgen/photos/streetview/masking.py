@@ -228,7 +228,7 @@ class LanguageGroundedMovers:
         torch, kit = _transformers()
         height, width = view.photo.shape[:2]
         look, find = (
-            self._loaded(kit, name, self.detector) for name in ("AutoProcessor", "GroundingDinoForObjectDetection")
+            self._pretrained(kit, name, self.detector) for name in ("AutoProcessor", "GroundingDinoForObjectDetection")
         )
         inputs = look(images=view.photo, text=self.words, return_tensors="pt").to(self.device)
         find = find.to(self.device).eval()
@@ -240,7 +240,7 @@ class LanguageGroundedMovers:
         mask = np.zeros((height, width), np.bool_)
         if not len(boxes):
             return mask
-        cut, model = (self._loaded(kit, name, self.segmenter) for name in ("SamProcessor", "SamModel"))
+        cut, model = (self._pretrained(kit, name, self.segmenter) for name in ("SamProcessor", "SamModel"))
         prompt = cut(view.photo, input_boxes=[boxes.tolist()], return_tensors="pt")
         sizes = prompt["original_sizes"].tolist(), prompt["reshaped_input_sizes"].tolist()
         model = model.to(self.device).eval()
@@ -251,7 +251,7 @@ class LanguageGroundedMovers:
         return mask
 
     @staticmethod
-    def _loaded(kit: Any, name: str, weights: str) -> Any:
+    def _pretrained(kit: Any, name: str, weights: str) -> Any:
         try:
             return getattr(kit, name).from_pretrained(weights, local_files_only=True)
         except (OSError, ValueError) as error:
@@ -347,7 +347,7 @@ class ColourCurve:
     gain: NDArray[np.float64]
     shift: NDArray[np.float64]
 
-    def applied(self, lab: NDArray[np.float32]) -> NDArray[np.float32]:
+    def apply(self, lab: NDArray[np.float32]) -> NDArray[np.float32]:
         """Lab colours of shape ``(..., 3)`` brought in line."""
         light = np.interp(lab[..., 0], self.source, self.target)
         tints = lab[..., 1:] * self.gain + self.shift

@@ -41,7 +41,7 @@ class Matches:
     def __len__(self) -> int:
         return len(self.score)
 
-    def taken(self, which: NDArray[Any]) -> Matches:
+    def select(self, which: NDArray[Any]) -> Matches:
         """Return some of the pairs."""
         return Matches(self.render[which], self.photo[which], self.score[which])
 
@@ -50,7 +50,7 @@ class Matches:
         height, width = reach.shape
         column = np.clip(self.render[:, 0].astype(np.int64), 0, width - 1)
         row = np.clip(self.render[:, 1].astype(np.int64), 0, height - 1)
-        return self.taken(np.linalg.norm(self.photo - self.render, axis=1) <= reach[row, column])
+        return self.select(np.linalg.norm(self.photo - self.render, axis=1) <= reach[row, column])
 
 
 class Matcher(Protocol):
@@ -263,7 +263,7 @@ class LoftrMatcher:
         score = found["confidence"].cpu().numpy().astype(np.float64)
         points = [found[f"keypoints{k}"].cpu().numpy().astype(np.float64) + 0.5 for k in range(2)]
         sure = score >= self.confidence
-        return Matches(points[0], points[1], score).taken(sure).within(reach)
+        return Matches(points[0], points[1], score).select(sure).within(reach)
 
     def _model(self, torch: Any, kornia: Any) -> Any:
         if not self.weights.is_file():
@@ -350,4 +350,4 @@ def _distinct(matches: Matches) -> Matches:
     order = np.lexsort((np.arange(len(matches)), -matches.score))
     cells = np.floor(matches.render[order]).astype(np.int64)
     _, first = np.unique(cells, axis=0, return_index=True)
-    return matches.taken(order[np.sort(first)])
+    return matches.select(order[np.sort(first)])

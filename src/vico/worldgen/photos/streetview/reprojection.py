@@ -465,7 +465,7 @@ def _shade_on_chart(
     mine = (samples.chart[seen.index] == number) & samples.known[seen.index]
     if not config.unshade > 0 or mine.sum() < _FEWEST_ON_CHART:
         return np.zeros(3)
-    gap = samples.lab[seen.index[mine]] - curve.applied(lab[mine])
+    gap = samples.lab[seen.index[mine]] - curve.apply(lab[mine])
     limit = np.array([_MOST_LIGHTER, _MOST_TINTED, _MOST_TINTED])
     return np.asarray(np.clip(np.median(gap, axis=0), -limit, limit), np.float64)
 
