@@ -457,7 +457,7 @@ def _report_step(progress: Progress | None, step: str, done: int) -> None:
 def divide_sources(request: CityRequest) -> RegionMap:
     """Keep for each tile what the region's map and ground say of it; return that map, as `divide_map`."""
     region = divide_map(request)
-    divide_waters(request, region, bare_ground(request))
+    divide_waters(request, region, _bare_ground(request))
     return region
 
 
@@ -477,7 +477,7 @@ def divide_map(request: CityRequest) -> RegionMap:
     return region
 
 
-def bare_ground(request: CityRequest) -> HeightField:
+def _bare_ground(request: CityRequest) -> HeightField:
     """Fit the bare ground of the whole city, level where nothing tells its heights."""
     half = request.grid.half + HALO
     if not request.sources.dem:

@@ -139,27 +139,27 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
         write_ground(whole, request.grid, lambda tile: _levels(request, tile))
         write_json(known, {"key": both})
     stages = Stages(request.plans / STREETS)
-    given = stages.given
-    data = given(data, f"{data.sha256} {data.frame} {data.half} {data.box}")
+    register = stages.register
+    data = register(data, f"{data.sha256} {data.frame} {data.half} {data.box}")
     with stages.timer("facts"):
-        site = given(site_facts(data), f"facts {stages.digest(data)}")
-    levels = given(whole_ground(whole, data.half), f"levels {both}")
-    height = given(replace(levels, decks=None, stairs=None), f"ground {both}")
-    solids = given(solids_of(shapes, request.grid), f"solids {both}")
-    streets = stages.run("polygons", streets_of, given(shapes, both), request.grid)
+        site = register(site_facts(data), f"facts {stages.digest(data)}")
+    levels = register(whole_ground(whole, data.half), f"levels {both}")
+    height = register(replace(levels, decks=None, stairs=None), f"ground {both}")
+    solids = register(solids_of(shapes, request.grid), f"solids {both}")
+    streets = stages.run("polygons", streets_of, register(shapes, both), request.grid)
     usable, tiles = frozenset(way for shape in shapes.values() for way in shape.open_ways), list(shapes)
     del shapes  # hundreds of megabytes in 27 km², and of no use any more
     give_back_memory()
     ways = stages.run(STREETS, streets_from_osm, site, solids, usable)
     roads = stages.run("roads", roads_from_osm, site, ways)
-    kerbs = given(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
+    kerbs = register(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
     release_pages(levels)
     network = stages.run("network", road_network, site, ways, levels, kerbs)
     release_pages(levels)  # half a gigabyte in 27 km²
     write_record(whole / ROADS, roads)
     write_bytes(whole / NET, network.net_xml)
     write_bytes(whole / XODR, network.xodr or b"")
-    lanes = given(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
+    lanes = register(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
     mapped = stages.run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=request.seed)
     release_pages(levels)
     with stages.timer("waiting"):

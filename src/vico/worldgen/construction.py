@@ -58,7 +58,7 @@ from vico.worldgen.stages import Stages, load_product
 from vico.worldgen.streets.polygons import road_polygons
 
 
-def read_data_tables() -> None:
+def _read_data_tables() -> None:
     """Read every file of data, ours and the user's, and make the user's models.
 
     Raises
@@ -122,7 +122,7 @@ class Plan:
 
 def plan_site(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan:
     """Run the stages that come before anything is built."""
-    read_data_tables()
+    _read_data_tables()
     run = stages.run
     evidence, known = _merge_buildings(evidence, stages)
     site = _without_lost(_site(evidence.data, request.place, stages), stages)

@@ -189,7 +189,7 @@ def _fill_triangles(image, corners, colours):  # type: ignore[no-untyped-def]
                         image[j, i, k] = colours[t, k]
 
 
-def map_picture(world: World) -> Image.Image:
+def _map_picture(world: World) -> Image.Image:
     """Draw a world from above with legend, scale bar, north arrow and attribution."""
     scale = 2  # drawn larger, then reduced
     side = _MAP_SIDE * scale
@@ -376,7 +376,7 @@ def write_previews(world: World, folder: Path, *, views: bool) -> dict[str, int]
 
 def write_map(world: World, folder: Path) -> None:
     """Write ``map.png``."""
-    map_picture(world).save(folder / "map.png")
+    _map_picture(world).save(folder / "map.png")
 
 
 def render_views(world: World, views: Sequence[Viewpoint | Overhead]) -> Iterator[NDArray[np.uint8]]:

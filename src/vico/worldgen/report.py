@@ -190,7 +190,7 @@ addEventListener("resize", fit); fit();
 _MAP_SIDE = 600  # pixels of a tile before it is zoomed
 
 
-def city_page(city: City) -> str:
+def _city_page(city: City) -> str:
     """Return the page, HTML; its pictures are those of the tiles, by relative path."""
     manifest = city.manifest
     (west, south), (east, north) = manifest.first, manifest.last
@@ -240,4 +240,4 @@ def city_page(city: City) -> str:
 
 def write_city_report(city: City) -> None:
     """Write ``report.html`` into a city's folder."""
-    write_bytes(city.path / "report.html", city_page(city).encode())
+    write_bytes(city.path / "report.html", _city_page(city).encode())

@@ -169,7 +169,7 @@ def rooftop_parts(
     random
         The building's own stream.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
 
     Returns
     -------
@@ -329,7 +329,9 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
             break
         west, south, east, north = room.bounds
         middle = np.array([west + (east - west) * at[0], south + (north - south) * at[1]])
-        box = _box(middle, size, _box_direction(part.polygon))
+        around = np.asarray(shapely.minimum_rotated_rectangle(part.polygon).exterior.coords)
+        side = around[1] - around[0]
+        box = _box(middle, size, math.atan2(side[1], side[0]))
         if free.contains(overlay.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
             made.append(_solid(box, part.eaves - 0.2, part.eaves + float(random.uniform(1.6, 3.0)), "penthouse"))
     return made
@@ -337,12 +339,6 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
 
 def _solid(polygon: Polygon, low: float, high: float, finish: str) -> PartPlan:
     return PartPlan(polygon, low, high, 0, Roof("flat", 0.0), {}, finish)
-
-
-def _box_direction(polygon: Polygon) -> float:
-    box = np.asarray(shapely.minimum_rotated_rectangle(polygon).exterior.coords)
-    side = box[1] - box[0]
-    return math.atan2(side[1], side[0])
 
 
 _LEAST_HEIGHT = 2.9  # metres under whatever hangs over a pavement
@@ -395,7 +391,7 @@ def projections(
     free
         Whether nothing stands in an outline between two heights above the building's base.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     random
         The building's own stream.
 

@@ -260,7 +260,7 @@ _MOST_SCALE = 0.04
 Move = tuple[tuple[float, float], float]
 
 
-def moved_to_mesh(
+def _moved_to_mesh(
     plans: list[BuildingPlan], measure: Measure, failed: list[Dropped]
 ) -> tuple[list[BuildingPlan], list[Move]]:
     """Plans with their footprints where the mesh has its walls; and each one's shift and scale.
@@ -508,7 +508,7 @@ def fit_to_tiles(
         better = new is not plan and mean_of(higher.off(k)) < mean_of(roofs.off(k)) - GAIN
         kept.append(new if better else plan)
         reasons.append("" if better else reason or "already fits")
-    moved, moves = moved_to_mesh(kept, measure, failed)
+    moved, moves = _moved_to_mesh(kept, measure, failed)
     final_roofs, final_walls = measure.roofs(moved), measure.walls(moved)
     fits = []
     for k, (plan, new) in enumerate(zip(plans, moved, strict=True)):

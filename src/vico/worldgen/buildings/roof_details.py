@@ -418,7 +418,7 @@ def dormers(
     others
         What else sits on its roofs; dormers keep clear of it.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     random
         The building's own stream.
 

@@ -76,7 +76,7 @@ def with_customary_roofs(
     streets
         Centre lines of streets: a ridge goes by the side of the house that lies nearest to one.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     flat_town
         Whether houses have flat roofs here (`is_flat_town`): then those that were supposed stay flat.
     random
@@ -185,7 +185,7 @@ def details_of(
     dropped
         Where it is told whose details can't be made.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     seed
         Decides what is there; each building's draws are its own.
 

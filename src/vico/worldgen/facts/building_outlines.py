@@ -50,7 +50,7 @@ _SPANNED = 5.0  # metres of street beneath that make it a passage
 _BARE = Roof("flat", 0.0)
 
 
-def support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: list[Dropped]) -> list[BuildingPlan]:
+def _support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: list[Dropped]) -> list[BuildingPlan]:
     """Bring down what would hover: mappers give an upper part its first level and forget what is below.
 
     A part that begins above the ground stays where it is if enough of its area rests on other solids, enough of its
@@ -150,7 +150,7 @@ def _carries(lower: PartPlan, upper: PartPlan) -> bool:
     )
 
 
-def without_needless_corners(polygon: Polygon) -> Polygon:
+def _without_needless_corners(polygon: Polygon) -> Polygon:
     """Drop corners of a polygon that are none: a wall is one line from corner to corner, so that its bays are whole."""
     rings = []
     for ring in rings_of(polygon):
@@ -161,7 +161,7 @@ def without_needless_corners(polygon: Polygon) -> Polygon:
     return tidied if isinstance(tidied, Polygon) and tidied.is_valid and tidied.area > 0.0 else polygon
 
 
-def separate_overlapping_solids(plans: list[BuildingPlan], dropped: list[Dropped]) -> list[BuildingPlan]:
+def _separate_overlapping_solids(plans: list[BuildingPlan], dropped: list[Dropped]) -> list[BuildingPlan]:
     """Cut solids that overlap in plan and height.
 
     The taller keeps its ground and the lower gets what is left of it. Under a taller one that begins above the ground
@@ -191,7 +191,7 @@ def separate_overlapping_solids(plans: list[BuildingPlan], dropped: list[Dropped
             for j in sorted(near.get(i, []), key=lambda j: int(rank[j])):
                 for other in placed[j]:
                     pieces = [piece for mine in pieces for piece in _beside(mine, other)]
-            placed[i] = [replace(piece, polygon=without_needless_corners(piece.polygon)) for piece in pieces]
+            placed[i] = [replace(piece, polygon=_without_needless_corners(piece.polygon)) for piece in pieces]
             continue
         failed.add(rows[i][0])
     result: list[BuildingPlan] = []
@@ -448,7 +448,7 @@ def building_plans(
             rule = "height tag" if tagged_height(tags) else "levels tag" if tagged_levels(tags) else "town"
             lone = BuildingPlan(name, tags.get("name"), use, tags, outline, part.levels, 0, [part], rule=rule)
             plans.append(_with_sources(lone, {}, origins, dropped))
-    return BuildingPlans(separate_overlapping_solids(support_floating_parts(plans, osm, dropped), dropped), dropped)
+    return BuildingPlans(_separate_overlapping_solids(_support_floating_parts(plans, osm, dropped), dropped), dropped)
 
 
 def _with_sources(

@@ -266,7 +266,7 @@ def _roof(
             shape = "flat"
         else:
             # Storeys within the roof are said of pitched roofs; a roof said to have none is flat.
-            shape = "flat" if tiers == 0 else usual_roof(use, storeys, flat and not tiers, area, deep, float(draw[1]))
+            shape = "flat" if tiers == 0 else _usual_roof(use, storeys, flat and not tiers, area, deep, float(draw[1]))
     if shape == "flat":
         return Roof("flat", 0.0 if open_below or area < 60.0 else 0.5 + 0.5 * float(draw[2]))
     if shape in ("gabled", "round", "gambrel", "saltbox") and deep < 0.5:
@@ -295,7 +295,7 @@ def _usual_height(shape: str, tags: Tags, use: str, deep: float, draw: float) ->
     return min(deep * math.tan(math.radians(pitch)), 12.0 if use == "religious" else 5.5)
 
 
-def usual_roof(use: str, storeys: int, flat: bool, area: float, deep: float, draw: float) -> str:
+def _usual_roof(use: str, storeys: int, flat: bool, area: float, deep: float, draw: float) -> str:
     """Return the roof of a building that doesn't say."""
     if use == "religious":
         return "gabled"

@@ -151,7 +151,7 @@ class ResolvedBuilding:
     facets: tuple[RoofFacet, ...]
 
 
-def resolve_building(area: OsmArea, claims: Sequence[Claim], precedence: Precedence) -> ResolvedBuilding:
+def _resolve_building(area: OsmArea, claims: Sequence[Claim], precedence: Precedence) -> ResolvedBuilding:
     """Decide outline, height, roof and name of a building of the map.
 
     Parameters
@@ -291,7 +291,7 @@ def conflate_buildings(osm: OsmData, sources: Sequence[FoundBuildings], preceden
         made = area
         if mine is not None:
             with drop_on_failure(area.id, dropped):
-                result = resolve_building(area, mine, precedence)
+                result = _resolve_building(area, mine, precedence)
                 results[area.id], made = result, result.area
         areas.append(made)
     origins |= {name: result.origin for name, result in results.items()}

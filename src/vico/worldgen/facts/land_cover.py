@@ -176,7 +176,7 @@ def _by_paving(
     return {**({kind: rest} if rest else {}), **parted}
 
 
-def pitch_surface(tags: dict[str, str]) -> str:
+def _pitch_surface(tags: dict[str, str]) -> str:
     """Say what a sports pitch is covered with: turf, court, clay, sand, gravel or concrete."""
     said = tags.get("surface", "")
     known = {
@@ -212,7 +212,7 @@ def _kind_of(tags: dict[str, str]) -> str | None:
     if natural in ("sand", "beach", "dune") or tags.get("golf") == "bunker":
         return "sand"
     if leisure in ("pitch", "track"):
-        return pitch_surface(tags)
+        return _pitch_surface(tags)
     if natural in _BARE or landuse == "railway":
         return "ballast"
     if natural in _WOODS or landuse == "forest":

@@ -333,14 +333,9 @@ class _Beside:
             apart = np.hypot(*(mine.line[:, None] - deck.line[None]).transpose(2, 0, 1))
             i, j = np.unravel_index(int(apart.argmin()), apart.shape)
             if abs(float(mine.z[i] - deck.z[j])) < _STEP_BETWEEN:
-                found.append(overlay.make_valid(_deck_carriageway(deck)))
+                side = left_normals(deck.line) * (deck.width / 2 - deck_sidewalk_width(deck.way.tags))
+                found.append(overlay.make_valid(Polygon(np.concatenate([deck.line + side, (deck.line - side)[::-1]]))))
         return overlay.union_all(found)
-
-
-def _deck_carriageway(deck: Deck) -> Polygon:
-    """Return where a deck's carriageway lies, metres."""
-    side = left_normals(deck.line) * (deck.width / 2 - deck_sidewalk_width(deck.way.tags))
-    return Polygon(np.concatenate([deck.line + side, (deck.line - side)[::-1]]))
 
 
 def _draw_deck(
@@ -522,27 +517,21 @@ def _draw_rails(stone: QuadMeshBuilder, site: SiteFacts, terrain: HeightField, w
             continue
         with drop_on_failure(f"w{way.id}"):
             drawn = QuadMeshBuilder()
-            _draw_rail(drawn, way, terrain, window, tree, ids)
+            # No railing stands where other ways go on beside the bridge.
+            line = np.asarray(shapely.segmentize(shapely.LineString(way.line), 4.0).coords)
+            left = left_normals(line)
+            width = deck_width(way) + (1.2 if way.tags["highway"] not in ON_FOOT else 0.0)
+            for side in (1.0, -1.0):
+                edge = line + side * left * (width / 2 - 0.1)
+                z = terrain.upper(edge)
+                for k in range(len(edge) - 1):
+                    middle = shapely.Point((edge[k] + edge[k + 1]) / 2)
+                    crowded = [j for j in tree.query(middle, predicate="intersects") if ids[int(j)] != way.id]
+                    if crowded or not window.contains(middle):
+                        continue
+                    p, q = np.r_[edge[k], z[k]], np.r_[edge[k + 1], z[k + 1]]
+                    out = side * np.r_[left[k], 0.0]
+                    if side > 0:
+                        p, q = q, p
+                    _parapet(drawn, p, q, out, solid=False)
             stone.take(drawn)
-
-
-def _draw_rail(
-    stone: QuadMeshBuilder, way: OsmWay, terrain: HeightField, window: Polygon, others: shapely.STRtree, ids: list[int]
-) -> None:
-    """Railings along one bridge, but not where other ways (`others`, with these ids) go on beside it."""
-    line = np.asarray(shapely.segmentize(shapely.LineString(way.line), 4.0).coords)
-    left = left_normals(line)
-    width = deck_width(way) + (1.2 if way.tags["highway"] not in ON_FOOT else 0.0)
-    for side in (1.0, -1.0):
-        edge = line + side * left * (width / 2 - 0.1)
-        z = terrain.upper(edge)
-        for k in range(len(edge) - 1):
-            middle = shapely.Point((edge[k] + edge[k + 1]) / 2)
-            crowded = [j for j in others.query(middle, predicate="intersects") if ids[int(j)] != way.id]
-            if crowded or not window.contains(middle):
-                continue
-            p, q = np.r_[edge[k], z[k]], np.r_[edge[k + 1], z[k + 1]]
-            out = side * np.r_[left[k], 0.0]
-            if side > 0:
-                p, q = q, p
-            _parapet(stone, p, q, out, solid=False)

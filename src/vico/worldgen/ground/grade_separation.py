@@ -152,7 +152,7 @@ def _mouth(portal: Portal) -> tuple[list[Floats], Floats, Floats]:
     return [c - side, c + deep - side, c + deep + side, c + side], u, left
 
 
-def portal_surfaces(portals: Sequence[Portal], terrain: HeightField, window: Polygon) -> list[Surface]:
+def _portal_surfaces(portals: Sequence[Portal], terrain: HeightField, window: Polygon) -> list[Surface]:
     """Draw the mouths of tunnels: a body of stone with a dark opening in its face."""
     stone = QuadMeshBuilder()
     for portal in portals:
@@ -174,7 +174,22 @@ def _portal_mesh(portal: Portal, terrain: HeightField, window: Polygon) -> QuadM
         return stone
     top = ground + portal.height + 0.9
     stone.box(foot, low, top, "wall")
-    _opening(stone, portal, ground, u, left)
+    # The dark mouth and the lintel above it lie a hand's breadth before the face.
+    middle = np.array(portal.place) - u * 0.04
+    side = left * portal.width / 2
+    rise = portal.height
+    profile: list[tuple[float, float]] = [(-1.0, rise * 0.72), (-0.8, rise * 0.88), (-0.4, rise), (0.4, rise)]
+    profile += [(0.8, rise * 0.88), (1.0, rise * 0.72)]
+    corner: Callable[[float, float], Floats] = lambda s, z: np.r_[middle + side * s, ground + z]  # noqa: E731
+    for (s0, z0), (s1, z1) in pairwise(profile):
+        # Seen from outside, looking in, left is to the left.
+        stone.add([corner(s1, 0.0), corner(s0, 0.0), corner(s0, z0), corner(s1, z1)], "kerb", _DARK)
+    before = middle - u * 0.12
+    lintel = [
+        np.r_[before + side * s * 1.08, ground + portal.height + z]
+        for s, z in ((1, 0.1), (-1, 0.1), (-1, 0.5), (1, 0.5))
+    ]
+    stone.add(lintel, "kerb")
     return stone
 
 
@@ -192,32 +207,13 @@ def _well(stone: QuadMeshBuilder, foot: Sequence[Floats], u: Floats, left: Float
         stone.box(wall, ground - 0.3, ground + PARAPET + 0.1, "wall")
 
 
-def _opening(stone: QuadMeshBuilder, portal: Portal, ground: float, u: Floats, left: Floats) -> None:
-    """Build the dark mouth and the lintel above it, a hand's breadth before the face."""
-    middle = np.array(portal.place) - u * 0.04
-    side = left * portal.width / 2
-    rise = portal.height
-    profile: list[tuple[float, float]] = [(-1.0, rise * 0.72), (-0.8, rise * 0.88), (-0.4, rise), (0.4, rise)]
-    profile += [(0.8, rise * 0.88), (1.0, rise * 0.72)]
-    corner: Callable[[float, float], Floats] = lambda s, z: np.r_[middle + side * s, ground + z]  # noqa: E731
-    for (s0, z0), (s1, z1) in pairwise(profile):
-        # Seen from outside, looking in, left is to the left.
-        stone.add([corner(s1, 0.0), corner(s0, 0.0), corner(s0, z0), corner(s1, z1)], "kerb", _DARK)
-    before = middle - u * 0.12
-    lintel = [
-        np.r_[before + side * s * 1.08, ground + portal.height + z]
-        for s, z in ((1, 0.1), (-1, 0.1), (-1, 0.5), (1, 0.5))
-    ]
-    stone.add(lintel, "kerb")
-
-
 _LANDED = 0.35  # metres from the ground at which the end of a deck counts as down
 _STEEPEST, _STEEPEST_ON_FOOT = 0.13, 0.25  # slopes of what can be driven and walked up; stairs may be steeper
 _STEEPEST_STAIRS = 1.1
 _ON_THE_GROUND = 0.3  # metres
 
 
-def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -> frozenset[int]:
+def _usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -> frozenset[int]:
     """Return the ways above streets that lead from the ground to the ground on slopes that can be used.
 
     Decks that meet are one bridge. Of each, streets are usable if those of its ends that streets on the ground go on
@@ -246,7 +242,7 @@ def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -
     return frozenset(found)
 
 
-def low_parts(decks: Sequence[Deck], terrain: HeightField) -> list[Polygon]:
+def _low_parts(decks: Sequence[Deck], terrain: HeightField) -> list[Polygon]:
     """Return where decks lie too low for people to pass under them, and too high to be the ground, metres."""
     found: list[Polygon] = []
     for deck in decks:
@@ -357,7 +353,7 @@ class Bridges:
         """Draw them, and the railings of bridges that are the ground."""
         return [
             *bridge_surfaces(self.decks, site, terrain, streets, window),
-            *portal_surfaces(self.portals, terrain, window),
+            *_portal_surfaces(self.portals, terrain, window),
             *bore_surfaces(self.bores, terrain, window),
         ]
 
@@ -385,5 +381,5 @@ def bridges_of(
     used = {bore.way.id for bore in bores}
     portals = [portal for portal in portals_of(site.osm, streets) if portal.way not in used]
     feet = [*pier_feet(decks, terrain, pier_free_area(site.osm, streets)), *portal_feet(portals)]
-    usable = usable_decks(site, decks, terrain)
-    return Bridges(decks, portals, feet, usable, low_parts(decks, terrain), bores, cuts_of(bores))
+    usable = _usable_decks(site, decks, terrain)
+    return Bridges(decks, portals, feet, usable, _low_parts(decks, terrain), bores, cuts_of(bores))

@@ -184,7 +184,7 @@ class Network:
                     heapq.heappush(heap, (-lower, other))
         return found
 
-    def levelled(
+    def fit_heights(
         self, wanted: Floats, weight: Floats, *, length: float, spacing: float, abreast: Abreast | None = None
     ) -> Floats:
         """Heights near the wanted ones that change their slope slowly.

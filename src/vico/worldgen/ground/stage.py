@@ -28,7 +28,7 @@ from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, nam
 from vico.worldgen.facts.land_cover import ground_partition, mapped_areas, pieces_in
 from vico.worldgen.facts.site import SiteFacts, on_the_ground
 from vico.worldgen.facts.street_habits import street_habits
-from vico.worldgen.facts.streets import Crossing, StreetPolygons
+from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges import spans_over_water
 from vico.worldgen.ground.decimation import decimate_mesh
 from vico.worldgen.ground.grade_separation import Bridges
@@ -81,31 +81,26 @@ def tactile_fields(streets: StreetPolygons, window: Polygon) -> list[Polygon]:
     for crossing in streets.crossings:
         if crossing.painted:
             with drop_on_failure(crossing.id):
-                found += _tactile_strips(crossing, streets.carriageway, pavement)
+                a, b = np.array(crossing.start), np.array(crossing.end)
+                along = (b - a) / max(distance(b, a), 1e-9)
+                reach = _FROM_KERB + _DEEP
+                strips: list[BaseGeometry] = []
+                for end, out in ((a, -along), (b, along)):
+                    if not shapely.intersects_xy(pavement, *(end + out * (_FROM_KERB + _DEEP / 2))):
+                        continue
+                    # Slanting crossings meet the kerb before or behind their end.
+                    middle = LineString([end - out * 1.5, end + out * 2.0])
+                    strip = overlay.buffer(middle, min(crossing.width, _WIDEST) / 2, cap_style="flat")
+                    x, y = end
+                    road = shapely.clip_by_rect(streets.carriageway, x - 6.0, y - 6.0, x + 6.0, y + 6.0)
+                    band = overlay.difference(
+                        overlay.buffer(road, reach, quad_segs=3), overlay.buffer(road, _FROM_KERB, quad_segs=3)
+                    )
+                    field = overlay.areas_of(overlay.intersection(overlay.intersection(strip, band), pavement))
+                    strips += [part for part in shapely.get_parts(field) if part.area > _LEAST]
+                found += strips
     inside = [shape for shape in found if window.contains(shape)]
     return polygons_of(overlay.union_all(inside, grid=0.001), _LEAST) if inside else []
-
-
-def _tactile_strips(crossing: Crossing, carriageway: BaseGeometry, pavement: BaseGeometry) -> list[BaseGeometry]:
-    a, b = np.array(crossing.start), np.array(crossing.end)
-    along = (b - a) / max(distance(b, a), 1e-9)
-    reach = _FROM_KERB + _DEEP
-    found: list[BaseGeometry] = []
-    for end, out in ((a, -along), (b, along)):
-        if not shapely.intersects_xy(pavement, *(end + out * (_FROM_KERB + _DEEP / 2))):
-            continue
-        # Slanting crossings meet the kerb before or behind their end.
-        strip = overlay.buffer(
-            LineString([end - out * 1.5, end + out * 2.0]), min(crossing.width, _WIDEST) / 2, cap_style="flat"
-        )
-        x, y = end
-        road = shapely.clip_by_rect(carriageway, x - 6.0, y - 6.0, x + 6.0, y + 6.0)
-        band = overlay.difference(
-            overlay.buffer(road, reach, quad_segs=3), overlay.buffer(road, _FROM_KERB, quad_segs=3)
-        )
-        field = overlay.areas_of(overlay.intersection(overlay.intersection(strip, band), pavement))
-        found += [part for part in shapely.get_parts(field) if part.area > _LEAST]
-    return found
 
 
 _KINDS_WITH_PITS = ("sidewalk", "pedestrian", "yard", "parking")

@@ -451,8 +451,15 @@ def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) 
         _lay(stone, overlay.intersection(piece.plan, driven), piece, 0.0, "carriageway")
         _lay(stone, overlay.intersection(piece.plan, raised), piece, KERB, "sidewalk")
         if piece.headroom:
-            _roof(stone, overlay.intersection(piece.plan, roofed), piece)
-    _kerbs(stone, driven, plan, floors)
+            flat, faces = triangulate(polygons_of(overlay.intersection(piece.plan, roofed), 0.005))
+            for a, b, c in np.c_[flat, piece.heights(flat) + piece.headroom][faces]:
+                stone.add([a, c, b, b], "kerb", _CEILING)
+    # Kerbs stand between carriageways and what is raised beside them.
+    unbroken = overlay.buffer(plan, -_AT)
+    for a, b in _edges(driven):
+        if unbroken.contains(shapely.Point((a + b) / 2)):
+            (low_a, low_b), _ = floors.at(np.stack([a, b]))
+            stone.add([np.r_[a, low_a], np.r_[b, low_b], np.r_[b, low_b + KERB], np.r_[a, low_a + KERB]][::-1], "kerb")
     # Mouths stay open, and so do tubes where they leave the window.
     mouths = overlay.union_all([shapely.LineString(end) for bore in bores for end in bore.end_lines()])
     ways_in = overlay.buffer(mouths, _AT, cap_style="flat")
@@ -505,15 +512,6 @@ def _lay(stone: QuadMeshBuilder, area: BaseGeometry, piece: _Piece, lift: float,
         stone.add([a, b, c, c], look)
 
 
-def _kerbs(stone: QuadMeshBuilder, driven: BaseGeometry, plan: BaseGeometry, floors: _Floors) -> None:
-    """Build the faces between carriageways and what is raised beside them."""
-    inside = overlay.buffer(plan, -_AT)
-    for a, b in _edges(driven):
-        if inside.contains(shapely.Point((a + b) / 2)):
-            (low_a, low_b), _ = floors.at(np.stack([a, b]))
-            stone.add([np.r_[a, low_a], np.r_[b, low_b], np.r_[b, low_b + KERB], np.r_[a, low_a + KERB]][::-1], "kerb")
-
-
 def _upright(
     stone: QuadMeshBuilder, a: Floats, b: Floats, low: Floats, high: Floats, tint: Rgb, look: str = "kerb"
 ) -> None:
@@ -533,13 +531,6 @@ def _cut_wall(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors, ter
     _upright(stone, a, b, low, high, _CONCRETE)
     _upright(stone, b + out, a + out, foot[::-1], high[::-1], _CONCRETE)
     stone.add([np.r_[a, high[0]], np.r_[a + out, high[0]], np.r_[b + out, high[1]], np.r_[b, high[1]]], "kerb")
-
-
-def _roof(stone: QuadMeshBuilder, area: BaseGeometry, piece: _Piece) -> None:
-    """Build a part of a piece's ceiling."""
-    flat, faces = triangulate(polygons_of(area, 0.005))
-    for a, b, c in np.c_[flat, piece.heights(flat) + piece.headroom][faces]:
-        stone.add([a, c, b, b], "kerb", _CEILING)
 
 
 def _portal(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors, terrain: HeightField) -> None:

@@ -54,7 +54,7 @@ class SmallThings:
     tops: dict[int, Top | None]
 
 
-def small_things_for_room(kind: str, items: Sequence[Furnishing], chance: np.random.Generator) -> SmallThings:
+def _small_things(kind: str, items: Sequence[Furnishing], chance: np.random.Generator) -> SmallThings:
     """Lay small things on the tables, desks and counters of a room.
 
     Parameters
@@ -225,7 +225,7 @@ def furnish_sketch(sketch: Sketch, chance: np.random.Generator, variant: int = 0
             else:
                 furnish_room(draft, kind.entry.furniture, room_kinds().names)
             items = draft.items
-        dress = small_things_for_room(room.kind, items, chance) if room.kind not in UNFURNISHED else SmallThings((), {})
+        dress = _small_things(room.kind, items, chance) if room.kind not in UNFURNISHED else SmallThings((), {})
         spots = _spots(room, draft, items, dress) if room.kind not in UNFURNISHED else ()
         rooms.append(
             RoomPlan(

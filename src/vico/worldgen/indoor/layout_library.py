@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
@@ -234,50 +234,31 @@ def _rooms_findings(layout: Layout) -> Iterator[str]:
         x0, y0, x1, y1 = room.rect
         if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
             yield f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least"
-        yield from _extent_findings(here, room, layout.size)
-        yield from _overlap_findings(here, room, before)
-
-
-def _extent_findings(here: str, room: LayoutRoom, size: Sequence[float]) -> Iterator[str]:
-    x0, y0, x1, y1 = room.rect
-    w, h = size
-    if x0 < -1e-6 or y0 < -1e-6 or x1 > w + 1e-6 or y1 > h + 1e-6:
-        yield f"{here}.rect: it leaves the plan of {w:g} x {h:g} m"
-
-
-def _overlap_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> Iterator[str]:
-    x0, y0, x1, y1 = room.rect
-    for j, other in enumerate(before):
-        a = other.rect
-        if x0 < a[2] - 0.01 and a[0] < x1 - 0.01 and y0 < a[3] - 0.01 and a[1] < y1 - 0.01:
-            yield f"{here}.rect: it overlaps rooms.{j} ({other.id})"
+        w, h = layout.size
+        if x0 < -1e-6 or y0 < -1e-6 or x1 > w + 1e-6 or y1 > h + 1e-6:
+            yield f"{here}.rect: it leaves the plan of {w:g} x {h:g} m"
+        for j, other in enumerate(before):
+            a = other.rect
+            if x0 < a[2] - 0.01 and a[0] < x1 - 0.01 and y0 < a[3] - 0.01 and a[1] < y1 - 0.01:
+                yield f"{here}.rect: it overlaps rooms.{j} ({other.id})"
 
 
 def _doors_findings(layout: Layout) -> Iterator[str]:
     rooms = {room.id: room for room in layout.rooms}
     for k, door in enumerate(layout.doors):
         here = f"doors.{k}"
-        unlinked = list(_between_findings(here, door, rooms))
-        yield from unlinked or _door_place_findings(here, door, rooms, layout.size)
-
-
-def _between_findings(here: str, door: LayoutDoor, rooms: Mapping[str, LayoutRoom]) -> Iterator[str]:
-    """Say that a door does not join two rooms of the plan, or one of them and the outdoors."""
-    lost = [name for name in door.between if name != "outside" and name not in rooms]
-    if lost:
-        yield f"{here}.between: there is no room {lost[0]!r}"
-    elif door.between[0] == door.between[1]:
-        yield f"{here}.between: twice the same room"
-
-
-def _door_place_findings(
-    here: str, door: LayoutDoor, rooms: Mapping[str, LayoutRoom], size: Sequence[float]
-) -> Iterator[str]:
-    for name in door.between:
-        if name != "outside" and not _on_wall(rooms[name].rect, door):
-            yield f"{here}.at: {door.at} with {door.width:g} m is not on a wall of {name!r}, clear of its ends"
-    if "outside" in door.between and not _on_wall([0.0, 0.0, *size], door):
-        yield f"{here}.at: {door.at} leads outside, but is not on the plan's edge"
+        lost = [name for name in door.between if name != "outside" and name not in rooms]
+        if lost:
+            yield f"{here}.between: there is no room {lost[0]!r}"
+            continue
+        if door.between[0] == door.between[1]:
+            yield f"{here}.between: twice the same room"
+            continue
+        for name in door.between:
+            if name != "outside" and not _on_wall(rooms[name].rect, door):
+                yield f"{here}.at: {door.at} with {door.width:g} m is not on a wall of {name!r}, clear of its ends"
+        if "outside" in door.between and not _on_wall([0.0, 0.0, *layout.size], door):
+            yield f"{here}.at: {door.at} leads outside, but is not on the plan's edge"
 
 
 def _ways_out_findings(layout: Layout) -> Iterator[str]:

@@ -144,7 +144,7 @@ class Rays:
         return Rays(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def agreeing_places(rays: Rays, rules: Rules) -> list[tuple[Floats, list[int]]]:
+def _agreeing_places(rays: Rays, rules: Rules) -> list[tuple[Floats, list[int]]]:
     """Return places and the rays that agree on each, most agreed first; every ray is in one of them."""
     candidates = _candidates(rays, rules)
     agrees = _agreement(candidates, rays, rules)
@@ -284,7 +284,7 @@ class LocatedThing:
     how: str
 
 
-def locate_things(found: Detections, height: HeightField, classes: Classes) -> tuple[list[LocatedThing], list[Dropped]]:
+def _locate(found: Detections, height: HeightField, classes: Classes) -> tuple[list[LocatedThing], list[Dropped]]:
     """Return the things that a file of detections tells of, and what of it is left out, with the reason.
 
     Parameters
@@ -345,7 +345,7 @@ def _of_class(
         sightings = [sightings[k] for k in np.flatnonzero(~floating).tolist()]
         rays = rays.select(~floating)
     alone: list[int] = []
-    for xy, members in agreeing_places(rays, rules):
+    for xy, members in _agreeing_places(rays, rules):
         few = len(members) < (rules.raised_photos if raised else 2)
         if few:
             alone += members
@@ -414,7 +414,7 @@ def _to_the_ground(one: Sighting, height: HeightField, reach: float) -> tuple[fl
     return distance, ROUGH + (distance**2 + drop**2) / drop * _TILT
 
 
-def merge_nearby(spots: Sequence[LocatedThing], apart: float) -> tuple[list[LocatedThing], list[Dropped]]:
+def _merge_nearby(spots: Sequence[LocatedThing], apart: float) -> tuple[list[LocatedThing], list[Dropped]]:
     """Return things of which no two of a class are nearer than `apart`; the one that more photos show stays."""
     kept: list[LocatedThing] = []
     dropped: list[Dropped] = []
@@ -479,8 +479,8 @@ def things_from_detections(osm: OsmData, found: Detections, height: HeightField,
         As for `objects_from_osm`: decides between models that suit equally well.
     """
     classes = detected_classes()
-    spots, dropped = locate_things(found, height, classes)
-    spots, twins = merge_nearby(spots, classes.rules.apart)
+    spots, dropped = _locate(found, height, classes)
+    spots, twins = _merge_nearby(spots, classes.rules.apart)
     nodes = [OsmNode(-k - 1, spot.xy, classes.by_name[spot.name.lower()].tags) for k, spot in enumerate(spots)]
     alone = replace(osm, nodes=nodes, ways=[], areas=[])
     wishes = {wish.id: wish for wish in mapped_placements(alone, height, seed)}

@@ -242,7 +242,7 @@ def _blocks(key: str, shape: BaseGeometry, tall: float | None) -> list[Placement
     return found
 
 
-def gate_yaws(osm: OsmData) -> dict[int, float]:
+def _gate_yaws(osm: OsmData) -> dict[int, float]:
     """Which way each gate leads through, by node id: across the barrier it hangs in, else along its way."""
     barriers: dict[int, float] = {}
     ways: dict[int, float] = {}
@@ -267,7 +267,7 @@ def mapped_placements(osm: OsmData, height: HeightField, seed: int) -> list[Plac
     zone = planting(osm, height)
     where = region(osm)
     points: list[Placement] = []
-    gates = gate_yaws(osm)
+    gates = _gate_yaws(osm)
     for node in osm.nodes:
         with drop_on_failure(f"n{node.id}"):
             wish = _point_placement(node, seed, zone, where, gates.get(node.id))
@@ -331,7 +331,12 @@ def _of_area(
         names = ("cafe_parasol", "cafe_table") if tags.get("leisure") else ("picnic_table", "picnic_table")
         return _grid(area, names, (3.1, 3.1), 24, random)
     if tags.get("landuse") == "flowerbed" or tags.get("garden:type") == "flower_bed":
-        return _flower_bed(area, random)
+        inner = overlay.buffer(area.polygon, -0.35)
+        name = _BEDS[int(random.integers(3))]
+        return [
+            Placement(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0)
+            for k, xy in enumerate(blue_noise_points(inner, 1.7, 60, random, least=0.98))
+        ]
     if tags.get("leisure") == "playground":
         return _playground(area, played, random)
     if tags.get("leisure") == "pitch":
@@ -339,15 +344,6 @@ def _of_area(
     if tags.get("leisure") == "fitness_station":
         return [Placement(area.id, "fitness_station", _middle(area))]
     return _single(area, seed, where)
-
-
-def _flower_bed(area: OsmArea, random: np.random.Generator) -> list[Placement]:
-    inner = overlay.buffer(area.polygon, -0.35)
-    name = _BEDS[int(random.integers(3))]
-    return [
-        Placement(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0)
-        for k, xy in enumerate(blue_noise_points(inner, 1.7, 60, random, least=0.98))
-    ]
 
 
 def _middle(area: OsmArea) -> NDArray[np.float64]:

@@ -126,7 +126,13 @@ def parking_from_osm(
     feet = np.asarray(
         shapely.polygons([_rectangle(one.bay, *size) for one, size in zip(found, sizes, strict=True)]), object
     )
-    keep = _standing(found, feet, streets, osm.half) & _on_level_ground(found, height)
+    # Bays at kerbs lie on the carriageway, others on car parks, all within the world.
+    within = np.abs(shapely.bounds(feet)).max(axis=1) < osm.half - 1.0
+    lot = np.array([one.kind == "lot" for one in found])
+    for shape, own in ((streets.carriageway, ~lot), (streets.parking, lot)):
+        shapely.prepare(shape)
+        within[own] &= shapely.covers(shape, feet[own])
+    keep = np.asarray(within, bool) & _on_level_ground(found, height)
     keep &= _clear(feet, _kept_free(osm, streets, lanes, transit, solids, objects))
     chosen = _apart(np.flatnonzero(keep), feet)
     entity = max([FIRST_OBJECT - 1, *objects.entity[objects.entity < FIRST_STOP].tolist()]) + 1
@@ -215,18 +221,6 @@ def _rectangle(bay: Bay, length: float, width: float) -> NDArray[np.float64]:
     c, s = math.cos(bay.yaw), math.sin(bay.yaw)
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length / 2, width / 2)
     return np.asarray(bay.centre) + corners @ np.array([[c, s], [-s, c]])
-
-
-def _standing(
-    found: Sequence[_Candidate], feet: NDArray[np.object_], streets: StreetPolygons, half: float
-) -> NDArray[np.bool_]:
-    """Which bays lie on the ground they should lie on, within the world."""
-    within = np.abs(shapely.bounds(feet)).max(axis=1) < half - 1.0
-    lot = np.array([one.kind == "lot" for one in found])
-    for shape, own in ((streets.carriageway, ~lot), (streets.parking, lot)):
-        shapely.prepare(shape)
-        within[own] &= shapely.covers(shape, feet[own])
-    return np.asarray(within, bool)
 
 
 def _on_level_ground(found: Sequence[_Candidate], height: HeightField) -> NDArray[np.bool_]:

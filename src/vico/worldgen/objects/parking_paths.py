@@ -335,8 +335,8 @@ def _bends(spot: ParkingSpot) -> Iterator[Floats]:
                 yield np.concatenate([[[x, y]], arc])
 
 
-def _outlines(line: Floats) -> NDArray[np.object_]:
-    """Return outlines of a car whose axles follow a line, from the line's start to its end."""
+def _touches(things: shapely.STRtree, line: Floats) -> bool:
+    """Return whether a car whose axles follow a line touches anything."""
     path = shapely.LineString(line)
     back = np.arange(0.0, max(path.length - _WHEELBASE, 0.0) + 0.5, 0.5)
     rear = shapely.get_coordinates(shapely.line_interpolate_point(path, back))
@@ -345,12 +345,7 @@ def _outlines(line: Floats) -> NDArray[np.object_]:
     middle = (front + rear) / 2
     a, b = _LENGTH / 2 + _AIR, _WIDTH / 2 + _AIR
     outlines = [_corners(x, y, h, a, b) for (x, y), h in zip(middle.tolist(), yaw.tolist(), strict=True)]
-    return np.asarray(shapely.polygons(np.array(outlines)), object)
-
-
-def _touches(things: shapely.STRtree, line: Floats) -> bool:
-    """Return whether a car whose axles follow a line touches anything."""
-    return bool(things.query(_outlines(line), predicate="intersects").size)
+    return bool(things.query(np.asarray(shapely.polygons(np.array(outlines)), object), predicate="intersects").size)
 
 
 @dataclass(frozen=True)

@@ -185,16 +185,6 @@ def _unit(heading: float) -> Floats:
     return np.array([math.cos(heading), math.sin(heading)])
 
 
-def _with_heights(line: Floats, heights: Floats) -> Floats:
-    """Return a line with its heights, and with more points where they would not do to tell them."""
-    size = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    profile = overlay.simplify(shapely.LineString(heights * [size, 1.0]), _LEVEL)
-    own = _shares_of_length(line)
-    at = np.union1d(own, shapely.get_coordinates(profile)[:, 0] / max(size, 1e-9))
-    at = at[np.r_[True, np.diff(at) * size > 0.01]]
-    return np.stack([*(np.interp(at, own, line[:, k]) for k in (0, 1)), np.interp(at, *heights.T)], axis=1)
-
-
 def _write_lane(found: re.Match[bytes], paths: dict[str, _Path]) -> bytes:
     """Return a lane's element with its new shape and length, or as it was."""
     path = paths.get(found.group(1).decode())
@@ -202,7 +192,13 @@ def _write_lane(found: re.Match[bytes], paths: dict[str, _Path]) -> bytes:
         return found.group(0)
     points = path.line
     if path.heights is not None:
-        points = _with_heights(points, path.heights)
+        # Where the points of the line are too few for its heights, there are more.
+        size = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        profile = overlay.simplify(shapely.LineString(path.heights * [size, 1.0]), _LEVEL)
+        own = _shares_of_length(points)
+        at = np.union1d(own, shapely.get_coordinates(profile)[:, 0] / max(size, 1e-9))
+        at = at[np.r_[True, np.diff(at) * size > 0.01]]
+        points = np.stack([*(np.interp(at, own, points[:, k]) for k in (0, 1)), np.interp(at, *path.heights.T)], axis=1)
     shape = " ".join(",".join(f"{value:.3f}" for value in point) for point in points.tolist())
     length = max(float(np.hypot(*np.diff(path.line, axis=0).T).sum()), 0.1)
     return b'<lane id="%s"%s length="%.3f"%s shape="%s"' % (

@@ -399,19 +399,6 @@ def _write_file(root: Element, streets: Sequence[Element], ways: Sequence[Elemen
         controller.extend(one for one in given if one.get("signalId") in signals - known)
     kept = [*controllers.values(), *root.findall("junction")]
     root[:] = [header, *roads, *(element for element in kept if len(element))]
-    _set_bounds(header, roads)
-    geo = header.find("geoReference")
-    where = "" if geo is None else str(geo.text).strip()
-    if geo is not None:
-        geo.text = None
-    indent(root, "    ")
-    text = tostring(root, encoding="unicode")
-    text = text.replace("<geoReference />", f"<geoReference><![CDATA[{where}]]></geoReference>", 1)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
-
-
-def _set_bounds(header: Element, roads: Iterable[Element]) -> None:
-    """Set the header's bounds to the box around all roads with their lanes."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for road in roads:
         reach = max((abs(t) for pair in lane_borders(road, at_end=False).values() for t in pair), default=0.0)
@@ -421,3 +408,11 @@ def _set_bounds(header: Element, roads: Iterable[Element]) -> None:
     if np.isfinite(low).all():
         for name, value in zip(("west", "south", "east", "north"), (*low, *high), strict=True):
             header.set(name, f"{value:.3f}")
+    geo = header.find("geoReference")
+    where = "" if geo is None else str(geo.text).strip()
+    if geo is not None:
+        geo.text = None
+    indent(root, "    ")
+    text = tostring(root, encoding="unicode")
+    text = text.replace("<geoReference />", f"<geoReference><![CDATA[{where}]]></geoReference>", 1)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

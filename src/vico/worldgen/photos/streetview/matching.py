@@ -189,7 +189,12 @@ def _match_within_reach(a: _Features, b: _Features, reach: NDArray[np.float32], 
         quality[mine[good]] = 1.0 - near[good] / np.minimum(next_[good], 1.4)
     paired = np.flatnonzero(partner >= 0)
     mutual = paired[back_of[partner[paired]] == paired]
-    return _distinct(Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual]))
+    # One pair for each pixel of the render: features with several orientations would vote several times.
+    matches = Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual])
+    order = np.lexsort((np.arange(len(matches)), -matches.score))
+    cells = np.floor(matches.render[order]).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    return matches.select(order[np.sort(first)])
 
 
 def _descriptor_distances(alike: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -343,11 +348,3 @@ def _kornia(what: str) -> tuple[Any, Any]:
 
 def _no_matches() -> Matches:
     return Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
-
-
-def _distinct(matches: Matches) -> Matches:
-    """One pair for each pixel of the render: features with several orientations would vote several times."""
-    order = np.lexsort((np.arange(len(matches)), -matches.score))
-    cells = np.floor(matches.render[order]).astype(np.int64)
-    _, first = np.unique(cells, axis=0, return_index=True)
-    return matches.select(order[np.sort(first)])

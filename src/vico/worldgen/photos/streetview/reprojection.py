@@ -181,7 +181,7 @@ def flat_ground(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.zeros(np.asarray(xy).shape[:-1])
 
 
-def prepare_photo(
+def _prepare_photo(
     image: StreetImage, photograph: Photographer, config: StreetviewConfig, ground: Ground
 ) -> tuple[PhotoOutcome, Shot | None]:
     """Mend a photo's pose and paint over what moves; None if it can't be used, with the reason."""
@@ -382,7 +382,7 @@ def reproject(
     views: list[VisiblePoints] = []
     for image in images:
         with drop_on_failure(f"{image.source} {image.id}"):
-            outcome, shot = prepare_photo(image, photograph, config, ground or flat_ground)
+            outcome, shot = _prepare_photo(image, photograph, config, ground or flat_ground)
             if shot is not None:
                 seen = _visible_samples(samples, shot, atlas, sight, config)
                 if len(seen.index):
