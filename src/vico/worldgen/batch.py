@@ -114,7 +114,7 @@ class BadRow:
 
 @dataclass(frozen=True)
 class PlaceTable:
-    """What a table of places holds.
+    """Rows of a table of places, and notes on how it is written.
 
     Attributes
     ----------
@@ -344,7 +344,7 @@ def place_lists() -> dict[str, PlaceList]:
 
 
 def rows_of(places: PlaceList, *, extracts: Path | None = None, only: Collection[str] = ()) -> list[PlaceRow]:
-    """Return what `build_many` is told of a list.
+    """Return the rows of a list for `build_many`.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def _row_of_place(place: ListedPlace, extracts: Path | None) -> PlaceRow:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a place: built, kept (it was there), or failed with a reason."""
+    """Result for a place: built, kept (it was there), or failed with a reason."""
 
     name: str
     state: str
@@ -405,7 +405,7 @@ def build_many(
     ray: str | None = None,
     finished: Finished | None = None,
 ) -> list[Outcome]:
-    """Build every place into a folder of `out`; a world that is there and whole is kept, one that fails is told.
+    """Build every place into a folder of `out`; a world that is there and whole is kept, one that fails is reported.
 
     Parameters
     ----------

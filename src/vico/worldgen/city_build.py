@@ -478,7 +478,7 @@ def divide_map(request: CityRequest) -> RegionMap:
 
 
 def _bare_ground(request: CityRequest) -> HeightField:
-    """Fit the bare ground of the whole city, level where nothing tells its heights."""
+    """Fit the bare ground of the whole city, level where its heights are unknown."""
     half = request.grid.half + HALO
     if not request.sources.dem:
         return flat_terrain(half=half)

@@ -1,4 +1,4 @@
-"""What is asked of a city, the map of its region, and what is decided once for the whole city: waters and tunnels.
+"""The request for a city, the map of its region, and waters and tunnels, which are decided once for the whole city.
 
 How high waters lie is decided by all their banks. Which tunnels can be used, and how they lie, is decided by all
 their mouths: a tile knows of a tunnel what lies in it alone, and its neighbour would lay another floor, or close it.
@@ -92,7 +92,7 @@ class CityRequest:
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> CityRequest:
-        """Return what `to_json` told."""
+        """Return the request that `to_json` wrote."""
         grid = content["grid"]
         return cls(
             Sources.from_json(content["sources"]),
@@ -163,7 +163,7 @@ def _bodies_of_water(region: RegionMap, ground: HeightField) -> list[WaterBody]:
 
 
 def _part_of(body: WaterBody, window: shapely.Polygon, middle: NDArray[np.float64]) -> list[WaterBody]:
-    """Return what of a body lies in a window, as high as it is, told from another middle."""
+    """Return the parts of a body in a window, as high as it is, in coordinates around another middle."""
     here = polygons_of(overlay.intersection(body.outline, window))
     return [replace(body, outline=translate(part, *(-middle).tolist()), shore=body.shore - middle) for part in here]
 
@@ -282,7 +282,7 @@ class _CityGround:
 
 
 def _bores_near(bores: Sequence[Bore], tile: Tile, grid: TileGrid) -> list[Bore]:
-    """Return what of tunnels is near a tile, told from its middle."""
+    """Return the parts of tunnels near a tile, in the tile's coordinates."""
     middle = np.array(grid.centre(tile))
     reach = grid.size / 2 + APRON + _MORE
     found: list[Bore] = []

@@ -100,7 +100,7 @@ def map_of(place: TilePlace) -> tuple[OsmData, str]:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is decided before anything is built: outlines of buildings, streets, and the ground graded to them.
+    """Plan of a world before anything is built: outlines of buildings, streets, and the ground graded to them.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def plan_site(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan
 
 @dataclass(frozen=True)
 class Shape:
-    """What stands and lies there: the plan carried out, before streets are driven on and things put beside them.
+    """Buildings and ground: the plan carried out, before there are lanes and objects.
 
     Attributes
     ----------
@@ -229,7 +229,7 @@ def _without_lost(site: SiteFacts, stages: Stages) -> SiteFacts:
 def _terrain(
     evidence: Evidence, plans: BuildingPlans, request: WorldRequest, stages: Stages
 ) -> tuple[HeightField, TileMesh | None]:
-    """Make the bare ground of whatever tells heights; the tile mesh, if there is one, is raised to stand on it."""
+    """Make the bare ground from the sources of heights; the tile mesh, if there is one, is raised to stand on it."""
     tiles, half, place = evidence.tiles, request.reach, request.place
     if place is not None and request.sources.dem:
         # Of the whole city at once: a fit to fewer samples is another one.
@@ -249,7 +249,7 @@ def _terrain(
 def _ground_of_tiles(
     data: OsmData, samples: HeightSamples | None, mesh: TileMesh, plans: BuildingPlans, *, half: float
 ) -> tuple[HeightField, float]:
-    """Make the ground, and tell by how much the tile mesh has to be raised to stand on it.
+    """Return the ground, and by how much the tile mesh has to be raised to stand on it.
 
     An elevation file that is given goes before the mesh's own ground; a mesh of buildings alone has none.
     """

@@ -1,4 +1,4 @@
-"""What the sources of a world give, read once before its stages run; and which values of the map could not be read.
+"""Content of a world's sources, read once before its stages run; and values of the map that could not be read.
 
 A build's report lists each value that is not plain: what was read by a rule ("G+4" as five storeys), what can't be
 read ("two"), and what can't be true ("9999"). Nothing else is decided here; stages read the same values by
@@ -92,7 +92,7 @@ def opening_hours_notes(places: Sequence[Place]) -> tuple[dict[str, int], list[D
 
 
 def _tagged_objects(osm: OsmData) -> Iterator[tuple[str, NDArray[np.float64], Tags]]:
-    """Everything of a map that has tags: its id, points of its shape, and its tags. A closed way is told once."""
+    """Yield everything of a map that has tags: its id, points of its shape, and its tags; a closed way once."""
     yield from ((f"n{node.id}", node.xy[None], node.tags) for node in osm.nodes)
     yield from ((f"w{way.id}", way.line, way.tags) for way in osm.ways)
     relations: Iterable[tuple[str, NDArray[np.float64], Tags]] = (
@@ -123,7 +123,7 @@ _SHOWN_OUTLIERS = 3
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the sources gave.
+    """Content of the sources.
 
     Attributes
     ----------

@@ -91,7 +91,7 @@ def report_page(world: World) -> str:
 
 
 def write_report(world: World) -> None:
-    """Write the page into the world's folder. It tells seconds, so it is no part of the world's identity."""
+    """Write the page into the world's folder. It shows seconds, so it is no part of the world's identity."""
     write_bytes(world.file("report.html"), report_page(world).encode())
 
 

@@ -271,7 +271,7 @@ SUFFIX = ".stage"
 
 @dataclass(frozen=True)
 class _StageFile:
-    """What the file of a stage holds: what it made, what it left out, and of how many objects (0 if nothing)."""
+    """Content of a stage's file: what it made, what it left out, and of how many objects (0 if nothing)."""
 
     value: Any
     dropped: list[Dropped]

@@ -1,4 +1,4 @@
-"""What stages made, written into the world's folder and told in its report."""
+"""Products of stages, written into the world's folder and reported."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class WorldParts:
-    """What a world consists of beside its surfaces; fields are named as the attributes of `World`."""
+    """Parts of a world beside its surfaces; fields are named as the attributes of `World`."""
 
     height: HeightField
     buildings: list[Building]
@@ -116,7 +116,7 @@ class WorldWriter:
         self._stages = stages
 
     def terrain(self, height: HeightField, *, flat: bool) -> None:
-        """Write the graded ground; `flat` says that nothing told its heights."""
+        """Write the graded ground; `flat` says that its heights are unknown."""
         write_terrain(self.folder / "terrain.npz", height)
         told = [Dropped(id="terrain", reason=FLAT_GROUND)] if flat else []
         self._stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(flat)}, told)

@@ -176,7 +176,7 @@ _ABSENT = 1.5  # metres over the ground floor under which the mesh shows no buil
 
 
 def raised_to_mesh(plan: BuildingPlan, roofs: RoofSamples, k: int, base: float) -> tuple[BuildingPlan, str]:
-    """Return the plan with eaves and roofs where the mesh has them; or itself, and why, where nothing tells."""
+    """Return the plan with eaves and roofs where the mesh has them; or itself, and why, where no heights are known."""
     mine = np.flatnonzero(roofs.plan == k)
     if len(mine) < LEAST_POINTS:
         return plan, "too small or outside the tiles"
@@ -389,7 +389,7 @@ def _move_building(
 
 @dataclass(frozen=True)
 class Fit:
-    """What became of a building.
+    """Result of fitting a building.
 
     Attributes
     ----------
@@ -419,7 +419,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class FitReport:
-    """What became of all buildings.
+    """Results of fitting all buildings.
 
     Attributes
     ----------

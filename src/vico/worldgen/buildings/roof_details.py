@@ -1,4 +1,4 @@
-"""What belongs to a roof beside its slopes: eaves, stepped gables and dormers; closed solids each.
+"""Parts of a roof beside its slopes: eaves, stepped gables and dormers; closed solids each.
 
 Eaves: roofs reach out over the walls, each slope in its own plane, cut where a neighbour stands. What is built is the
 fringe outside the walls alone: along every edge of an outline the slopes that end there go on outwards and down (at

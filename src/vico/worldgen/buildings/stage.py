@@ -267,7 +267,7 @@ class UncladBuildings:
 
 @dataclass(frozen=True)
 class Cladding:
-    """What covers buildings: layers "buildings" and "roofs", together closed, part by part."""
+    """Surfaces of buildings: layers "buildings" and "roofs", together closed, part by part."""
 
     walls: list[Surface]
     roofs: list[Surface]
@@ -275,7 +275,7 @@ class Cladding:
 
 @dataclass(frozen=True)
 class BuildingsResult:
-    """What the stage made.
+    """Product of the stage.
 
     Attributes
     ----------

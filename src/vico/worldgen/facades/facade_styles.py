@@ -238,7 +238,7 @@ Table = Sequence[tuple[str, float]]
 
 @dataclass(frozen=True)
 class House:
-    """What is known of a building whose facade is looked for.
+    """Facts about a building that decide its facade.
 
     Attributes
     ----------
@@ -348,7 +348,7 @@ def tower(house: House) -> Table | None:
 
 
 def by_age(house: House) -> Table | None:
-    """Decide by the year it was built in, told or supposed, and the customs of that time."""
+    """Decide by the year it was built in, mapped or supposed, and the customs of that time."""
     year = house.year
     if year is None and _of_an_old_town(house):
         year = _TOWN_HOUSE_YEAR

@@ -1,4 +1,4 @@
-"""What stands at the entrances: doors by use, shop fronts with the shop's name, canopies, awnings, projecting signs."""
+"""Fronts at the entrances: doors by use, shop fronts with the shop's name, canopies, awnings, projecting signs."""
 
 from __future__ import annotations
 

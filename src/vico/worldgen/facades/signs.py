@@ -222,7 +222,7 @@ _RIM = 2  # pixels
 
 @dataclass(frozen=True)
 class Lettering:
-    """What is painted on a board.
+    """Text and colours of a board.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class Lettering:
 
     @property
     def order(self) -> tuple[str, Rgb, Rgb, tuple[int, ...], bool]:
-        """What boards are sorted by."""
+        """Key that boards are sorted by."""
         return self.text, self.ground, self.letters, self.rim or (), self.shines
 
 

@@ -92,7 +92,7 @@ class NamePlate:
 
 @dataclass(frozen=True)
 class Streets:
-    """What plates are hung by.
+    """Facts that decide where plates hang.
 
     Attributes
     ----------

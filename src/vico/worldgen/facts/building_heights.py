@@ -151,7 +151,7 @@ def level_estimates(
 
 
 class _Town:
-    """What is known of all outlines, for those that don't say their storeys.
+    """Facts about all outlines, for those without mapped storeys.
 
     Attributes
     ----------

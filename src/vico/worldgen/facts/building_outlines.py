@@ -1,4 +1,4 @@
-"""What buildings there are: outlines and parts from OpenStreetMap, with heights, uses and roofs decided.
+"""Buildings of a place: outlines and parts from OpenStreetMap, with heights, uses and roofs decided.
 
 Facts win; where OpenStreetMap says nothing, type, area and the neighbours decide, then a seeded draw of each
 building's own. Spec section 1, buildings; OSM wiki, Simple 3D Buildings.

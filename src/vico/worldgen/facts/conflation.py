@@ -40,7 +40,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Precedence(DataRecord):
-    """Order of sources by what they tell; see data/sources/precedence.toml.
+    """Order of sources by kind of fact; see data/sources/precedence.toml.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ _LEAST_AREA = 2.0  # square metres
 
 @dataclass(frozen=True)
 class Claim:
-    """What a file says of a building of the map.
+    """Facts in a file about a building of the map.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ def _resolve_building(area: OsmArea, claims: Sequence[Claim], precedence: Preced
     """
 
     def first(order: Sequence[str], of_map: bool, tells: Callable[[Claim], bool]) -> Claim | None:
-        """Return the claim that goes first; None if the map does, or nobody tells."""
+        """Return the claim that goes first; None if the map does, or there is none."""
         ranked = [
             (rank, k) for k, claim in enumerate(claims)
             if tells(claim) and (rank := rank_of(claim.main.kind, claim.main.file, order)) is not None

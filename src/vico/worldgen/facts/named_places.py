@@ -34,7 +34,7 @@ class _CategoriesFile(DataRecord):
 
 
 class Ending(DataRecord):
-    """What a word means that ends so."""
+    """Meaning of words with an ending."""
 
     endings: Words
     category: Category

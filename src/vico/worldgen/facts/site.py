@@ -1,4 +1,4 @@
-"""What the map says of a place that several stages need, decided once: levels, bridges over streets, bodies of water.
+"""Facts of a map that several stages need, decided once: levels, bridges over streets, bodies of water.
 
 A bridge over water, a railway or nothing mapped is the ground there. A bridge over a street is not: the street keeps
 the ground, and the deck above it is a surface of its own, which is used where it comes down to the ground. A river, a

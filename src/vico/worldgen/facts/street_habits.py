@@ -105,7 +105,7 @@ Ring = tuple[tuple[float, float], ...]
 
 
 class Paving(DataRecord):
-    """What a kind of ground is covered with: a material of ours, metres that its texture covers, and a tint."""
+    """Covering of a kind of ground: a material of ours, metres that its texture covers, and a tint."""
 
     material: str
     tile: float
@@ -181,7 +181,7 @@ class Markings:
 
 @dataclass(frozen=True)
 class Plates:
-    """What plates with the names of streets and the numbers of houses look like.
+    """Colours of plates with the names of streets and the numbers of houses.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ class Plates:
 
 @dataclass(frozen=True)
 class StreetHabits:
-    """What is usual in the streets of a place.
+    """Customs in the streets of a place.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is seen beyond the edge of a world: plain houses where its edge is built up, trees where it is not.
+"""Backdrop beyond the edge of a world: plain houses where its edge is built up, trees where it is not.
 
 Nobody knows what stands there, and nothing of it is a record of the world: it is like the painted cloth behind a stage,
 so that streets do not end in a bare plain. Heights and colours are those of the buildings near by, water stays open.

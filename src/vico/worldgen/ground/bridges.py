@@ -238,7 +238,7 @@ def left_normals(line: Floats) -> Floats:
 
 
 def pier_feet(decks: Sequence[Deck], terrain: HeightField, keep_clear: BaseGeometry) -> list[Polygon]:
-    """Return where the piers of decks stand, for those who must not walk through them, metres."""
+    """Return the footprints of the piers of decks, which block walking, metres."""
     feet: list[Polygon] = []
     for deck in decks:
         with drop_on_failure(f"w{deck.way.id}"):
@@ -294,7 +294,7 @@ def bridge_surfaces(
 
 @dataclass(frozen=True)
 class _Beside:
-    """All decks, to tell where one borders on another: no parapet stands between two decks of one bridge."""
+    """All decks, to find where one borders on another: no parapet stands between two decks of one bridge."""
 
     decks: list[Deck]
     tree: shapely.STRtree

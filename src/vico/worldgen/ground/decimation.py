@@ -121,7 +121,7 @@ class _Mesh(NamedTuple):
 
 
 class _Ring(NamedTuple):
-    """What lies about one corner; room for the largest.
+    """Surroundings of one corner; room for the largest.
 
     Attributes
     ----------

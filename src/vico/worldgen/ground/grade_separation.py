@@ -138,7 +138,7 @@ def _end_of(way: OsmWay, here: Floats, inward: Floats) -> BaseGeometry:
 
 
 def portal_feet(portals: Sequence[Portal]) -> list[Polygon]:
-    """Where the mouths of tunnels stand, for those who must not walk through them, metres."""
+    """Return the footprints of the mouths of tunnels, which block walking, metres."""
     return [Polygon([corner[:2] for corner in _mouth(portal)[0]]) for portal in portals]
 
 

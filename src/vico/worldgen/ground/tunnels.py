@@ -60,7 +60,7 @@ _PRIVATE = {"no", "private", "permit", "delivery", "agricultural", "forestry", "
 
 
 class Ground(Protocol):
-    """What tunnels lie under: the ground with streets graded into it, of one place or of all tiles of a city."""
+    """Ground above tunnels: with streets graded into it, of one place or of all tiles of a city."""
 
     def smooth(self, xy: Floats, /) -> Floats:
         """Return heights without kerbs at points, metres, shape ``(n, 2)`` or ``(2,)``."""
@@ -192,7 +192,7 @@ def _strip(line: Floats, chosen: NDArray[np.bool_], half: float, *, both: bool =
 
 
 def _is_bore(way: OsmWay, window: Box) -> bool:
-    """Whether a way is a tunnel outdoors for everybody, long enough for two mouths, within the window."""
+    """Whether a way is a public tunnel outdoors, long enough for two mouths, within the window."""
     tags = way.tags
     kind = tags.get("highway", "").removesuffix("_link")
     if tags.get("tunnel", "no") in ("no", "building_passage", "culvert") or tags.get("indoor", "no") != "no":

@@ -1,4 +1,4 @@
-"""What the open ground between houses is, where no map says so: gardens, lawns, lots of asphalt; else it is paved."""
+"""Kinds of open ground between houses that no map knows: gardens, lawns, lots of asphalt; else it is paved."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _WORKED, _TRADED = {"industrial", "garages", "port", "depot", "harbour"}, {"comm
 
 @dataclass(frozen=True)
 class Yards:
-    """Regions in which open ground that no map tells more of is not paved as yards usually are; they don't overlap.
+    """Regions in which unmapped open ground is not paved as yards usually are; they don't overlap.
 
     Attributes
     ----------

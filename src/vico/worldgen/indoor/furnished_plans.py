@@ -444,7 +444,7 @@ def _spots(
 
 @dataclass(frozen=True)
 class Indoors:
-    """What the stage made.
+    """Product of the stage.
 
     Attributes
     ----------

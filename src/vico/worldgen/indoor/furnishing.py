@@ -126,7 +126,7 @@ class RoomDraft:
 
     @property
     def sides(self) -> list[int]:
-        """The walls to the left and right of who comes in, the longer choice first decided by chance."""
+        """The walls to the left and right of the first door, the longer choice first decided by chance."""
         found = [(self.near + 1) % 4, (self.near + 3) % 4]
         return found if self.chance.random() < 0.5 else found[::-1]
 
@@ -183,7 +183,7 @@ class RoomDraft:
         return np.asarray((labels == home) & (home > 0))
 
     def _are_left(self, beds: Sequence[_Bed], new: Sequence[Box]) -> bool:
-        """Whether who came in by the first door can lie down in all of some beds, and get up, with new pieces there."""
+        """Whether all of some beds can be reached from the first door and lain in, with new pieces there."""
         if not beds:
             return True
         iy, ix = np.nonzero(self.reachable())

@@ -1,4 +1,4 @@
-"""Layouts of one's own: a folder of JSON files with rooms, doors and furniture, and an author who may draw them.
+"""Layouts of one's own: JSON files with rooms, doors and furniture, and the interface of authors that draw them.
 
 A layout file holds one floor plan of a use or a category::
 
@@ -370,7 +370,7 @@ def read_library(folder: Path) -> Library:
 
 
 class LayoutAuthor(Protocol):
-    """Somebody who draws floor plans: a language model, a vision model, a script."""
+    """Author of floor plans: a language model, a vision model, a script."""
 
     def draw(self, request: LayoutRequest, feedback: Sequence[str]) -> str | None:
         """Answer with a layout as JSON text; None gives up.
@@ -386,7 +386,7 @@ class LayoutAuthor(Protocol):
 
 @dataclass(frozen=True)
 class LayoutRequest:
-    """What an author is asked for.
+    """Request for a floor plan.
 
     Attributes
     ----------

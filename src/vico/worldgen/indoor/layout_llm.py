@@ -85,7 +85,7 @@ class LlmLayoutAuthor:
 
     @property
     def digest(self) -> str:
-        """What plans hang on besides the places, to know a stage's inputs by: model, options, what it is told."""
+        """Digest of what plans depend on besides the places: model, options, prompt."""
         told = json.dumps([self.model.name, self.rounds, _briefing()])
         return hashlib.sha256(told.encode()).hexdigest()
 
@@ -233,7 +233,7 @@ def furnish_drawn(
 
 
 class _Collector:
-    """An author who only notes what is asked for."""
+    """An author that only collects requests."""
 
     def __init__(self) -> None:
         self.requests: list[LayoutRequest] = []

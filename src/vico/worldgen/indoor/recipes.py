@@ -20,7 +20,7 @@ Spot = tuple[int, float]  # a wall, and where along it
 
 @dataclass(frozen=True)
 class NamedPieces:
-    """What steps may name: sets of pieces that stand together, and pieces of which chance picks one."""
+    """Names that steps may use: sets of pieces that stand together, and pieces of which chance picks one."""
 
     sets: Mapping[str, tuple[Member, ...]]
     choices: Mapping[str, tuple[str, ...]]

@@ -1,4 +1,4 @@
-"""What the files of ``data/indoor`` may hold: kinds of rooms with their furniture, and uses of places with their plans.
+"""Records of the files in ``data/indoor``: kinds of rooms with their furniture, and uses of places with their plans.
 
 docs/adding_a_room.md says how to write one. Metres and degrees; the frames are those of `furnishing.RoomDraft` and
 `floorplans.Sketch`.
@@ -166,7 +166,7 @@ class RowsStep(DataRecord):
 
 
 class RoomSize(DataRecord):
-    """What has to hold of a room: larger than an area, a longer or shorter side longer than; or by chance a share."""
+    """Condition on a room: larger than an area, a longer or shorter side longer than; or by chance a share."""
 
     area: float | None = None
     long_side: float | None = None
@@ -336,7 +336,7 @@ Plan = Annotated[
 
 
 class Use(DataRecord):
-    """What a place's floor plan is for.
+    """Use of a place that a floor plan is for.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ Names = tuple[str, ...]
 
 
 class Condition(DataRecord):
-    """What a tag's value has to be, beside equal to something.
+    """Condition on a tag's value, other than being equal to something.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class Standing(DataRecord):
 
 
 class PlantMix(DataRecord):
-    """What is planted along streets and grows in woods of a climate; what comes twice is twice as common."""
+    """Plants along streets and in woods of a climate; a plant that comes twice is twice as common."""
 
     streets: Names = Field(min_length=1)
     woods: Names = Field(min_length=1)
@@ -204,7 +204,7 @@ class Barriers(DataRecord):
 
 @dataclass(frozen=True)
 class Kinds:
-    """What tags lead to.
+    """Models that tags lead to.
 
     Attributes
     ----------

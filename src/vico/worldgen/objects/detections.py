@@ -1,4 +1,4 @@
-"""Things that photos show: where they stand, which of them the map knows already, and who is right about that.
+"""Things that photos show: where they stand, which of them the map knows already, and which source is right.
 
 What the classes of detectors stand for, and the rules by which they are placed, are data, read once. Photos of one
 thing are found together with its place. Candidates are where rays of two photos cross, and where a ray through the foot
@@ -53,7 +53,7 @@ class Rules(DataRecord):
 
 
 class DetectedClass(DataRecord):
-    """What a class stands for.
+    """Meaning of a class of detections.
 
     Attributes
     ----------
@@ -285,7 +285,7 @@ class LocatedThing:
 
 
 def _locate(found: Detections, height: HeightField, classes: Classes) -> tuple[list[LocatedThing], list[Dropped]]:
-    """Return the things that a file of detections tells of, and what of it is left out, with the reason.
+    """Return the things in a file of detections, and those that are left out, with the reason.
 
     Parameters
     ----------
@@ -429,7 +429,7 @@ def _merge_nearby(spots: Sequence[LocatedThing], apart: float) -> tuple[list[Loc
 
 @dataclass(frozen=True)
 class DetectedThings:
-    """What detections change about the map that outdoor objects are made of.
+    """Changes by detections to the map that outdoor objects are made of.
 
     Attributes
     ----------
@@ -509,7 +509,7 @@ def _match_by_rules(
     rules: Rules,
     dropped: list[Dropped],
 ) -> DetectedThings:
-    """Decide by the rules who is right about each; only what the map has as a point can be moved."""
+    """Decide by the rules which source is right about each; only mapped points can be moved."""
     partner = _partners(seen, known, rules.same)
     new: list[OsmNode] = []
     moved: dict[int, Floats] = {}

@@ -435,7 +435,7 @@ def _grid(
 
 
 def _playground(area: OsmArea, played: list[NDArray[np.float64]], random: np.random.Generator) -> list[Placement]:
-    """Equipment by the ground's size, unless somebody mapped it piece by piece."""
+    """Return equipment by the ground's size, unless it is mapped piece by piece."""
     shape = area.polygon
     if any(shape.contains(shapely.Point(xy)) for xy in played):
         return []

@@ -195,7 +195,7 @@ def _kerb_candidates(osm: OsmData, streets: StreetPolygons, left_driving: bool) 
 
 
 def _by_habit(street: Street, said: str | None, free: float) -> bool:
-    """Whether people park at a kerb of which the map tells no parking lane."""
+    """Whether people park at a kerb without a mapped parking lane."""
     if said is not None or street.kind not in _HABIT or street.slanted or street.cycle_left or street.cycle_right:
         return False
     return free >= _HABIT_DEPTH + _HABIT_ROOM * max(street.lanes, 1)

@@ -80,7 +80,7 @@ class _Lanes(NamedTuple):
 
 @dataclass(frozen=True)
 class _Raster:
-    """What stands about a car park, and where one may drive; cells of `_CELL` from a corner on."""
+    """Obstacles about a car park, and drivable ground; cells of `_CELL` from a corner on."""
 
     corner: Floats
     clearance: Floats

@@ -78,7 +78,7 @@ _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is there before things are put up.
+    """Surroundings that are there before objects are placed.
 
     Attributes
     ----------

@@ -166,7 +166,7 @@ _Batch = tuple[int, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What a bake made.
+    """Result of a bake.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class BakeResult:
 
 @dataclass(frozen=True)
 class _Expected:
-    """What the coarse bake tells of each chart: offset = a + b i + c j, its colours, and whether it is a wall."""
+    """Estimates of the coarse bake for each chart: offset = a + b i + c j, its colours, and whether it is a wall."""
 
     offset: NDArray[np.float64]
     luminance: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What is made of an atlas once photos are on it: even light, filled holes, finer texels.
+"""Enhancement of an atlas with photos on it: even light, filled holes, finer texels.
 
 The sun that photos of walls were made in is found by the shadows the buildings cast, and taken out of the photos. A
 wall in the shade is dark in its photo, and a renderer would shade it once more. Which texels of clean buildings any

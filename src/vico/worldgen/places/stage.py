@@ -72,7 +72,7 @@ _FORMS = frozenset(_FORM_WORDS.split())
 
 @dataclass(frozen=True)
 class PlaceComparison:
-    """What comparing came to.
+    """Result of comparing places.
 
     Attributes
     ----------

@@ -357,7 +357,7 @@ class TilePlace:
 
 @dataclass(frozen=True)
 class JoinedTile:
-    """What of a tile's plan its neighbours have a say in."""
+    """Parts of a tile's plan that depend on its neighbours."""
 
     streets: StreetPolygons
     height: HeightField

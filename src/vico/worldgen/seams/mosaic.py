@@ -1,4 +1,4 @@
-"""What the tiles of a city have, put together or cut to them: ground, streets, walkable map, road network.
+"""Data of a city's tiles, put together or cut to them: ground, streets, walkable map, road network.
 
 There is one field of heights, one set of street polygons and one walkable map of the whole city: the surfaces of its
 tiles, room to walls, and what is joined with what. The road network is cut to whole streets near a tile, in the
@@ -38,7 +38,7 @@ from vico.worldgen.seams.joins import KINDS, Tile, TileGrid, crop_heights
 
 @dataclass(frozen=True)
 class TileShape:
-    """What of a tile its city's streets depend on, in the tile's coordinates.
+    """Parts of a tile that its city's streets depend on, in the tile's coordinates.
 
     Attributes
     ----------
@@ -339,7 +339,7 @@ def _box(edge: Element) -> tuple[float, float, float, float]:
 
 
 def _shift_element(element: Element, east: float, north: float) -> Element:
-    """Return a copy of an element and its children, told from another origin."""
+    """Return a copy of an element and its children with coordinates from another origin."""
     moved = Element(element.tag, dict(element.attrib))
     if "shape" in moved.attrib:
         moved.set(

@@ -220,7 +220,7 @@ _ALLOWED = re.compile(rb'(<lane id="([^"]*)"[^>]*? )allow="pedestrian"')
 
 @dataclass(frozen=True)
 class CarriagewayEdges:
-    """What says where sidewalks can be.
+    """Edges that limit where sidewalks can be.
 
     Attributes
     ----------

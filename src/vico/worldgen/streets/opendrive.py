@@ -253,7 +253,7 @@ def _lay(streets: Iterable[_Street], height: HeightField | None) -> None:
 
 
 def _simplify_profile(along: Floats, levels: Floats) -> list[int]:
-    """Return the points of a profile between which straight lines tell the others (Douglas and Peucker)."""
+    """Return the points of a profile between which straight lines come near the others (Douglas and Peucker)."""
     kept, open_ = {0, len(along) - 1}, [(0, len(along) - 1)]
     while open_:
         low, high = open_.pop()

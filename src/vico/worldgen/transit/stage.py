@@ -181,7 +181,7 @@ _LONG_WAIT = 75.0  # seconds for their time that buses may stand where others dr
 
 @dataclass(frozen=True)
 class _DrivenLine:
-    """A line that is driven: its names, its loop, who drives it, the sources' routes it stands for, and its delay.
+    """A line that is driven: its names, its loop, its drive, the sources' routes it stands for, and its delay.
 
     `later` is how many seconds after others its first bus leaves, where nobody says when it does.
     """

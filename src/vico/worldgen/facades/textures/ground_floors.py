@@ -173,7 +173,7 @@ def _shelves(
 
 
 def _shops(random: np.random.Generator) -> Picture:
-    """Recent shop fronts: panes between slim piers, lights above a transom: who trades there, nobody says."""
+    """Recent shop fronts: panes between slim piers, lights above a transom; no trade is recognisable."""
     canvas = blocks(_PX, _W, random, 32, 64, (158, 155, 150))
     paints = ((58, 62, 66), (78, 52, 46), (50, 66, 60), (62, 58, 72), (104, 94, 76), (46, 56, 74), (70, 70, 68))
     for i in range(BAYS):

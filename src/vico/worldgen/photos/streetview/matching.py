@@ -146,7 +146,7 @@ class _Features:
 
 
 class _Limits(Protocol):
-    """What a pair of features must keep to."""
+    """Limits that a pair of features must keep to."""
 
     @property
     def ratio(self) -> float: ...

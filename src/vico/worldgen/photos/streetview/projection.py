@@ -90,7 +90,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class VisiblePoints:
-    """What a camera sees of some points.
+    """Points that a camera sees.
 
     Attributes
     ----------

@@ -67,7 +67,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class PoseFit:
-    """What the matches say about the pose.
+    """Pose that fits the matches.
 
     Attributes
     ----------

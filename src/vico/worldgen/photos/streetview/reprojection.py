@@ -133,7 +133,7 @@ class StreetviewConfig:
 
 @dataclass(frozen=True)
 class PhotoOutcome:
-    """What became of one photo.
+    """Result for one photo.
 
     Attributes
     ----------
@@ -296,7 +296,7 @@ _MOST_LIGHTER, _MOST_TINTED = 25.0, 12.0  # Lab: what light and shade on one wal
 
 @dataclass(frozen=True)
 class StreetviewReport:
-    """What became of all photos, in the order they came.
+    """Results for all photos, in the order they came.
 
     Attributes
     ----------
