@@ -71,7 +71,16 @@ from vico.worldgen.seams.joins import (
     tile_name,
 )
 from vico.worldgen.seams.mosaic import TileShape, cells_of_tile, window_around, write_gates, write_walking
-from vico.worldgen.stages import SUFFIX, Stages, code_digest, digest_of, load_product, read_head, store_product
+from vico.worldgen.stages import (
+    SUFFIX,
+    Progress,
+    Stages,
+    code_digest,
+    digest_of,
+    load_product,
+    read_head,
+    store_product,
+)
 
 #: Product with a tile's gates.
 GATES = "gates"
@@ -279,8 +288,6 @@ _CELL = 8.0
 _LEAST = 160.0  # metres, the side of a tile at least
 _MOST = 1200.0  # and at most
 _LARGEST = 20_000.0  # metres, the side of a city at most
-#: Called with a step's name, how many tiles are done, and how many there are.
-Progress = Callable[[str, int, int], None]
 
 
 def city_request(

@@ -28,6 +28,7 @@ from vico.seeds import rng
 from vico.world.model import OPEN_KINDS, Dropped
 from vico.worldgen.facts.building_heights import STOREY, level_estimates, tagged_height, tagged_levels, weighted_median
 from vico.worldgen.facts.building_plans import (
+    OUTLINE_TOLERANCE,
     SMALL_KINDS,
     BuildingOrigin,
     BuildingPlan,
@@ -259,7 +260,6 @@ def _turns_round(ring: NDArray[np.float64]) -> bool:
     return bool((np.abs(turn) > _TURN).any() or ((np.abs(both) > _TURN) & (length < _THIN)).any())
 
 
-_TOLERANCE = 0.05  # metres of outline detail that is not seen but costs triangles
 _COVERED = 0.85  # share of an outline that parts must cover for the outline to be dropped
 
 _USES = {
@@ -329,7 +329,7 @@ def _pieces(drawn: Polygon | MultiPolygon) -> list[Polygon]:
     return [
         piece
         for shape in polygons_of(whole)
-        for simple in polygons_of(overlay.simplify(shape, _TOLERANCE), _LEAST_AREA)
+        for simple in polygons_of(overlay.simplify(shape, OUTLINE_TOLERANCE), _LEAST_AREA)
         for piece in polygons_of(without_needles(simple), _LEAST_AREA)
     ]
 

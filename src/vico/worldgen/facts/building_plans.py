@@ -356,7 +356,7 @@ def _direction(polygon: Polygon, tags: Tags, shape: str) -> float | None:
 _STEP = 0.35  # metres between roofs that are two
 _OWN_PART = 12.0  # square metres from which on a stretch of roof is a part of its own
 _SHARE = 0.03  # and of the building
-_TOLERANCE = 0.05
+OUTLINE_TOLERANCE = 0.05  # metres of outline detail that is not seen but costs triangles
 _LEAST_EAVES = 2.2
 _PARAPET = 0.6  # metres, of level roofs as large as those that get one without a model
 _WITH_PARAPET = 60.0  # square metres
@@ -382,7 +382,7 @@ def parts_of_roof(
         If they can't be made; the building then needs a roof that is fitted.
     """
     parts: list[PartPlan] = []
-    for piece in overlay.polygons_of(overlay.simplify(outline, _TOLERANCE), 2.0):
+    for piece in overlay.polygons_of(overlay.simplify(outline, OUTLINE_TOLERANCE), 2.0):
         cells = roof_cells(piece, facets)
         for members in _stretches(cells, piece.area):
             parts += _parts([cells[k] for k in members], facets, tags)

@@ -133,7 +133,8 @@ def parking_from_osm(
         shapely.prepare(shape)
         within[own] &= shapely.covers(shape, feet[own])
     keep = np.asarray(within, bool) & _on_level_ground(found, height)
-    keep &= _clear(feet, _kept_free(osm, streets, lanes, transit, solids, objects))
+    for shapes, away in _kept_free(osm, streets, lanes, transit, solids, objects):
+        keep[shapely.STRtree(shapes).query(feet, predicate="dwithin", distance=max(away, 1e-6))[0]] = False
     chosen = _apart(np.flatnonzero(keep), feet)
     entity = max([FIRST_OBJECT - 1, *objects.entity[objects.entity < FIRST_STOP].tolist()]) + 1
     rows, spots = [], []
@@ -278,13 +279,6 @@ def _stop_zones(transit: Transit, lanes: LaneGraph) -> list[BaseGeometry]:
             line = shapely.LineString(lanes.at(lane, np.array(ends))[:, :2])
             zones.append(overlay.buffer(line, _STOP_WIDE, cap_style="flat"))
     return zones
-
-
-def _clear(feet: NDArray[np.object_], kept: list[tuple[NDArray[np.object_], float]]) -> NDArray[np.bool_]:
-    clear = np.ones(len(feet), bool)
-    for shapes, away in kept:
-        clear[shapely.STRtree(shapes).query(feet, predicate="dwithin", distance=max(away, 1e-6))[0]] = False
-    return clear
 
 
 def _apart(chosen: NDArray[np.int64], feet: NDArray[np.object_]) -> NDArray[np.int64]:

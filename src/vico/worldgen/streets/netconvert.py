@@ -199,10 +199,13 @@ def _convert(
             raise NetconvertError(
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
-        plain = smooth_lanes(_plain_net(net.read_bytes()))
+        # The comment at the head holds the time of generation, the paths and the options: equal roads give equal bytes
+        # without it and with a fixed date.
+        plain = smooth_lanes(_COMMENT.sub(b"", net.read_bytes()))
         if kerbs is not None:
             plain = move_sidewalks(plain, kerbs, left_driving=site.left_driving)
-        roads = repair_opendrive(_plain_xodr(xodr.read_bytes()), height)
+        content = _DATE.sub(rb'\1 date=""', _COMMENT.sub(b"", xodr.read_bytes()), count=1)
+        roads = repair_opendrive(content, height)
         return RoadNetwork(plain if height is None else _lay_lanes(plain, height), roads)
 
 
@@ -238,11 +241,8 @@ east="{half:.3f}" west="{-half:.3f}">
     return RoadNetwork(net.encode(), xodr.encode())
 
 
-def _plain_net(content: bytes) -> bytes:
-    """Without the comment that holds the time of generation, the paths and the options."""
-    return re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
-
-
+_COMMENT = re.compile(rb"<!--.*?-->\s*", re.DOTALL)
+_DATE = re.compile(rb'(<header [^>]*?) date="[^"]*"')
 _SHAPE = re.compile(rb'(<lane [^>]*? shape=")([^"]*)(")')
 
 
@@ -264,12 +264,6 @@ def _lay_lanes(content: bytes, height: HeightField) -> bytes:
     )
     texts = iter([" ".join(next(rows) for _ in shape).encode() for shape in shapes])
     return _SHAPE.sub(lambda found: found.group(1) + next(texts) + found.group(3), content)
-
-
-def _plain_xodr(content: bytes) -> bytes:
-    """Without the comment, and with a fixed date: equal roads give equal bytes."""
-    content = re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
-    return re.sub(rb'(<header [^>]*?) date="[^"]*"', rb'\1 date=""', content, count=1)
 
 
 def _types_xml() -> str:

@@ -52,7 +52,15 @@ from vico.worldgen.transit.bus_lines import (
     timing,
     width_in_districts,
 )
-from vico.worldgen.transit.routes import NOT_ON_THE_MAP, Pole, Route, routes_from_gtfs, routes_from_osm, trams_from_osm
+from vico.worldgen.transit.routes import (
+    FEED_REACH,
+    NOT_ON_THE_MAP,
+    Pole,
+    Route,
+    routes_from_gtfs,
+    routes_from_osm,
+    trams_from_osm,
+)
 
 __all__ = [
     "BUS_LENGTH",
@@ -169,7 +177,6 @@ def _off_the_lanes(lanes: LaneGraph, xy: NDArray[np.float64]) -> NDArray[np.floa
 
 
 _REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
-_FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
 _ILL = 6.0  # metres of drive that a metre off the pole is worth
 # Lines of a district; with more the buses of central Helsinki bring its cars to a stand. A city has as many an area.
 _MOST_LINES = 3
@@ -291,7 +298,8 @@ def transit_from_osm(
             leave_out(line.ids[0] if line.ids else name, f"{FAILED}: its stop {lost[0]} can't")
             continue
         with drop_on_failure(line.ids[0] if line.ids else name):
-            lines.append(_record(k, line, stops))
+            colour = line.route.colour if line.route else ""
+            lines.append(line_record(k, name, line.timing, line.drive, stops, colour))
     stations, racks = bike_stations(site, lanes, walks, height, seed)
     tram_stops, tram_lines, off_rails = trams_from_osm(
         site, height, solids=solids or [], feeds=feeds, first_entity=FIRST_STOP + len(kept)
@@ -338,11 +346,6 @@ def _stagger(chosen: Sequence[_DrivenLine]) -> list[_DrivenLine]:
     """Lines whose first buses leave one after another where they share a stop."""
     shared = [sum(bool(set(other.loop) & set(line.loop)) for other in chosen[:k]) for k, line in enumerate(chosen)]
     return [replace(line, later=_STAGGER * count) for line, count in zip(chosen, shared, strict=True)]
-
-
-def _record(number: int, line: _DrivenLine, stops: dict[Berth, Stop]) -> Line:
-    colour = line.route.colour if line.route else ""
-    return line_record(number, "/".join(line.names), line.timing, line.drive, stops, colour)
 
 
 def _mapped_berths(osm: OsmData, kerbs: Kerbs, left_out: list[Dropped]) -> list[Berth]:
@@ -488,7 +491,7 @@ def _fit_route(
 ) -> tuple[tuple[Berth, ...], Drive, float] | str:
     """Find a closed drive past a route's stops, there and back, else there and round; say why not if there is none."""
     drive = Drive(kerbs.lanes, route.way)
-    reach = _FEED_REACH if route.origin == "gtfs" else _REACH
+    reach = FEED_REACH if route.origin == "gtfs" else _REACH
     by_key = {berth.key: berth for berth in known}
 
     def choices(poles: Sequence[Pole]) -> list[list[tuple[float, Berth]]]:
