@@ -31,8 +31,10 @@ from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.roofs import Roof, rings_of
 
 _SIZE = (0.85, 0.5)  # metres
-_STACK, _THICK = 1.7, 0.5  # metres along and across a wall between houses
-_POTS, _POT = 0.38, 0.2  # metres: height and width of a row of pots
+_STACK = 1.7  # metres of a chimney along a wall between houses
+_THICK = 0.5  # and across it
+_POTS = 0.38  # metres, height of a row of pots
+_POT = 0.2  # metres, its width
 _CLEAR = 0.75  # metres by which a chimney stands above the roof around it, at least
 _OVER_RIDGE = 0.5  # metres beyond which no chimney stands above its roof's ridge, unless it stands at it
 _LEAST_WALL = 5.0  # metres of a wall that carries a stack
@@ -505,7 +507,8 @@ def _alpine(wall: _Wall, share: float, region: RegionalStyle, random: np.random.
     return made
 
 
-_ORIEL, _CANT = 0.85, 0.3  # metres: how far an oriel juts out, and by how much its front is narrower
+_ORIEL = 0.85  # metres that an oriel juts out
+_CANT = 0.3  # metres by which its front is narrower
 
 
 def _oriels(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:

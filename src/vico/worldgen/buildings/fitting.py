@@ -35,7 +35,8 @@ GAIN = 0.02  # metres that a change must bring
 _INSET = 1.2  # metres from a roof's edge, where photogrammetry rounds it off
 _SPACING = 1.3
 _MOST_POINTS = 600  # a part
-_ROOF_CLIP, _WALL_CLIP = 4.0, 3.0  # metres: what is farther off is something else
+_ROOF_CLIP = 4.0  # metres: a roof farther off is something else
+_WALL_CLIP = 3.0  # metres: a wall farther off is something else
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 

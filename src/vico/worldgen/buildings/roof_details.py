@@ -48,7 +48,8 @@ _WITH_EAVES = (
 _ON_EDGE = 0.03  # metres within which a corner of the mesh lies on an outline's edge
 _APART = 0.012  # metres kept free of neighbours, so that no two faces lie in one plane
 _HEADROOM = 2.3  # metres under the lowest edge
-_LANE, _LANE_HEADROOM = 4.0, 3.2  # near a street's centre line more is asked
+_LANE = 4.0  # metres from a street's centre line within which more headroom is asked for
+_LANE_HEADROOM = 3.2  # metres
 _SPECK = 0.004  # metres: detail that the kernel makes and nobody sees
 _SHORTEST = 0.9  # metres of an edge that is worth a fringe
 _STEEPEST = 1.9  # rise per metre beyond which a roof is a spire and has none
@@ -329,9 +330,11 @@ def _fringe(
 
 
 _STEPS = 4
-_BEHIND, _BEFORE = 0.3, 0.05  # metres that a gable reaches into the roof, and before the wall's plane
+_BEHIND = 0.3  # metres that a gable reaches into the roof
+_BEFORE = 0.05  # metres that it stands before the wall's plane
 _COPING = 0.3  # metres by which each step stands above the slope behind it
-_NARROWEST_GABLE, _WIDEST_GABLE = 3.0, 12.0  # metres of front that have one
+_NARROWEST_GABLE = 3.0  # metres of front that have one, at least
+_WIDEST_GABLE = 12.0  # and at most
 _LOWEST_GABLE = 1.5  # metres of roof
 
 

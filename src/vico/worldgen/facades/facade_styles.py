@@ -226,11 +226,14 @@ _ORDINARY_HOUSES = ("house", "residential", "apartments", "office", "yes")  # wh
 _SHEDS = ("shed", "hut", "barn", "cabin", "farm_auxiliary", "stable")
 _TOWN_USES = ("residential", "other", "retail", "commercial", "hotel")
 _TRADE_USES = ("office", "commercial", "retail", "transport", "hotel")
-_OLD, _POST_WAR = 1920, 1975  # years that ages of houses begin and end with
+_OLD = 1920  # year before which houses are old
+_POST_WAR = 1975  # year in which the age after it ends
 _TOWN_HOUSE_YEAR = 1880  # of what is old, but nobody says since when
 _OLD_TOWN_SHARE = 0.6  # of houses on small plots that are old
-_OLD_SHARE, _MIDDLE_SHARE = 0.62, 0.86  # of houses that nothing is known of: old ones, and old and middle ones
-_MODERN_OFFICES, _MODERN_SHOPS = 0.7, 0.4  # shares that do not look like the old houses beside them
+_OLD_SHARE = 0.62  # share of old ones in houses that nothing is known of
+_MIDDLE_SHARE = 0.86  # share of old and middle ones
+_MODERN_OFFICES = 0.7  # share that does not look like the old houses beside it
+_MODERN_SHOPS = 0.4  # the same of shops
 
 #: Families with their shares; one may come twice.
 Table = Sequence[tuple[str, float]]

@@ -17,12 +17,13 @@ from vico.worldgen.facades.signs import Boards, Lettering, drawable_text
 from vico.worldgen.facades.walls import Face, GroundFloors, Pieces, Wall
 from vico.worldgen.facts.street_habits import Plates
 
-_TALL, _LONGEST = 0.22, 2.2  # metres; longer names have lower plates
+_TALL = 0.22  # metres, height of a plate
+_LONGEST = 2.2  # metres, length of a plate; longer names have lower plates
 _OFF = 0.09  # metres before the wall: before its mouldings
 _END = 0.35  # metres between a plate and the end of its wall
 _ABOVE = 0.02  # metres above the ground floor: over its band, below windows
-# From a corner, metres: how far along the street its wall begins, and how far beside the street it stands, at most.
-_ALONG, _ASIDE = 26.0, 10.0
+_ALONG = 26.0  # metres along the street from a corner within which a wall begins
+_ASIDE = 10.0  # metres beside the street that the wall stands at most
 _PARALLEL = math.cos(math.radians(25.0))
 _LEAST_WALL = 3.0  # metres
 _BEFORE = 1.0  # metres before a wall at which the ground below a plate is looked up

@@ -99,7 +99,8 @@ class QuadMeshBuilder:
 _SPACING = 3.0
 _ABREAST = 2.5  # metres between decks that lie as high as each other
 _PIER_EVERY = 22.0
-_KERBED_END, _TAPER = 3.5, 8.0  # metres: a street's kerbs go on under a deck, and run out where it has none
+_KERBED_END = 3.5  # metres that a street's kerbs go on under a deck
+_TAPER = 8.0  # metres over which kerbs run out where a street has none
 FILLED = 2.6
 """Metres: a ramp lower than this is an embankment between walls."""
 
@@ -270,7 +271,8 @@ def pier_boxes(
     return found
 
 
-_SEAM, _STEP_BETWEEN = 1.2, 0.8  # metres beside and above a deck where another counts as the same bridge
+_SEAM = 1.2  # metres beside a deck where another counts as the same bridge
+_STEP_BETWEEN = 0.8  # and metres above or below it
 _WIDEST = 25.0  # metres: no deck is twice as wide
 _RAIL_STEEL: tuple[int, int, int] = (96, 102, 104)
 

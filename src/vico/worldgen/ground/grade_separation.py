@@ -46,7 +46,8 @@ Floats = NDArray[np.float64]
 _DARK: tuple[int, int, int] = (26, 27, 29)
 _LEAST_TUNNEL = 12.0  # metres: the mouths of a shorter one would stand back to back
 _BEHIND = 7.0  # metres into a tunnel where the ground tells whether there is a hill
-_FOOT_HEADROOM, _HEADROOM = 2.8, 4.8
+_FOOT_HEADROOM = 2.8  # metres, of the mouths of tunnels for walkers
+_HEADROOM = 4.8  # and for vehicles
 
 
 @dataclass(frozen=True)
@@ -208,7 +209,8 @@ def _well(stone: QuadMeshBuilder, foot: Sequence[Floats], u: Floats, left: Float
 
 
 _LANDED = 0.35  # metres from the ground at which the end of a deck counts as down
-_STEEPEST, _STEEPEST_ON_FOOT = 0.13, 0.25  # slopes of what can be driven and walked up; stairs may be steeper
+_STEEPEST = 0.13  # slope of what can be driven up
+_STEEPEST_ON_FOOT = 0.25  # slope of what can be walked up; stairs may be steeper
 _STEEPEST_STAIRS = 1.1
 _ON_THE_GROUND = 0.3  # metres
 

@@ -103,7 +103,8 @@ def _quads_of(shape: Polygon) -> list[NDArray[np.float64]]:
     return found
 
 
-_STRIPE, _STRIPE_PERIOD = 0.5, 1.0  # of a zebra, metres along the walk
+_STRIPE = 0.5  # metres, breadth of a stripe of a zebra
+_STRIPE_PERIOD = 1.0  # metres from stripe to stripe
 # Rows of marks at both sides: metres from one to the next, along the walk and across it.
 _ROWS = {
     "dashes": (1.0, 0.5, 0.4),

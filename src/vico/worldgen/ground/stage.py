@@ -56,7 +56,8 @@ from vico.worldgen.ground.polygons import region_above
 from vico.worldgen.ground.stairs import Flights
 from vico.worldgen.ground.yards import Yards
 
-_FROM_KERB, _DEEP = 0.25, 0.6  # metres: behind the kerb stone, and on from there
+_FROM_KERB = 0.25  # metres from the kerb to ribbed slabs
+_DEEP = 0.6  # metres on from there
 _WIDEST = 3.0
 _LEAST = 0.25  # square metres of a field worth laying
 
@@ -104,7 +105,8 @@ def tactile_fields(streets: StreetPolygons, window: Polygon) -> list[Polygon]:
 
 
 _KINDS_WITH_PITS = ("sidewalk", "pedestrian", "yard", "parking")
-_FRAME, _EARTH = 1.7, 1.4  # metres, outer sides
+_FRAME = 1.7  # metres, outer side of a pit's frame
+_EARTH = 1.4  # metres, outer side of its earth
 _WHOLE = 0.98  # share of a pit's frame on paving
 _STONE_COLOUR, _EARTH_COLOUR = (150, 147, 141), (86, 72, 56)
 
@@ -147,7 +149,8 @@ GROUND_APRON = 40.0
 # another depth in a tile whose ground is not level.
 _UNDERLAY, _UNDERLAY_SLOPED = 0.6, 3.0
 _UNDER_STAIRS = 0.3
-_LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
+_LIFT = 0.02  # metres of paint above the ground
+_LIFT_SLOPED = 0.035  # and where it slopes
 _STEEP = 1.08  # slope from which bare ground is held by a wall
 _SLOPING = 0.17  # ... and from which a yard is not paved
 _SLOPE_CELL = 2.0

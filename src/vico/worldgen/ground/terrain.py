@@ -32,7 +32,8 @@ _CLEAR = 2.5  # metres around buildings where a mesh's walls run into the ground
 _MIN_WIDTH = {"footway", "path", "steps", "cycleway", "pedestrian", "corridor", "bridleway", "track"}
 
 _NEAREST_SAMPLES = 48
-_STICKS_OUT, _SINKS = 0.35, 1.0  # metres over and under the ground around that are no noise
+_STICKS_OUT = 0.35  # metres over the ground around that are no noise
+_SINKS = 1.0  # and under it
 _MOST_STICKS_OUT = 1.2  # however uneven it is around
 _BIN, _BIN_REACH = 10.0, 45.0
 _BIN_OVER = 2.5  # metres that a whole bin may lie above the low ground around it

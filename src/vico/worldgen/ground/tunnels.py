@@ -47,9 +47,12 @@ WALL = 0.35
 """Thickness of the walls of cuts, metres."""
 
 _ROOF = 0.4  # metres of ground above the clear height where a tunnel is covered
-_STEEPEST, _STEEPEST_ON_FOOT = 0.11, 0.12
-_LONGEST_CUT, _SHORT_CUT = 62.0, 30.0  # metres; a straight tunnel is preferred to a dive up to cuts of the second
-_LEAST, _SPACING = 12.0, 3.0
+_STEEPEST = 0.11  # slope of what can be driven up
+_STEEPEST_ON_FOOT = 0.12  # slope of what can be walked up
+_LONGEST_CUT = 62.0  # metres
+_SHORT_CUT = 30.0  # metres of cut up to which a straight tunnel is preferred to a dive
+_LEAST = 12.0  # metres, length of a tunnel
+_SPACING = 3.0  # metres between the points of floors
 _SAME_FLOOR = 0.4  # metres by which floors that meet may differ where they overlap
 _LEDGE = 0.6  # metres, where nobody walks
 _JOINT = 5.0  # metres at a mouth where a cut meets the street that leads in

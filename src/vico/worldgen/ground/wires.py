@@ -21,7 +21,8 @@ CONTACT = 5.5
 """Metres above the rail: 4.2 to 6 over streets (EN 50119)."""
 
 _ANCHOR = 7.0  # metres above the street where a span wire meets a wall
-_SPAN_EVERY, _APART = 28.0, 14.0  # metres along a track, and from a span to that of the next track
+_SPAN_EVERY = 28.0  # metres along a track from span to span
+_APART = 14.0  # metres from a span to that of the next track
 _REACH = 19.0  # metres from a track within which a wall holds a span
 _STEP = 14.0  # metres, longest piece of wire
 _THICK = 0.035  # wider than it is: 12 mm would be between two pixels

@@ -40,7 +40,8 @@ from vico.worldgen.indoor.furnishing import Furnishing
 SCHEMA = "vico.layout"
 VERSION = 1
 _MOST_BYTES = 4 << 20
-_MOST_ROOMS, _MOST_PIECES = 60, 400
+_MOST_ROOMS = 60  # of a layout
+_MOST_PIECES = 400  # of a room's furniture
 _LEAST_ROOM = 1.4
 _EDGE = 0.06  # metres a point may lie off the wall it is meant to be on
 _CLEAR_WIDTH = 0.9

@@ -479,7 +479,8 @@ def _pitch(area: OsmArea) -> list[Placement]:
 SPACING = 28.0
 _APART = 20.0
 # Metres between the kerb and a lamp, and how far from a street's middle a kerb is looked for.
-_BESIDE_KERB, _WIDEST = 0.6, 16.0
+_BESIDE_KERB = 0.6  # metres from the kerb to a lamp
+_WIDEST = 16.0  # metres from the middle of a way within which its kerb is looked for
 # Where nothing says whether a street is lit, it is where houses stand this near, metres.
 _TOWN = 45.0
 _REACH = 2.4

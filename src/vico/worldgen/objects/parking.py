@@ -59,7 +59,8 @@ _STOP_AFTER = 6.0  # and after it
 _STOP_WIDE = 4.5  # metres, breadth of the strip that stays free there
 _RAIL = 1.8  # metres from a tram track's middle
 _STEEP = 0.06  # slope along a car on which it still stands level
-_LANE_REACH, _LANE_TURN = 6.5, 0.35
+_LANE_REACH = 6.5  # metres from a bay to the lane beside it
+_LANE_TURN = 0.35  # rad between the two at most
 
 
 class _Candidate(NamedTuple):

@@ -106,7 +106,8 @@ _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
 _BEND = np.cos(np.radians(14.0))  # neighbouring faces that turn less than this share a chart ...
 _FLAT = 0.10  # ... if they stay this near its plane, metres
 _LEAST_AREA = 1.0  # square metres; smaller pieces are not worth a chart
-_THIN, _SPARSE = 0.4, 0.12  # metres of the shorter side, share of its rectangle: mouldings and rims, no faces
+_THIN = 0.4  # metres of the shorter side up to which a face is a moulding or a rim
+_SPARSE = 0.12  # and the share of its rectangle
 _UNDERSIDE = -0.9  # normals with a smaller z look at the ground
 _WELD = 1e-3  # metres
 

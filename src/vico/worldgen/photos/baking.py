@@ -156,8 +156,10 @@ _BEHIND = 0.9  # metres behind the photographed wall from which the second ray s
 _LOW = 2.6  # metres above a wall's foot up to which what stands off it is a car or a person
 _FOOT = 1.5  # metres above a wall's foot up to which photogrammetry rounds it off into the ground
 _LEANS = 0.3  # how much more it looks up there than the wall does (z of the normals): it shows the ground's colours
-_GREEN, _GREENER = 26.0, 18.0  # excess green (2g - r - b) of leaves, and how much more than the wall's own
-_DARK, _DARKER = 14.0, 0.15  # luminance of holes in the photographs, and their share of the wall's own
+_GREEN = 26.0  # excess green (2g - r - b) of leaves
+_GREENER = 18.0  # how much more it is than the wall's own
+_DARK = 14.0  # luminance of holes in the photographs
+_DARKER = 0.15  # their share of the wall's own
 _FRINGE = 2  # texels around leaves that they still colour
 
 Progress = Callable[[int, int], None]

@@ -90,9 +90,12 @@ def _cut(values: NDArray[np.float32], axis: int, start: int) -> NDArray[np.float
 
 
 _LARGEST_PAGE = 8192
-_NEAR, _TRUSTED = 4, 0.5  # shreds of photo with fewer known texels than this share within a few texels are filled too
-_MOST_THREADS, _MOST_PAGES = 16, 4  # threads that hold a chart and its coarser levels each, or a page
-_TILE, _MARGIN = 1024, 16  # pixels an upscaler sees at a time, and how far they overlap
+_NEAR = 4  # texels around a shred of photo that are looked at
+_TRUSTED = 0.5  # share of known ones among them below which it is filled too
+_MOST_THREADS = 16  # that hold a chart and its coarser levels each
+_MOST_PAGES = 4  # threads that hold a page each
+_TILE = 1024  # pixels, side of what an upscaler sees at a time
+_MARGIN = 16  # pixels by which these overlap
 
 
 class Inpainter(Protocol):

@@ -234,7 +234,8 @@ def _address(tags: Tags) -> str | None:
 
 
 _LARGE_HOUSE = 4000.0  # square metres of floor above which a house has two stairways
-_HOMES_WANTED, _MOST_HOMES = 60, 240
+_HOMES_WANTED = 60  # homes that are enough for a place
+_MOST_HOMES = 240  # houses that are looked at for more homes
 
 
 def places_from_osm(

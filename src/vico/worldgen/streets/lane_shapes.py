@@ -37,7 +37,8 @@ _PIECE = math.radians(7.0)  # most that a rounded line turns at one point
 _WOBBLE = 0.12  # metres off a line that are netconvert's, not the map's
 _LEVEL = 0.03  # metres that a point may be off the straight line between those beside it
 _JOINT = math.radians(8.0)  # at which a path through a junction is drawn anew
-_TURNS_BACK, _WIDE = math.radians(110.0), 12.0  # who turns back over more metres than this does so in several bends
+_TURNS_BACK = math.radians(110.0)
+_WIDE = 12.0  # metres: a way that turns back over more does so in several bends
 _SHORTEST = 0.3  # metres between the ends of a path that is worth a curve
 
 _LANE_WITH_LENGTH = re.compile(rb'<lane id="([^"]*)"([^>]*?) length="[^"]*"([^>]*?) shape="[^"]*"')
@@ -207,7 +208,8 @@ def _write_lane(found: re.Match[bytes], paths: dict[str, _Path]) -> bytes:
 
 
 _BESIDE = 0.75  # metres from the kerb to the line that walkers follow
-_LEAST, _MOST = 0.2, 5.0  # metres that a line lies within the carriageway to be moved; beyond, something else is wrong
+_LEAST = 0.2  # metres that a line lies within the carriageway to be moved
+_MOST = 5.0  # metres beyond which something else is wrong
 _STEP = 4.0
 _WALL = 0.4  # metres from walls; where there is no room for a sidewalk beside the carriageway it stays where it is
 _ACROSS = 15.0  # metres at most from where a sidewalk lies to its place beside the lanes of its street

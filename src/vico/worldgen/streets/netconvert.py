@@ -58,7 +58,8 @@ _OPTIONS = {
 }
 # netconvert needs under a second for 800 m of a dense city; this only ends a hang. For each km2 of larger ones:
 _LIMIT_SECONDS = 60
-_ABOVE_ALL, _PROFILE = 1e5, 10.0  # metres; between points of lanes on decks
+_ABOVE_ALL = 1e5  # metres above every surface
+_PROFILE = 10.0  # metres between points of lanes on decks
 # So many streets may be left out because netconvert refuses them.
 _MOST_REFUSED = 3
 

@@ -30,10 +30,13 @@ SHORTEST = 0.5
 
 _ROOM = 0.3  # metres that a road through a junction has at least
 _TINY = 0.05  # metres of a curve that is left out
-_HOOK, _TURNS_BACK = 0.6, 1.5  # a last piece so short (metres) that turns so far (radians) is no part of a street
-_CORNER, _CUT = 0.02, 2.0  # radians at which two curves meet in a corner, and metres of each that rounding takes
+_HOOK = 0.6  # metres: a last piece so short that turns back is no part of a street
+_TURNS_BACK = 1.5  # radians
+_CORNER = 0.02  # radians at which two curves meet in a corner
+_CUT = 2.0  # metres of each that rounding takes
 _U_TURN = 2.0  # radians: from there on a road through a junction is drawn along its outer side
-_STATION, _LEVEL = 5.0, 0.02  # metres between heights, and that a height may be off the line between others
+_STATION = 5.0  # metres between heights
+_LEVEL = 0.02  # metres that a height may be off the line between others
 
 _End = tuple[str, bool]  # id of a street, and whether its end (else its start) is meant
 

@@ -330,7 +330,8 @@ _KERB_RADIUS = 2.0
 #: Ground between paved surfaces that is narrower than this is paved, metres: lines that were drawn one by one leave it,
 #: and it would end in knives' points.
 _NARROW = 1.0
-_LEAST_GAP, _LEAST_CORNER = 0.02, 0.05  # square metres
+_LEAST_GAP = 0.02  # square metres
+_LEAST_CORNER = 0.05  # square metres
 _BESIDE = 0.05  # metres from a strip within which an outline is its edge
 #: How its outline is offset: right angles stay, what is more pointed is cut off.
 _BLUNT = {"join_style": "mitre", "mitre_limit": 1.5}

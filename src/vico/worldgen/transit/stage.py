@@ -78,7 +78,8 @@ FIRST_STATION = 95_000
 
 _CAPACITY = 12
 _EACH = 40_000.0  # square metres of window for each planned station
-_FEWEST, _MOST = 2, 6
+_FEWEST = 2  # stations of shared bicycles
+_MOST = 6
 _APART = 80.0
 _INSIDE = 5.0  # metres from the window's edge
 _ASIDE = 2.2  # metres from the middle of a footway

@@ -14,8 +14,10 @@ from vico.errors import MissingExtraError, MissingFileError
 from vico.worldgen.photos.streetview.matching import opencv
 
 _TALLEST = 3.4  # metres: a bus
-_PERSON, _VEHICLE = 2.0, 2.4  # metres: how high each reaches, at most
-_LEAST_TALL, _LEAST_WIDE = 0.5, 0.2  # metres: what is smaller is no person and no vehicle
+_PERSON = 2.0  # metres, height of people at most
+_VEHICLE = 2.4  # metres, height of vehicles at most
+_LEAST_TALL = 0.5  # metres: what is lower is no person and no vehicle
+_LEAST_WIDE = 0.2  # metres: nor what is narrower
 _CONTACT = 0.5  # metres: it stands on the ground, so its foot hides what is lower than this
 _FARTHEST = 45.0  # metres: beyond, a person is a few pixels
 _SHIFTS = ((0, 0), (0, 3), (0, -3), (3, 0), (-3, 0))  # pixels that the two pictures may be out of step by

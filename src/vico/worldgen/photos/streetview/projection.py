@@ -293,10 +293,8 @@ def choose_cameras(
 
 
 _BAND = 1 << 19  # texels at a time
-_LEAST_FIT, _LEAST_SHARE = (
-    0.4,
-    0.7,
-)  # correlation with the wall, and share of the best photo's, under which none is used
+_LEAST_FIT = 0.4  # correlation with the wall under which no photo is used
+_LEAST_SHARE = 0.7  # share of the best photo's under which none is used
 _LEAST_AGREED = 0.5  # what agrees less with the wall's own texels shows something else
 _WORSE = 0.75  # a camera gives way where another of the chart is better by this
 

@@ -29,7 +29,9 @@ _HERE = 4
 _RIGHT = 5
 _BELOW = 7
 _ENOUGH = 12  # points that agree on a pose
-_PRIOR_METRES, _PRIOR_RADIANS = 3.0, 0.07  # what is expected of the metadata: a weak pull where points say little
+# Expected errors of the metadata: a weak pull where points say little.
+_PRIOR_METRES = 3.0
+_PRIOR_RADIANS = 0.07
 
 
 @dataclass(frozen=True)
@@ -332,16 +334,19 @@ def _rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
 FARTHEST_NUDGE = 0.7
 """Metres that a photo is moved at most."""
 
-_FINE, _COARSE = 0.12, 0.9  # metres: what is finer is noise or lost in one of the two, what is broader is light
+_FINE = 0.12  # metres: what is finer is noise or lost in one of the two
+_COARSE = 0.9  # metres: what is broader is light
 _BLOCK = 5.0  # metres: parts of a wall that are compared each by itself
 _LEAST_SIDE = 2.0  # metres of a part that tell something
 _LEAST = 0.25  # correlation that two parts must have
 _LEAST_CONTRAST = 2.5  # levels of luminance: a wall with less has nothing to be recognised by
 _AROUND = 1.2  # metres around a place that photo and wall are compared in
-_UNLIKE, _ALIKE = 0.05, 0.35  # agreement at which a photo counts nothing, and from which it counts fully
+_UNLIKE = 0.05  # agreement at which a photo counts nothing
+_ALIKE = 0.35  # and from which it counts fully
 _PLAIN = 0.15  # spread of normalised detail that counts as none
 _FAR_COLOUR = 16.0  # Lab: beyond twice this, something else stands before the wall, or the sky is seen over it
-_SHIFT, _STAND = 0.3, 0.25  # metres expected, and what the wall's plane may be off
+_SHIFT = 0.3  # metres of shift expected
+_STAND = 0.25  # metres that the wall's plane may be off
 _NOISE = 0.06  # metres that a part's own shift may be wrong
 
 

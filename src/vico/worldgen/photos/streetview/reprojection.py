@@ -291,7 +291,9 @@ def photographer_of(world: World) -> Photographer:
 
 _FEWEST_KNOWN = 300  # samples that a photo's colours are compared with, before it is compared with the other photos
 _FEWEST_ON_CHART = 8
-_MOST_LIGHTER, _MOST_TINTED = 25.0, 12.0  # Lab: what light and shade on one wall may amount to
+# Lab: what light and shade on one wall may amount to.
+_MOST_LIGHTER = 25.0
+_MOST_TINTED = 12.0
 
 
 @dataclass(frozen=True)
