@@ -124,7 +124,7 @@ class RegionMap:
     def whole(self) -> OsmData:
         """The map of the square around the city, and what is near it."""
         whole = read_osm(self._path, self._frame, self._reach, need_buildings=False)
-        # The sea is found for all tiles at once: of one that no coastline meets nobody could say whether it is land.
+        # The sea is found for all tiles at once: a tile that no coastline meets could be land or sea.
         # Where that fails each tile looks for its own, and reports what is wrong.
         with drop_on_failure("sea"):
             reach = self._reach
@@ -172,7 +172,7 @@ Floats = NDArray[np.float64]
 
 _BESIDE = 40.0  # metres beside a tunnel's line whose ground and streets say whether it can be used
 _INSIDE = 1.0  # metres from the city's edge from which on the ground is known
-_MORE = 10.0  # metres beyond what a tile knows of the ground that it is told of tunnels
+_MORE = 10.0  # metres beyond the ground of a tile within which it gets the tunnels
 
 
 def tiles_with_tunnels(request: CityRequest, region: RegionMap) -> list[Tile]:

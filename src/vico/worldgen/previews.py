@@ -154,7 +154,7 @@ _BUILDING: Rgb = (168, 156, 148)
 _ACCESSIBLE: Rgb = (192, 172, 152)
 _OUTLINE: Rgb = (118, 106, 100)
 
-# Okabe and Ito's colours, told apart by people with any kind of colour vision; a shape of its own for each.
+# Okabe and Ito's colours, distinct for all kinds of colour vision; a shape of its own for each.
 _MARKS: dict[Category, tuple[Rgb, str]] = {
     Category.ACCOMMODATION: ((0, 114, 178), "square"),
     Category.FOOD: ((213, 94, 0), "circle"),

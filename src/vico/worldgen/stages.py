@@ -345,7 +345,7 @@ class Stages:
     def register(self, value: T, digest: str) -> T:
         """Make an input known by a digest of its own (of the file it was read from), and return it."""
         try:
-            # Known as long as somebody holds it: the meshes and photos of a district would fill gigabytes.
+            # Known as long as it is referenced: the meshes and photos of a district would fill gigabytes.
             self._digests[id(value)] = weakref.ref(value), digest
         except TypeError:
             if not isinstance(value, tuple):  # tuples are taken apart: none is the input of a stage

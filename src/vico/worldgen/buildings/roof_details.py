@@ -50,7 +50,7 @@ _APART = 0.012  # metres kept free of neighbours, so that no two faces lie in on
 _HEADROOM = 2.3  # metres under the lowest edge
 _LANE = 4.0  # metres from a street's centre line within which more headroom is asked for
 _LANE_HEADROOM = 3.2  # metres
-_SPECK = 0.004  # metres: detail that the kernel makes and nobody sees
+_SPECK = 0.004  # metres: detail that the kernel makes and that is too small to be seen
 _SHORTEST = 0.9  # metres of an edge that is worth a fringe
 _STEEPEST = 1.9  # rise per metre beyond which a roof is a spire and has none
 

@@ -389,7 +389,7 @@ def _gable_ends(polygon: Polygon, rings: list[NDArray[np.float64]]) -> list[list
     return marks
 
 
-_SPECK = 0.002  # metres: detail that the kernel makes and nobody sees
+_SPECK = 0.002  # metres: detail that the kernel makes and that is too small to be seen
 
 
 def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Manifold:

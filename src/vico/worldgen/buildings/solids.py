@@ -103,7 +103,7 @@ def solid_meshes(plans: Sequence[BuildingPlan], seats: Sequence[Footing]) -> Sol
         meshes.append([])
         for solid in plan.solids:
             mesh = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-            with drop_on_failure(plan.id, []):  # the stage that builds it tells
+            with drop_on_failure(plan.id, []):  # the stage that builds it reports the failure
                 mesh = part_mesh(solid, seat)
             meshes[-1].append(mesh)
     return merge_solids(meshes)

@@ -51,9 +51,9 @@ _DEEPEST = 18.0  # metres of a house whose ridge is turned along the street
 _REACH = 25.0  # metres within which a street counts
 _SHORTEST = 2.5  # metres of a side that may be a house's front
 _PITCHED = range(2, 8)  # storeys of houses that have pitched roofs in a town of them
-_SLOPE = 0.62  # metres a metre: of roofs that nobody gave a height
+_SLOPE = 0.62  # metres a metre: of roofs without a height
 _PARAPET = 0.6  # metres
-_GARRET = 3.4  # metres: a mansard is a storey high, where nobody says its height
+_GARRET = 3.4  # metres: a mansard without a height is a storey high
 
 
 def with_customary_roofs(

@@ -183,7 +183,7 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     sunk = _near(streets.sunken, n, half, cell, 2 * _FADE)
     sunk[nodes_in_polygons(polygons_of(streets.sunken), n, half, cell)] = 0.0
     low = np.full((n, n), -KERB)
-    # Only on drives the carriageway comes up: beyond the kerbs its height has nobody to mind it, and stays even.
+    # Only on drives the carriageway comes up: beyond the kerbs its height does not matter, and stays even.
     drives = polygons_of(overlay.buffer(overlay.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
     rising = nodes_in_polygons(drives, n, half, cell) & ~nodes_in_polygons(polygons_of(streets.sunken), n, half, cell)
     low[rising] = (-KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0))[rising]

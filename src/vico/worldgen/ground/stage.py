@@ -220,7 +220,7 @@ def ground_from_osm(
     if terrain.steps is not None:
         pieces = _with_tactile(pieces, tactile_fields(streets, window), window)
     waters = open_water(site, terrain, pieces.get("water", [])) if terrain.steps is not None else []
-    # Along the window's sides all is drawn: who draws what lies beyond may know of other walls.
+    # Along the window's sides all is drawn: the tile beyond may know of other walls.
     hidden = overlay.intersection(
         _ground_under_buildings(osm, standing), overlay.buffer(window, -_SHOWN, join_style="mitre")
     )

@@ -220,7 +220,7 @@ def _low_plane(
         plane = np.linalg.solve(normal, right[..., None])[..., 0]
         plane[:, 2] += middle
         residual = height - np.einsum("nki,ni->nk", design, plane)
-        # The spread of the lower part tells noise; the upper half may be half full of cars.
+        # The spread of the lower part is noise; the upper half may be half full of cars.
         spread = np.maximum(-np.quantile(residual, 0.2, axis=1) / 0.84, 0.06)
         ratio = residual / spread[:, None]
         weight = 1.0 / (1.0 + np.where(ratio > 0, ratio / 2.0, ratio / 3.0) ** 2)

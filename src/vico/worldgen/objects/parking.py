@@ -317,7 +317,7 @@ def _car(one: _Candidate, seed: int, height: HeightField) -> dict[str, object] |
     ahead = np.array([math.cos(bay.yaw), math.sin(bay.yaw)])
     spare = min(max(bay.length - size[0] - 0.6, 0.0) / 2, 0.3)
     x, y = np.asarray(bay.centre) + ahead * random.uniform(-spare, spare)
-    turned = math.pi if one.kind != "kerb" and random.random() < 0.35 else 0.0  # who backs into a bay
+    turned = math.pi if one.kind != "kerb" and random.random() < 0.35 else 0.0  # share of cars that back into a bay
     return {
         "id": f"parked.{one.id}",
         "kind": CAR,

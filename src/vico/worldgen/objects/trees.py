@@ -40,7 +40,7 @@ _MOWN = {
     "leisure": ("park", "garden", "golf_course", "pitch"),
     "natural": ("grassland", "heath", "scree", "bare_rock", "cliff"),
 }
-_STEEP = 0.25  # rise per metre from which nobody mows
+_STEEP = 0.25  # rise per metre from which nothing is mown
 _STEEP_CELL = 10.0  # metres, side of the cells that it is measured in
 _WILD_ROOM = 55.0  # square metres that a plant has there
 _SHRUBS = 0.6  # share of shrubs there
@@ -360,7 +360,7 @@ def _plant_area(
     wild = use in ("wood", "forest", "nature_reserve")
     there = int(shapely.contains(area.polygon, trunks).sum()) if len(trunks) else 0
     if not wild and there > 0.3 * ground.area / room[use]:
-        return found  # somebody mapped them
+        return found  # they are mapped one by one
     for k, xy in enumerate(blue_noise_points(ground, room[use], 260, random)):
         wish = tree_placement(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
         if use == "orchard":

@@ -147,7 +147,7 @@ def _put(whole: NDArray[Any], part: NDArray[Any], tile: Tile, grid: TileGrid) ->
     whole[j : j + side + 1, i : i + side + 1] = part
 
 
-#: Metres of room to walls that are told apart: more is as good as so much.
+#: Metres of room to walls that are distinguished: more counts as so much.
 MOST_ROOM = 16.0
 
 

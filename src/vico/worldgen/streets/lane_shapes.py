@@ -213,7 +213,7 @@ _MOST = 5.0  # metres beyond which something else is wrong
 _STEP = 4.0
 _WALL = 0.4  # metres from walls; where there is no room for a sidewalk beside the carriageway it stays where it is
 _ACROSS = 15.0  # metres at most from where a sidewalk lies to its place beside the lanes of its street
-_IN_LANES = 0.5  # share of a sidewalk's length in lanes from which on nobody walks there
+_IN_LANES = 0.5  # share of a sidewalk's length in lanes from which on it is closed
 _SAME_LEVEL = 3.0  # metres; farther above or below lie other streets
 
 _LANE_WITH_SHAPE = re.compile(rb'(<lane id="([^"]*)"[^>]*? shape=")([^"]*)(")')

@@ -411,7 +411,7 @@ FIRST_DEPARTURE, LAST_DEPARTURE = 5 * 3600, 23 * 3600
 HEADWAY = (360.0, 600.0)
 
 # Share of a round kept at the first stop to make up for what was lost on the way, and the most seconds of it: longer
-# nobody is held up behind a bus that waits for its time.
+# no vehicle is held up behind a bus that waits for its time.
 _LAYOVER_SHARE = 0.1  # of a round, waited at its end
 _MOST_LAYOVER = 60.0  # seconds
 _BUSY = 1.17  # times as long a round takes with 60 cars in central Helsinki: so much time our own plans give it

@@ -267,7 +267,7 @@ def transit_from_osm(
     if timed and any(line.route is not None and line.route.origin == "gtfs" for line in chosen):
         names = "osm and gtfs" if mapped else "gtfs"
     if all(len(line.loop) < MIN_STOPS for line in chosen):
-        # Routes that only cut a corner of the window take nobody anywhere: a round is planned beside them.
+        # Routes that only cut a corner of the window are of no use: a round is planned beside them.
         planned, source = _plan_round(site, kerbs, mapped, seed, least=MIN_STOPS if chosen else 2)
         if planned is not None:
             chosen = [planned, *chosen]
@@ -417,7 +417,7 @@ def _choose_driven_lines(
             names, ids = (*line.names, route.name), (*line.ids, route.id)
             chosen[twin] = replace(line, names=names, departures=tuple(times), ids=ids)
         elif ways[k][1] and (streets & ways[k][0] or _gap(route) < _round_seconds(kerbs.lanes, ways[k][0], loop)):
-            # Who turns on the spot reaches into the lane of who comes the other way: both would wait for ever.
+            # A bus that turns on the spot reaches into the opposite lane: two would wait for each other for ever.
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: has to turn where others drive"))
         elif (
             len(chosen) < most

@@ -184,7 +184,7 @@ def _cut_out(
     label[reach & (ratio > 0.5)] = cv2.GC_PR_FGD
     label[core] = cv2.GC_PR_FGD
     label[sure] = cv2.GC_FGD
-    # Only what is near a thing tells how its surroundings look.
+    # Only pixels near a thing show how its surroundings look.
     rows, columns = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
     box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
     label = np.ascontiguousarray(label[box])
