@@ -230,7 +230,8 @@ class LanguageGroundedMovers:
         torch, kit = _transformers()
         height, width = view.photo.shape[:2]
         look, find = (
-            self._pretrained(kit, name, self.detector) for name in ("AutoProcessor", "GroundingDinoForObjectDetection")
+            self._load_weights(kit, name, self.detector)
+            for name in ("AutoProcessor", "GroundingDinoForObjectDetection")
         )
         inputs = look(images=view.photo, text=self.words, return_tensors="pt").to(self.device)
         find = find.to(self.device).eval()
@@ -242,7 +243,7 @@ class LanguageGroundedMovers:
         mask = np.zeros((height, width), np.bool_)
         if not len(boxes):
             return mask
-        cut, model = (self._pretrained(kit, name, self.segmenter) for name in ("SamProcessor", "SamModel"))
+        cut, model = (self._load_weights(kit, name, self.segmenter) for name in ("SamProcessor", "SamModel"))
         prompt = cut(view.photo, input_boxes=[boxes.tolist()], return_tensors="pt")
         sizes = prompt["original_sizes"].tolist(), prompt["reshaped_input_sizes"].tolist()
         model = model.to(self.device).eval()
@@ -253,7 +254,7 @@ class LanguageGroundedMovers:
         return mask
 
     @staticmethod
-    def _pretrained(kit: Any, name: str, weights: str) -> Any:
+    def _load_weights(kit: Any, name: str, weights: str) -> Any:
         try:
             return getattr(kit, name).from_pretrained(weights, local_files_only=True)
         except (OSError, ValueError) as error:
