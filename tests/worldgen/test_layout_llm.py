@@ -137,8 +137,8 @@ def test_several_are_asked_for_at_a_time(helsinki: World, pubs: list[Place]) -> 
 def test_a_stage_knows_its_author_and_keeps_what_was_drawn(helsinki: World, pubs: list[Place], tmp_path: Path) -> None:
     def built(author: LlmLayoutAuthor) -> tuple[Stages, Any]:
         stages = Stages(tmp_path)
-        stages.given(author, author.digest)
-        height = stages.given(helsinki.height, "ground")
+        stages.register(author, author.digest)
+        height = stages.register(helsinki.height, "ground")
         return stages, stages.run(
             "indoor", furnish_drawn, pubs[:2], author=author, buildings=helsinki.buildings, height=height
         )

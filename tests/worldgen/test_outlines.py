@@ -276,7 +276,7 @@ def test_what_goes_on_under_a_part_has_no_sliver_beside_another() -> None:
 @pytest.mark.parametrize(
     ("module", "function"),
     [
-        (building_outlines, "_settled"),
+        (building_outlines, "_settle_part"),
         (building_outlines, "_beside"),
         (building_outlines, "_pieces"),
         (building_outlines, "part_of"),

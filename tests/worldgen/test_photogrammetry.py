@@ -241,7 +241,7 @@ def test_a_building_that_cant_be_fitted_stays_as_planned_and_is_told(
         raise OverlayError("side location conflict")
 
     monkeypatch.setattr(fitting, "raised_to_mesh", failing)
-    monkeypatch.setattr(fitting, "_displaced", unmoved)
+    monkeypatch.setattr(fitting, "_move_building", unmoved)
     by = replace(helsinki_tiles, positions=helsinki_tiles.positions + np.array([1.1, -0.7, 0.0]))
     decided, report = plans_on_tiles(BuildingPlans(plans, []), by, HeightField.flat(200.0))
     assert decided.plans == plans

@@ -39,8 +39,8 @@ def test_the_page_s_examples_add_a_kind_of_place_with_german_names(own_data: Pat
     assert meaning_of("google", "bicycle_parking_lot") is None
     assert meaning_of("overture", "holz_werkstatt") == (Category.STORE, "repair")
     names = named_places.place_names()
-    assert names.called(names.of(kind), street="Gasse") == "Fahrradwerkstatt in der Gasse"
-    assert names.called(names.home, where="Gasse 3") == "Wohnungen, Gasse 3"
+    assert names.describe(names.of(kind), street="Gasse") == "Fahrradwerkstatt in der Gasse"
+    assert names.describe(names.home, where="Gasse 3") == "Wohnungen, Gasse 3"
     assert names.of("ice_cream") == "Ice cream"
 
 

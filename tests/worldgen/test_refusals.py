@@ -186,13 +186,13 @@ def refusing(near: dict[str, Points]) -> Iterator[None]:
     @contextmanager
     def timing(self: Stages, name: str) -> Iterator[None]:
         running.append(name)
-        with timed(self, name):
+        with timer(self, name):
             yield
         running.pop()
 
-    timed = Stages.timed
+    timer = Stages.timer
     with ExitStack() as stack:
-        stack.enter_context(mock.patch.object(Stages, "timed", timing))
+        stack.enter_context(mock.patch.object(Stages, "timer", timing))
         for name in OPERATIONS:
             stack.enter_context(mock.patch.object(shapely, name, refuser(getattr(shapely, name))))
         stack.enter_context(mock.patch.object(Stages, "run", during(Stages.run)))

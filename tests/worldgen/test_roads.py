@@ -269,7 +269,7 @@ def test_a_street_that_netconvert_refuses_costs_itself_alone(monkeypatch: pytest
     site = site_facts(road_city().osm)
     streets = streets_from_osm(site)
     used = [street for street in streets if is_traffic_street(street)]
-    bad, converted = used[len(used) // 2].way, netconvert._converted
+    bad, converted = used[len(used) // 2].way, netconvert._convert
 
     def refusing(
         binary: Path, site: SiteFacts, some: Sequence[NetworkStreet], height: None, kerbs: None = None
@@ -278,7 +278,7 @@ def test_a_street_that_netconvert_refuses_costs_itself_alone(monkeypatch: pytest
             raise netconvert.NetconvertError("road network: netconvert gave no network")
         return converted(binary, site, some, height, kerbs)
 
-    monkeypatch.setattr(netconvert, "_converted", refusing)
+    monkeypatch.setattr(netconvert, "_convert", refusing)
     with collect_losses() as losses:
         network = netconvert.road_network(site, streets)
     assert losses.ids == {f"w{bad}"}

@@ -278,7 +278,7 @@ def test_a_curve_brings_a_dark_photo_to_its_reference() -> None:
     reference = random.integers(40, 230, (4000, 3)).astype(np.uint8)
     dark = np.clip((reference / 255.0) ** 1.3 * (0.8, 0.7, 0.6) * 255, 0, 255).astype(np.uint8)
     curve = colour_curve(lab_of(dark), lab_of(reference))
-    mended = rgb_of(curve.applied(lab_of(dark)))
+    mended = rgb_of(curve.apply(lab_of(dark)))
     assert np.abs(mended - reference).mean() < 0.4 * np.abs(dark.astype(float) - reference).mean()
     assert (np.diff(curve.target) >= 0).all()
 

@@ -78,7 +78,7 @@ _THOUSANDS = re.compile(r"[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*(?![\d.,])")
 _UNIT_OF_HEADER = re.compile(r"(?<![^\W_])(km|ft|feet|mi)(?![^\W_])", re.IGNORECASE)
 # 52.1, 52,1°, N 52.1, 52°06'00.0"N
 _ANGLE = re.compile(
-    r"""([NSEW])?\s*([+-]?\d[\d.,]*)\s*°?(?:\s*(\d[\d.,]*)\s*['′’])?(?:\s*(\d[\d.,]*)\s*(?:"|″|”|''))?\s*([NSEW])?""",
+    r"""(?P<before>[NSEW])?\s*([+-]?\d[\d.,]*)\s*°?(?:\s*(\d[\d.,]*)\s*['′’])?(?:\s*(\d[\d.,]*)\s*(?:"|″|”|''))?\s*(?P<after>[NSEW])?""",
     re.IGNORECASE,
 )
 
@@ -114,7 +114,7 @@ class BadRow:
 
 @dataclass(frozen=True)
 class PlaceTable:
-    """What a table of places holds.
+    """Rows of a table of places, and notes on how it is written.
 
     Attributes
     ----------
@@ -236,7 +236,7 @@ def _degrees(text: str, what: str, letters: str) -> float:
     parts = [] if match is None else [decimal(part) for part in match.group(2, 3, 4) if part is not None]
     if match is None or None in parts:
         raise ValueError(f"{what} {text[:40]!r} is no number of degrees")
-    letter = (match[1] or match[5] or "").upper()
+    letter = (match["before"] or match["after"] or "").upper()
     if letter and letter not in letters:
         raise ValueError(f"{what} {text[:40]!r} is none; latitude and longitude look exchanged")
     value = sum(abs(part or 0.0) / 60.0**k for k, part in enumerate(parts))
@@ -344,7 +344,7 @@ def place_lists() -> dict[str, PlaceList]:
 
 
 def rows_of(places: PlaceList, *, extracts: Path | None = None, only: Collection[str] = ()) -> list[PlaceRow]:
-    """Return what `build_many` is told of a list.
+    """Return the rows of a list for `build_many`.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def _row_of_place(place: ListedPlace, extracts: Path | None) -> PlaceRow:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a place: built, kept (it was there), or failed with a reason."""
+    """Result for a place: built, kept (it was there), or failed with a reason."""
 
     name: str
     state: str
@@ -405,7 +405,7 @@ def build_many(
     ray: str | None = None,
     finished: Finished | None = None,
 ) -> list[Outcome]:
-    """Build every place into a folder of `out`; a world that is there and whole is kept, one that fails is told.
+    """Build every place into a folder of `out`; a world that is there and whole is kept, one that fails is reported.
 
     Parameters
     ----------
@@ -440,7 +440,7 @@ def build_many(
     store = FolderStore(out) if isinstance(out, Path) else out
     outcomes: dict[int, Outcome] = {}
 
-    def done(index: int, answer: Answer) -> None:
+    def record(index: int, answer: Answer) -> None:
         name = rows[index].name
         content = answer.content or asdict(Outcome(name, "failed", reason=answer.reason))
         outcomes[index] = Outcome(**content)
@@ -452,7 +452,7 @@ def build_many(
     options = {"out": str(store), "locate": f"{locate.__module__}:{locate.__qualname__}", "force": force}
     with open_executor(workers=workers, ray=ray) as executor, shared_store_marker(store, executor) as seen:
         service = Service("vico.worldgen.batch:builder", {**options, "seen": seen})
-        executor.run(service, [Task(asdict(row)) for row in rows], done=done)
+        executor.run(service, [Task(asdict(row)) for row in rows], done=record)
     return [outcomes[index] for index in range(len(rows))]
 
 
@@ -473,7 +473,9 @@ def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Ou
     """Build one place; bad input becomes an outcome, so that it does not end the others."""
     try:
         if not force and store.has(f"{row.name}/world.json"):
-            return _existing_outcome(row, store)
+            there = store.folder / row.name if isinstance(store, FolderStore) else fetch_manifest(f"{store}/{row.name}")
+            kept = read_world(there).manifest.counts
+            return Outcome(row.name, "kept", kept["buildings"], kept["places"])
         sources = Sources(
             osm=Path(row.osm) if row.osm else locate(row.lat, row.lon, row.radius),
             dem=tuple(Path(p) for p in row.dem.split(";") if p),
@@ -502,10 +504,3 @@ def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Ou
         return Outcome(row.name, "failed", reason=str(error))
     flat = world.manifest.is_flat
     return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2), flat=flat)
-
-
-def _existing_outcome(row: PlaceRow, store: Store) -> Outcome:
-    """Return the outcome of a world that is there."""
-    there = store.folder / row.name if isinstance(store, FolderStore) else fetch_manifest(f"{store}/{row.name}")
-    counts = read_world(there).manifest.counts
-    return Outcome(row.name, "kept", counts["buildings"], counts["places"])

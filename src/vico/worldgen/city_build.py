@@ -71,7 +71,16 @@ from vico.worldgen.seams.joins import (
     tile_name,
 )
 from vico.worldgen.seams.mosaic import TileShape, cells_of_tile, window_around, write_gates, write_walking
-from vico.worldgen.stages import SUFFIX, Stages, code_digest, digest_of, load_product, read_head, store_product
+from vico.worldgen.stages import (
+    SUFFIX,
+    Progress,
+    Stages,
+    code_digest,
+    digest_of,
+    load_product,
+    read_head,
+    store_product,
+)
 
 #: Product with a tile's gates.
 GATES = "gates"
@@ -102,7 +111,7 @@ def _plan_stages(request: CityRequest, tile: Tile) -> dict[str, Any]:
         plan_site(evidence, request.tile(tile), stages)
     except VicoError as error:
         none = replace(evidence.data, nodes=[], ways=[], areas=[], relations=[])
-        plan_site(replace(evidence, data=stages.given(none, digest_of(none))), request.tile(tile), stages)
+        plan_site(replace(evidence, data=stages.register(none, digest_of(none))), request.tile(tile), stages)
         return {"failed": sentence_of(error)}
     return {}
 
@@ -117,7 +126,7 @@ def _evidence(request: CityRequest, tile: Tile) -> tuple[Stages, Evidence]:
 def join_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
     """Make a tile's streets and ground one with its neighbours', for the city's tunnels."""
 
-    def made() -> dict[str, Any]:
+    def join() -> dict[str, Any]:
         stages, evidence = _evidence(request, tile)
         asked = request.tile(tile)
         plan_with_neighbours(plan_site(evidence, asked, stages), asked, stages)
@@ -126,7 +135,7 @@ def join_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
     made_of = _plans(request, tile)
     if not (request.plans / tile_name(tile) / f"{JOINED}{SUFFIX}").exists():
         _forget_step(request, tile, "join")
-    return _cached_step(request, tile, "join", made_of, made)
+    return _cached_step(request, tile, "join", made_of, join)
 
 
 def shape_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
@@ -154,11 +163,11 @@ def build_tile(request: CityRequest, tile: Tile) -> dict[str, Any]:
         _forget_step(request, tile, "build")
     made_of = [*_plans(request, tile), _head(folder, BORES), _head(folder, CUT)]
 
-    def made() -> dict[str, Any]:
+    def build() -> dict[str, Any]:
         build_requested(request.tile(tile), out)
         return {}
 
-    return _cached_step(request, tile, "build", made_of, made)
+    return _cached_step(request, tile, "build", made_of, build)
 
 
 def _plans(request: CityRequest, tile: Tile) -> list[str]:
@@ -224,11 +233,11 @@ def find_gates(request: CityRequest, tile: Tile) -> dict[str, Any]:
     made_of.append(sha256(np.ascontiguousarray(room[square]).tobytes()).hexdigest())
     cell = request.grid.size / (square[0].stop - square[0].start)
 
-    def made() -> dict[str, Any]:
+    def cut_gates() -> dict[str, Any]:
         store_product(request.plans / tile_name(tile), GATES, tile_gates(cost, room, square, cell=cell))
         return {}
 
-    return _cached_step(request, tile, "gates", made_of, made)
+    return _cached_step(request, tile, "gates", made_of, cut_gates)
 
 
 def _head(folder: Path, name: str) -> str:
@@ -276,9 +285,9 @@ STEPS: dict[str, Callable[[CityRequest, Tile], dict[str, Any]]] = {
 
 TILE = 400.0
 _CELL = 8.0
-_LEAST, _MOST, _LARGEST = 160.0, 1200.0, 20_000.0
-#: Called with a step's name, how many tiles are done, and how many there are.
-Progress = Callable[[str, int, int], None]
+_LEAST = 160.0  # metres, the side of a tile at least
+_MOST = 1200.0  # and at most
+_LARGEST = 20_000.0  # metres, the side of a city at most
 
 
 def city_request(
@@ -379,7 +388,7 @@ def build_city(
     with open_executor(workers=workers, ray=ray) as executor:
         service = Service("vico.worldgen.city_build:tile_builder", request.to_json())
 
-        def done(step: str, tiles: Sequence[Tile]) -> list[Tile]:
+        def run_step(step: str, tiles: Sequence[Tile]) -> list[Tile]:
             """Do a step to tiles, and return those that it went well with."""
             nonlocal found
             answers = _run_step(executor, service, tiles, step, progress)
@@ -389,24 +398,24 @@ def build_city(
             failed.update({tile_name(one): reason for one, reason in refused.items()})
             return [one for one in tiles if one not in refused]
 
-        left = done("plan", list(request.grid))
-        tunnels = done("join", [tile for tile in tiles_with_tunnels(request, region) if tile in left])
+        left = run_step("plan", list(request.grid))
+        tunnels = run_step("join", [tile for tile in tiles_with_tunnels(request, region) if tile in left])
         divide_tunnels(request, region, tunnels)
         give_back_memory()
-        left = done("shape", left)
+        left = run_step("shape", left)
         if left:
             _report_step(progress, "streets", 0)
             reports = make_streets(request, region)
             _report_step(progress, "streets", 1)
         del region
         give_back_memory()
-        left = done("fit", done("build", left))
+        left = run_step("fit", run_step("build", left))
         if left:
             tiles = dict(found)
             maps = {one: request.out / TILES / tile_name(one) / "walkable.npz" for one in left}
             _write_walkable(request, maps)
             give_back_memory()
-            if lost := set(left).difference(done("gates", left)):
+            if lost := set(left).difference(run_step("gates", left)):
                 name = tile_name(min(lost))
                 raise StageError(f"city build: the ways out of tile {name} can't be found: {failed[name]}")
     if not left:
@@ -455,7 +464,7 @@ def _report_step(progress: Progress | None, step: str, done: int) -> None:
 def divide_sources(request: CityRequest) -> RegionMap:
     """Keep for each tile what the region's map and ground say of it; return that map, as `divide_map`."""
     region = divide_map(request)
-    divide_waters(request, region, bare_ground(request))
+    divide_waters(request, region, _bare_ground(request))
     return region
 
 
@@ -475,15 +484,15 @@ def divide_map(request: CityRequest) -> RegionMap:
     return region
 
 
-def bare_ground(request: CityRequest) -> HeightField:
-    """Fit the bare ground of the whole city, level where nothing tells its heights."""
+def _bare_ground(request: CityRequest) -> HeightField:
+    """Fit the bare ground of the whole city, level where its heights are unknown."""
     half = request.grid.half + HALO
     if not request.sources.dem:
         return flat_terrain(half=half)
     frame = LocalFrame(request.lat, request.lon)
     stages = Stages(request.plans)
     samples = read_elevation(request.sources.dem, frame, half)
-    stages.given(samples, f"{samples.sha256} {frame} {half}")
+    stages.register(samples, f"{samples.sha256} {frame} {half}")
     return stages.run("terrain", terrain_from_dem, samples, half=half, apron=APRON)
 
 
@@ -493,10 +502,10 @@ def _run_step(
     """Do a step to all tiles; return what came of each, in the order of the tiles."""
     answers: dict[Tile, Answer] = {}
 
-    def done(index: int, answer: Answer) -> None:
+    def record(index: int, answer: Answer) -> None:
         answers[tiles[index]] = answer
         if progress is not None:
             progress(step, len(answers), len(tiles))
 
-    executor.run(service, [Task({"tile": list(tile), "step": step}) for tile in tiles], done=done)
+    executor.run(service, [Task({"tile": list(tile), "step": step}) for tile in tiles], done=record)
     return {tile: answers[tile] for tile in tiles}

@@ -1,4 +1,4 @@
-"""What is asked of a city, the map of its region, and what is decided once for the whole city: waters and tunnels.
+"""The request for a city, the map of its region, and waters and tunnels, which are decided once for the whole city.
 
 How high waters lie is decided by all their banks. Which tunnels can be used, and how they lie, is decided by all
 their mouths: a tile knows of a tunnel what lies in it alone, and its neighbour would lay another floor, or close it.
@@ -92,7 +92,7 @@ class CityRequest:
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> CityRequest:
-        """Return what `to_json` told."""
+        """Return the request that `to_json` wrote."""
         grid = content["grid"]
         return cls(
             Sources.from_json(content["sources"]),
@@ -124,7 +124,7 @@ class RegionMap:
     def whole(self) -> OsmData:
         """The map of the square around the city, and what is near it."""
         whole = read_osm(self._path, self._frame, self._reach, need_buildings=False)
-        # The sea is found for all tiles at once: of one that no coastline meets nobody could say whether it is land.
+        # The sea is found for all tiles at once: a tile that no coastline meets could be land or sea.
         # Where that fails each tile looks for its own, and reports what is wrong.
         with drop_on_failure("sea"):
             reach = self._reach
@@ -145,7 +145,7 @@ def divide_waters(request: CityRequest, region: RegionMap, ground: HeightField) 
     numbers would come than next to it.
     """
     stages = Stages(request.plans)
-    stages.given(region, region.key)
+    stages.register(region, region.key)
     bodies = stages.run("bodies", _bodies_of_water, region, ground)
     outlines = shapely.STRtree([body.outline for body in bodies])
     half = request.grid.size / 2 + HALO
@@ -163,7 +163,7 @@ def _bodies_of_water(region: RegionMap, ground: HeightField) -> list[WaterBody]:
 
 
 def _part_of(body: WaterBody, window: shapely.Polygon, middle: NDArray[np.float64]) -> list[WaterBody]:
-    """Return what of a body lies in a window, as high as it is, told from another middle."""
+    """Return the parts of a body in a window, as high as it is, in coordinates around another middle."""
     here = polygons_of(overlay.intersection(body.outline, window))
     return [replace(body, outline=translate(part, *(-middle).tolist()), shore=body.shore - middle) for part in here]
 
@@ -172,13 +172,13 @@ Floats = NDArray[np.float64]
 
 _BESIDE = 40.0  # metres beside a tunnel's line whose ground and streets say whether it can be used
 _INSIDE = 1.0  # metres from the city's edge from which on the ground is known
-_MORE = 10.0  # metres beyond what a tile knows of the ground that it is told of tunnels
+_MORE = 10.0  # metres beyond the ground of a tile within which it gets the tunnels
 
 
 def tiles_with_tunnels(request: CityRequest, region: RegionMap) -> list[Tile]:
     """Return the tiles in or close to which there are tunnels that could be used."""
     stages = Stages(request.plans)
-    stages.given(region, region.key)
+    stages.register(region, region.key)
     found = stages.run("tunnels", _tiles_with_tunnels, region, request.grid)
     return [(column, row) for column, row in found]
 
@@ -196,9 +196,9 @@ def divide_tunnels(request: CityRequest, region: RegionMap, tiles: Sequence[Tile
         Those with tunnels: their ground and streets have been joined with their neighbours'.
     """
     stages = Stages(request.plans)
-    stages.given(region, region.key)
+    stages.register(region, region.key)
     heads = [read_head(request.plans / tile_name(tile) / f"{JOINED}{SUFFIX}")[1] for tile in tiles]
-    ground = stages.given(_JoinedTiles(request, tiles), "\n".join(heads))
+    ground = stages.register(_JoinedTiles(request, tiles), "\n".join(heads))
     bores = stages.run("bores", _bores, region, ground)
     for tile in request.grid:
         store_product(request.plans / tile_name(tile), BORES, _bores_near(bores, tile, request.grid))
@@ -282,7 +282,7 @@ class _CityGround:
 
 
 def _bores_near(bores: Sequence[Bore], tile: Tile, grid: TileGrid) -> list[Bore]:
-    """Return what of tunnels is near a tile, told from its middle."""
+    """Return the parts of tunnels near a tile, in the tile's coordinates."""
     middle = np.array(grid.centre(tile))
     reach = grid.size / 2 + APRON + _MORE
     found: list[Bore] = []

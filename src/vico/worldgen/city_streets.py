@@ -32,7 +32,7 @@ from vico.world.city import (
     LEVELS as LEVELS_OF_CITY,
 )
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph, read_lanes
+from vico.world.lanes import read_lanes
 from vico.world.model import Point2, Point3, Roads, StageReport
 from vico.world.transit import Transit
 from vico.world.world import write_record
@@ -96,7 +96,12 @@ def make_streets(request: CityRequest, region: RegionMap) -> list[StageReport]:
         What was made and left out.
     """
     (request.out / WHOLE).mkdir(parents=True, exist_ok=True)
-    both = _digest_of_shapes(request)
+    # All that is read, or will be, of the shapes of tiles is in one digest.
+    digests: list[str] = []
+    for tile in _tiles_with_shape(request):
+        folder = request.plans / tile_name(tile)
+        digests += [tile_name(tile), *(read_head(folder / f"{name}{SUFFIX}")[1] for name in (SHAPE, LEVELS))]
+    both = sha256("\n".join(digests).encode()).hexdigest()
     known = request.plans / STREETS / _DONE
     key = sha256(f"{region.key} {request.seed} {both}".encode()).hexdigest()
     content = read_json(known) if known.exists() else {}
@@ -124,7 +129,9 @@ def _output_digests(request: CityRequest) -> dict[str, str]:
 
 def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
     """Make the streets of a map and of its tiles' shapes, whose digest is `both`."""
-    shapes = _shapes(request)
+    shapes = _Shapes(
+        {tile: load_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _tiles_with_shape(request)}
+    )
     whole = request.out / WHOLE
     known = request.plans / STREETS / _GROUND
     is_there = known.exists() and all((whole / name).exists() for name in _HEIGHTS)
@@ -132,34 +139,44 @@ def _make(request: CityRequest, data: OsmData, both: str) -> list[StageReport]:
         write_ground(whole, request.grid, lambda tile: _levels(request, tile))
         write_json(known, {"key": both})
     stages = Stages(request.plans / STREETS)
-    given = stages.given
-    data = given(data, f"{data.sha256} {data.frame} {data.half} {data.box}")
-    with stages.timed("facts"):
-        site = given(site_facts(data), f"facts {stages.digest(data)}")
-    levels = given(whole_ground(whole, data.half), f"levels {both}")
-    height = given(replace(levels, decks=None, stairs=None), f"ground {both}")
-    solids = given(solids_of(shapes, request.grid), f"solids {both}")
-    streets = stages.run("polygons", streets_of, given(shapes, both), request.grid)
+    register = stages.register
+    data = register(data, f"{data.sha256} {data.frame} {data.half} {data.box}")
+    with stages.timer("facts"):
+        site = register(site_facts(data), f"facts {stages.digest(data)}")
+    levels = register(whole_ground(whole, data.half), f"levels {both}")
+    height = register(replace(levels, decks=None, stairs=None), f"ground {both}")
+    solids = register(solids_of(shapes, request.grid), f"solids {both}")
+    streets = stages.run("polygons", streets_of, register(shapes, both), request.grid)
     usable, tiles = frozenset(way for shape in shapes.values() for way in shape.open_ways), list(shapes)
     del shapes  # hundreds of megabytes in 27 km², and of no use any more
     give_back_memory()
     ways = stages.run(STREETS, streets_from_osm, site, solids, usable)
     roads = stages.run("roads", roads_from_osm, site, ways)
-    kerbs = given(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
+    kerbs = register(CarriagewayEdges(streets.carriageway, solids), f"kerbs {both}")
     release_pages(levels)
     network = stages.run("network", road_network, site, ways, levels, kerbs)
     release_pages(levels)  # half a gigabyte in 27 km²
     write_record(whole / ROADS, roads)
     write_bytes(whole / NET, network.net_xml)
     write_bytes(whole / XODR, network.xodr or b"")
-    lanes = given(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
+    lanes = register(read_lanes(whole / NET), f"lanes {sha256(network.net_xml).hexdigest()}")
     mapped = stages.run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=request.seed)
     release_pages(levels)
-    with stages.timed("waiting"):
+    with stages.timer("waiting"):
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write_record(whole / TRANSIT, transit)
-    _report(stages, roads, lanes, transit)
-    cutter, boxes = NetworkCutter(network.net_xml), _boxes(roads)
+    counts = {"roads": len(roads.roads), "junctions": len(roads.junctions), "lanes": len(lanes)}
+    stages.report("roads", counts, closed_roads(roads))
+    counts = {
+        "stops": len(transit.stops),
+        "lines": len(transit.lines),
+        "tram_lines": len(transit.tram_lines),
+        "bike_stations": len(transit.bike_stations),
+    }
+    stages.report("transit", counts, transit.left_out)
+    cutter = NetworkCutter(network.net_xml)
+    lines = [np.array(road.line) for road in roads.roads]
+    boxes = np.array([[*line.min(axis=0), *line.max(axis=0)] for line in lines]).reshape(-1, 4)
     for tile in tiles:
         shift = _Shift(request.grid, tile)
         net = cutter.within(half=request.grid.size / 2 + _AROUND, east=shift.by[0], north=shift.by[1])
@@ -174,23 +191,8 @@ def _tiles_with_shape(request: CityRequest) -> list[Tile]:
     return [tile for tile in request.grid if (request.plans / tile_name(tile) / f"{SHAPE}{SUFFIX}").exists()]
 
 
-def _digest_of_shapes(request: CityRequest) -> str:
-    """Return a digest of all that is read, or will be, of the shapes of tiles."""
-    digests: list[str] = []
-    for tile in _tiles_with_shape(request):
-        folder = request.plans / tile_name(tile)
-        digests += [tile_name(tile), *(read_head(folder / f"{name}{SUFFIX}")[1] for name in (SHAPE, LEVELS))]
-    return sha256("\n".join(digests).encode()).hexdigest()
-
-
 class _Shapes(dict[Tile, TileShape]):
     """The shapes of tiles; unlike a plain dictionary's, stages don't keep their inputs alive that are of this class."""
-
-
-def _shapes(request: CityRequest) -> _Shapes:
-    return _Shapes(
-        {tile: load_product(request.plans / tile_name(tile), SHAPE)[0] for tile in _tiles_with_shape(request)}
-    )
 
 
 def _levels(request: CityRequest, tile: Tile) -> HeightField:
@@ -199,18 +201,6 @@ def _levels(request: CityRequest, tile: Tile) -> HeightField:
     made = (folder / f"{LEVELS}{SUFFIX}").exists()
     levels: HeightField = load_product(folder, LEVELS if made else "grading")[0]
     return levels
-
-
-def _report(stages: Stages, roads: Roads, lanes: LaneGraph, transit: Transit) -> None:
-    counts = {"roads": len(roads.roads), "junctions": len(roads.junctions), "lanes": len(lanes)}
-    stages.report("roads", counts, closed_roads(roads))
-    counts = {
-        "stops": len(transit.stops),
-        "lines": len(transit.lines),
-        "tram_lines": len(transit.tram_lines),
-        "bike_stations": len(transit.bike_stations),
-    }
-    stages.report("transit", counts, transit.left_out)
 
 
 class _Shift:
@@ -234,12 +224,6 @@ class _Shift:
         half = self._size / 2 + _AROUND
         low, high = boxes[:, :2] - self.by, boxes[:, 2:] - self.by
         return np.flatnonzero((low <= half).all(axis=1) & (high >= -half).all(axis=1))
-
-
-def _boxes(roads: Roads) -> NDArray[np.float64]:
-    """Return the box of every road: west, south, east and north, metres, shape ``(n, 4)``."""
-    lines = [np.array(road.line) for road in roads.roads]
-    return np.array([[*line.min(axis=0), *line.max(axis=0)] for line in lines]).reshape(-1, 4)
 
 
 def _roads_in(roads: Roads, boxes: NDArray[np.float64], shift: _Shift) -> Roads:

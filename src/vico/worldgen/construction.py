@@ -58,7 +58,7 @@ from vico.worldgen.stages import Stages, load_product
 from vico.worldgen.streets.polygons import road_polygons
 
 
-def read_data_tables() -> None:
+def _read_data_tables() -> None:
     """Read every file of data, ours and the user's, and make the user's models.
 
     Raises
@@ -100,7 +100,7 @@ def map_of(place: TilePlace) -> tuple[OsmData, str]:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is decided before anything is built: outlines of buildings, streets, and the ground graded to them.
+    """Plan of a world before anything is built: outlines of buildings, streets, and the ground graded to them.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Plan:
 
 def plan_site(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan:
     """Run the stages that come before anything is built."""
-    read_data_tables()
+    _read_data_tables()
     run = stages.run
     evidence, known = _merge_buildings(evidence, stages)
     site = _without_lost(_site(evidence.data, request.place, stages), stages)
@@ -137,7 +137,7 @@ def plan_site(evidence: Evidence, request: WorldRequest, stages: Stages) -> Plan
 
 @dataclass(frozen=True)
 class Shape:
-    """What stands and lies there: the plan carried out, before streets are driven on and things put beside them.
+    """Buildings and ground: the plan carried out, before there are lanes and objects.
 
     Attributes
     ----------
@@ -162,17 +162,17 @@ def build_shape(plan: Plan, request: WorldRequest, stages: Stages) -> Shape:
     run = stages.run
     plan, beyond = plan_with_neighbours(plan, request, stages)
     site, plans, height = plan.site, plan.plans, plan.height
-    bores = None if request.place is None else stages.given(*load_product(request.place.own, BORES))
+    bores = None if request.place is None else stages.register(*load_product(request.place.own, BORES))
     bridges = run("bridges", bridges_of, site, height, plan.streets, bores)
     site = _without_lost(site, stages)
     flights = run("stairs", flights_of, site, height, plan.streets.steps)
     site = _without_lost(site, stages)
-    levels = stages.digested(replace(height, decks=bridges.levels(), stairs=flights.treads()))
+    levels = stages.register_value(replace(height, decks=bridges.levels(), stairs=flights.treads()))
     if plan.tiles is not None:
         plans, fits = run("fit", plans_on_tiles, plans, plan.tiles, height)
         stages.report("fit", fits.counts())
     built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=request.seed)
-    solids = stages.digested([*built.standing(height), *bridges.feet, *beyond])
+    solids = stages.register_value([*built.standing(height), *bridges.feet, *beyond])
     return Shape(replace(plan, site=site, plans=plans), bridges, flights, levels, built, solids)
 
 
@@ -183,21 +183,21 @@ def plan_with_neighbours(plan: Plan, request: WorldRequest, stages: Stages) -> t
         return plan, []
     around = place.grid.around(place.tile)
     found = {name: [load_product(place.folder(one), name) for one in around] for name in SEAMS}
-    known = {name: [stages.given(*one) for one in products] for name, products in found.items()}
+    known = {name: [stages.register(*one) for one in products] for name, products in found.items()}
     both = " ".join(digest for products in found.values() for _, digest in products)
-    streets = stages.given(known["streets"], f"streets {both}")
-    heights = stages.given(known["grading"], f"heights {both}")
+    streets = stages.register(known["streets"], f"streets {both}")
+    heights = stages.register(known["grading"], f"heights {both}")
     joined = stages.run(JOINED, join_neighbours, place.grid, place.tile, streets, heights, apron=APRON)
     plans, beyond = split_buildings(plan.plans, place.grid, place.tile)
     osm = plan.site.osm
     less = replace(osm, half=request.half, margin=osm.margin + osm.half - request.half)
-    site = stages.given(site_facts(less, plan.site.waters), f"{stages.digest(plan.site)} within {request.half}")
+    site = stages.register(site_facts(less, plan.site.waters), f"{stages.digest(plan.site)} within {request.half}")
     return replace(
         plan,
         site=site,
-        plans=stages.given(plans, f"{stages.digest(plan.plans)} within {request.half}"),
-        streets=stages.given(joined.streets, f"{stages.digest(joined)} streets"),
-        height=stages.given(joined.height, f"{stages.digest(joined)} height"),
+        plans=stages.register(plans, f"{stages.digest(plan.plans)} within {request.half}"),
+        streets=stages.register(joined.streets, f"{stages.digest(joined)} streets"),
+        height=stages.register(joined.height, f"{stages.digest(joined)} height"),
     ), beyond
 
 
@@ -207,15 +207,15 @@ def _merge_buildings(evidence: Evidence, stages: Stages) -> tuple[Evidence, dict
         return evidence, {}
     merged = stages.run("sources", conflate_buildings, evidence.data, evidence.buildings, evidence.precedence)
     stages.report("sources", merged.counts, merged.dropped)
-    data = stages.given(merged.osm, f"map of {stages.digest(merged)}")
+    data = stages.register(merged.osm, f"map of {stages.digest(merged)}")
     return replace(evidence, data=data), {"measured": merged.facets, "origins": merged.origins}
 
 
 def _site(data: OsmData, place: TilePlace | None, stages: Stages) -> SiteFacts:
     """Read the facts of the site off its map; they are known by the digest of that and of what a city knows beside."""
     waters, known = (None, "") if place is None else load_product(place.own, WATERS)
-    with stages.timed("facts"):
-        return stages.given(site_facts(data, waters), f"facts {stages.digest(data)} {known}")
+    with stages.timer("facts"):
+        return stages.register(site_facts(data, waters), f"facts {stages.digest(data)} {known}")
 
 
 def _without_lost(site: SiteFacts, stages: Stages) -> SiteFacts:
@@ -223,17 +223,17 @@ def _without_lost(site: SiteFacts, stages: Stages) -> SiteFacts:
     if not stages.lost:
         return site
     less = site.without(stages.lost)
-    return stages.given(less, f"{stages.digest(site)} without {' '.join(sorted(stages.lost))}")
+    return stages.register(less, f"{stages.digest(site)} without {' '.join(sorted(stages.lost))}")
 
 
 def _terrain(
     evidence: Evidence, plans: BuildingPlans, request: WorldRequest, stages: Stages
 ) -> tuple[HeightField, TileMesh | None]:
-    """Make the bare ground of whatever tells heights; the tile mesh, if there is one, is raised to stand on it."""
+    """Make the bare ground from the sources of heights; the tile mesh, if there is one, is raised to stand on it."""
     tiles, half, place = evidence.tiles, request.reach, request.place
     if place is not None and request.sources.dem:
         # Of the whole city at once: a fit to fewer samples is another one.
-        whole = stages.given(*load_product(place.plans, "terrain"))
+        whole = stages.register(*load_product(place.plans, "terrain"))
         east, north = place.grid.centre(place.tile)
         return stages.run("terrain", crop_heights, whole, half=half + APRON, east=east, north=north), None
     if tiles is None and evidence.samples is None:
@@ -249,7 +249,7 @@ def _terrain(
 def _ground_of_tiles(
     data: OsmData, samples: HeightSamples | None, mesh: TileMesh, plans: BuildingPlans, *, half: float
 ) -> tuple[HeightField, float]:
-    """Make the ground, and tell by how much the tile mesh has to be raised to stand on it.
+    """Return the ground, and by how much the tile mesh has to be raised to stand on it.
 
     An elevation file that is given goes before the mesh's own ground; a mesh of buildings alone has none.
     """
@@ -266,7 +266,7 @@ def _ground_of_tiles(
 def make_cladding(shape: Shape, request: WorldRequest, stages: Stages) -> Cladding:
     """Cover the buildings."""
     # Known by what it is a part of: that has been digested.
-    bare = stages.given(shape.built.bare, f"{stages.digest(shape.built)} bare")
+    bare = stages.register(shape.built.bare, f"{stages.digest(shape.built)} bare")
     return stages.run("cladding", clad, bare, shape.plan.site.osm, seed=request.seed)
 
 

@@ -1,4 +1,4 @@
-"""What the sources of a world give, read once before its stages run; and which values of the map could not be read.
+"""Content of a world's sources, read once before its stages run; and values of the map that could not be read.
 
 A build's report lists each value that is not plain: what was read by a rule ("G+4" as five storeys), what can't be
 read ("two"), and what can't be true ("9999"). Nothing else is decided here; stages read the same values by
@@ -92,7 +92,7 @@ def opening_hours_notes(places: Sequence[Place]) -> tuple[dict[str, int], list[D
 
 
 def _tagged_objects(osm: OsmData) -> Iterator[tuple[str, NDArray[np.float64], Tags]]:
-    """Everything of a map that has tags: its id, points of its shape, and its tags. A closed way is told once."""
+    """Yield everything of a map that has tags: its id, points of its shape, and its tags; a closed way once."""
     yield from ((f"n{node.id}", node.xy[None], node.tags) for node in osm.nodes)
     yield from ((f"w{way.id}", way.line, way.tags) for way in osm.ways)
     relations: Iterable[tuple[str, NDArray[np.float64], Tags]] = (
@@ -123,7 +123,7 @@ _SHOWN_OUTLIERS = 3
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the sources gave.
+    """Content of the sources.
 
     Attributes
     ----------
@@ -178,17 +178,20 @@ def read_evidence(
         Of whichever kind the source's reader raises; each is one sentence.
     """
     where = f"{frame} {half}"
-    precedence = _precedence(sources)
-    with stages.timed("map"):
+    # Which source decides what is read before anything that takes long; where only the map is asked, nothing is.
+    precedence = None
+    if sources.buildings or sources.precedence is not None:
+        precedence = read_precedence(sources.precedence, [path.name for path, _ in checked_files(sources.buildings)])
+    with stages.timer("map"):
         if part is None:
             data = read_osm(sources.osm, frame, half)
-            stages.given(data, f"{data.sha256} {where}")
+            stages.register(data, f"{data.sha256} {where}")
         else:
-            data = stages.given(*part)
+            data = stages.register(*part)
         finest = precedence is None or precedence.terrain == "finest"
         samples, without = _heights(sources, frame, half, finest_first=finest, part=part is not None)
         if samples is not None:
-            stages.given(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
+            stages.register(samples, f"{samples.sha256} {where}{'' if finest else ' as given'}")
     _report_map(data, samples, without, stages)
     credits = [
         Source(
@@ -207,22 +210,23 @@ def read_evidence(
         ]
     tiles = None
     if sources.tiles is not None:
-        with stages.timed("tiles"):
+        with stages.timer("tiles"):
             tiles = _tile_mesh(sources.tiles, frame, half, stages, credits)
     images: list[StreetImage] = []
     if sources.photos is not None:
-        with stages.timed("photos"):
+        with stages.timer("photos"):
             images = _photos(sources.photos, frame, half, stages, credits)
     found: list[FoundPlace] = []
     if sources.places:
-        with stages.timed("found places"):
+        with stages.timer("found places"):
             found = _places(sources.places, frame, half, stages, credits)
     feeds = []
     if sources.gtfs:
-        with stages.timed("timetables"):
-            feeds = [read_gtfs(path, frame, half, as_of=_day_of(data)) for path in sources.gtfs]
+        with stages.timer("timetables"):
+            as_of = None if data.timestamp is None else date.fromisoformat(data.timestamp[:10])
+            feeds = [read_gtfs(path, frame, half, as_of=as_of) for path in sources.gtfs]
         for path, feed in zip(sources.gtfs, feeds, strict=True):
-            stages.given(feed, f"{feed.sha256} {where}")
+            stages.register(feed, f"{feed.sha256} {where}")
             credits.append(
                 Source(
                     kind="timetable",
@@ -241,11 +245,11 @@ def read_evidence(
         stages.report("timetables", {"feeds": len(feeds)}, silent + broken)
     buildings: list[FoundBuildings] = []
     if sources.buildings:
-        with stages.timed("found buildings"):
+        with stages.timer("found buildings"):
             buildings = _buildings(sources, frame, half, stages, credits)
     detections = None
     if sources.detections is not None:
-        with stages.timed("detections file"):
+        with stages.timer("detections file"):
             detections = _detections(sources.detections, sources, frame, half, stages, credits)
     return Evidence(data, samples, tiles, images, found, feeds, credits, buildings, precedence, detections)
 
@@ -278,7 +282,7 @@ def _report_map(data: OsmData, samples: HeightSamples | None, without: Dropped |
         stages.report("map", {"heights_outlying": len(samples.outliers)}, told)
     if samples is not None and (samples.voids or samples.doubtful):
         told = [Dropped(id=name, reason=reason) for name, reason in _void_notes(samples)]
-        stages.report("map", {"heights_void": sum(row[4] for row in samples.voids)}, told)
+        stages.report("map", {"heights_void": sum(count for *_, count, _ in samples.voids)}, told)
 
 
 def _void_notes(samples: HeightSamples) -> list[tuple[str, str]]:
@@ -293,10 +297,9 @@ def _void_notes(samples: HeightSamples) -> list[tuple[str, str]]:
             lies = f"lie {abs(step):.0f} m {'below' if step > 0 else 'above'} the ground on nearly all sides"
             told.append((name, f"{what} {lies}; {said}: gdal_edit.py -a_nodata {height:g} {name}"))
         if len(rows) > _SHOWN_OUTLIERS:
-            more = len(rows) - _SHOWN_OUTLIERS
-            told.append(
-                (rows[-1][0], f"{more} more such patches, {sum(r[4] for r in rows[_SHOWN_OUTLIERS:]):,} pixels")
-            )
+            rest = rows[_SHOWN_OUTLIERS:]
+            pixels = sum(count for *_, count, _ in rest)
+            told.append((rows[-1][0], f"{len(rest)} more such patches, {pixels:,} pixels"))
     return told
 
 
@@ -312,11 +315,6 @@ def _outlier_notes(samples: HeightSamples) -> list[tuple[str, str]]:
     return told
 
 
-def _day_of(data: OsmData) -> date | None:
-    """Return the day that a map is of, if it says."""
-    return None if data.timestamp is None else date.fromisoformat(data.timestamp[:10])
-
-
 def _heights(
     sources: Sources, frame: LocalFrame, half: float, *, finest_first: bool, part: bool
 ) -> tuple[HeightSamples | None, Dropped | None]:
@@ -329,13 +327,6 @@ def _heights(
         if not part:
             raise
         return None, Dropped(id=sources.dem[0].name, reason=str(error))
-
-
-def _precedence(sources: Sources) -> Precedence | None:
-    """Read which source decides what, before anything that takes long; None where only the map is asked."""
-    if not sources.buildings and sources.precedence is None:
-        return None
-    return read_precedence(sources.precedence, [path.name for path, _ in checked_files(sources.buildings)])
 
 
 def _buildings(
@@ -368,7 +359,7 @@ def _detections(
 ) -> Detections:
     photos = None if sources.photos in (None, *SERVICES) else Path(str(sources.photos))
     found = read_detections(path, frame, half, photos=photos)
-    stages.given(found, f"{found.sha256} {frame} {half}")
+    stages.register(found, f"{found.sha256} {frame} {half}")
     credits.append(
         Source(
             kind="detections",
@@ -389,7 +380,7 @@ def _tile_mesh(source: str, frame: LocalFrame, half: float, stages: Stages, cred
         error=_TILE_ERROR,
         margin=_TILE_MARGIN,
     )
-    stages.given(mesh, digest_of(mesh))
+    stages.register(mesh, digest_of(mesh))
     dropped = [Dropped(id=uri, reason=reason) for uri, reason in report.left_out]
     stages.report("tiles", {"tiles": report.read, "triangles": len(mesh.triangles)}, dropped)
     attribution = "; ".join(mesh.attributions) or _file_name(source)

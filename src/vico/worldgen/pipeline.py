@@ -165,7 +165,10 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions, kind: Folder
         planned, part = (None, None) if request.place is None else (request.place.own, map_of(request.place))
         stages = Stages(folder / STAGES, again=options.again, progress=options.progress, beside=planned)
         evidence = read_evidence(request.sources, request.frame, request.reach, stages, part=part)
-        _clear(folder)
+        for path in folder.iterdir():
+            # What a build before left goes, except what its stages made.
+            if path.name != STAGES or not path.is_dir():
+                remove_path(path)
         if not (folder / STAGES).exists() and (out / STAGES).is_dir():
             # What did not change need not be made.
             shutil.copytree(out / STAGES, folder / STAGES, copy_function=os.link)
@@ -174,7 +177,7 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions, kind: Folder
             world = make_world(evidence, request, folder, stages, ahead)
         del evidence  # the mesh of a photographed city is large, and so are its pictures
         if part is None:
-            with stages.timed("previews"):
+            with stages.timer("previews"):
                 stages.report("previews", write_previews(world, folder, views=request.previews))
         stages.sweep()
         if not options.keep_stages:
@@ -183,10 +186,3 @@ def _build(request: WorldRequest, out: Path, options: BuildOptions, kind: Folder
         manifest = seal(folder, made, seconds=stages.seconds, without=() if part is None else (*OF_A_CITY, "map.png"))
         write_report(read_world(folder))
     return manifest
-
-
-def _clear(folder: Path) -> None:
-    """Delete what a build before left in the working folder, except what its stages made."""
-    for path in folder.iterdir():
-        if path.name != STAGES or not path.is_dir():
-            remove_path(path)

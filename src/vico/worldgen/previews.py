@@ -154,7 +154,7 @@ _BUILDING: Rgb = (168, 156, 148)
 _ACCESSIBLE: Rgb = (192, 172, 152)
 _OUTLINE: Rgb = (118, 106, 100)
 
-# Okabe and Ito's colours, told apart by people with any kind of colour vision; a shape of its own for each.
+# Okabe and Ito's colours, distinct for all kinds of colour vision; a shape of its own for each.
 _MARKS: dict[Category, tuple[Rgb, str]] = {
     Category.ACCOMMODATION: ((0, 114, 178), "square"),
     Category.FOOD: ((213, 94, 0), "circle"),
@@ -189,7 +189,7 @@ def _fill_triangles(image, corners, colours):  # type: ignore[no-untyped-def]
                         image[j, i, k] = colours[t, k]
 
 
-def map_picture(world: World) -> Image.Image:
+def _map_picture(world: World) -> Image.Image:
     """Draw a world from above with legend, scale bar, north arrow and attribution."""
     scale = 2  # drawn larger, then reduced
     side = _MAP_SIDE * scale
@@ -225,7 +225,13 @@ def map_picture(world: World) -> Image.Image:
         x, y = at(xy)
         r = 1.7 * metre
         draw.ellipse((x - r, y - r, x + r, y + r), fill=(126, 168, 104))
-    _draw_lines(draw, world, at, scale)
+    # A tile's lines use lanes of other tiles, too.
+    lanes = world.lanes
+    for line in world.transit.lines:
+        for there, names in groupby(line.lanes, lambda name: name in lanes.index):
+            points = [at(p) for name in names if there for p in lanes.line(lanes.index[name]).tolist()]
+            if len(points) > 1:
+                draw.line(points, fill=line.colour, width=2 * scale, joint="curve")
     _street_names(image, world, at, metre, scale)
     draw = ImageDraw.Draw(image)
     for place in sorted(world.places, key=lambda p: list(_MARKS).index(p.category)):
@@ -236,18 +242,6 @@ def map_picture(world: World) -> Image.Image:
     canvas.paste(image, (0, 0))
     _legend(ImageDraw.Draw(canvas), world)
     return canvas
-
-
-def _draw_lines(
-    draw: ImageDraw.ImageDraw, world: World, at: Callable[[Sequence[float]], tuple[float, float]], scale: int
-) -> None:
-    """Bus lines along the lanes they use; of a tile's lines those lanes alone that it has."""
-    lanes = world.lanes
-    for line in world.transit.lines:
-        for there, names in groupby(line.lanes, lambda name: name in lanes.index):
-            points = [at(p) for name in names if there for p in lanes.line(lanes.index[name]).tolist()]
-            if len(points) > 1:
-                draw.line(points, fill=line.colour, width=2 * scale, joint="curve")
 
 
 def _street_names(
@@ -382,7 +376,7 @@ def write_previews(world: World, folder: Path, *, views: bool) -> dict[str, int]
 
 def write_map(world: World, folder: Path) -> None:
     """Write ``map.png``."""
-    map_picture(world).save(folder / "map.png")
+    _map_picture(world).save(folder / "map.png")
 
 
 def render_views(world: World, views: Sequence[Viewpoint | Overhead]) -> Iterator[NDArray[np.uint8]]:

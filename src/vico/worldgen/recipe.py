@@ -102,7 +102,7 @@ def make_world(
         seed=seed,
     )
     write.parking(parking)
-    outdoors = stages.digested(Objects.joined([outdoors, parking.cars]))
+    outdoors = stages.register_value(Objects.joined([outdoors, parking.cars]))
     write.outdoors(outdoors, dropped)
     walkable = run("walkable", walkable_from_site, site, streets, [*solids, *bridges.low, *bridges.cuts], outdoors)
     write.walkable(walkable)
@@ -131,7 +131,7 @@ def make_world(
     ground = make_ground(shape, yards, trees, request, stages)
     stages.report("ground", {"faces": faces(ground)})
     cladding = make_cladding(shape, request, stages)
-    with stages.timed("fronts"):
+    with stages.timer("fronts"):
         names = Streets(roads, outdoors, levels, street_habits(site.osm).plates)
         fronts = street_fronts(indoors.places, entrances, buildings, cladding.walls, seed=seed, streets=names)
     stages.report("fronts", fronts.counts)
@@ -173,7 +173,7 @@ def _make_streets(
     feeds = list(plan.evidence.feeds)
     about = {"solids": shape.solids, "seed": request.seed, "feeds": feeds}
     mapped = run("transit", transit_from_osm, plan.site, lanes, shape.levels, **about)
-    with stages.timed("waiting"):
+    with stages.timer("waiting"):
         transit = waiting_places(mapped, plan.streets, lanes, plan.height, shape.solids)
     write.transit(transit)
     return roads, lanes, transit
@@ -182,8 +182,8 @@ def _make_streets(
 def _cut_streets(place: TilePlace, stages: Stages, write: WorldWriter) -> tuple[Roads, LaneGraph, Transit]:
     """Take the streets of a tile from those of its city."""
     cut, digest = load_product(place.own, CUT)
-    stages.given(cut.roads, f"roads {digest}")
-    stages.given(cut.transit, f"transit {digest}")
+    stages.register(cut.roads, f"roads {digest}")
+    stages.register(cut.transit, f"transit {digest}")
     lanes = write.streets(cut.roads, cut.network)
     write.transit(cut.transit)
     return cut.roads, lanes, cut.transit
@@ -198,7 +198,7 @@ def _with_detections(
     things = stages.run("detections", things_from_detections, osm, evidence.detections, height, seed=seed)
     write_records(folder / FILE, things.records)
     stages.report("detections", things.counts(), things.dropped)
-    return stages.given(things.on(osm), f"{stages.digest(osm)} {stages.digest(things)}")
+    return stages.register(things.on(osm), f"{stages.digest(osm)} {stages.digest(things)}")
 
 
 def _furnish(
@@ -213,7 +213,7 @@ def _furnish(
     library, author = request.sources.layouts, request.author
     if library is not None:
         files = sorted(library.glob("*.json"))
-        stages.given(library, " ".join(f"{path.name} {sha256_of(path)}" for path in files))
+        stages.register(library, " ".join(f"{path.name} {sha256_of(path)}" for path in files))
     inside = {
         "buildings": buildings,
         "height": height,
@@ -223,7 +223,7 @@ def _furnish(
     }
     if author is None:
         return stages.run("indoor", furnish, places, **inside), []
-    stages.given(author, author.digest)
+    stages.register(author, author.digest)
     return stages.run("indoor", furnish_drawn, places, author=author, **inside)
 
 

@@ -68,7 +68,11 @@ def report_page(world: World) -> str:
     parts.append("<h2>What is there</h2>" + figures(manifest.counts))
     parts.append("<h2>Places by type</h2>" + _bars(manifest.places_by_type.items(), unit=""))
     parts.append("<h2>What was left out or mended, and why</h2>" + omissions(manifest.stages))
-    parts.append("<h2>Stage by stage</h2>" + _stage_table(manifest.stages))
+    stages = [
+        (_label(s.name), "; ".join(f"{_label(name)} {number:,}" for name, number in s.counts.items()))
+        for s in manifest.stages
+    ]
+    parts.append("<h2>Stage by stage</h2>" + _table(("stage", "made"), stages))
     parts.append("<h2>Seconds a stage</h2>" + _bars(seconds.items(), unit=" s"))
     rows = [
         (
@@ -87,7 +91,7 @@ def report_page(world: World) -> str:
 
 
 def write_report(world: World) -> None:
-    """Write the page into the world's folder. It tells seconds, so it is no part of the world's identity."""
+    """Write the page into the world's folder. It shows seconds, so it is no part of the world's identity."""
     write_bytes(world.file("report.html"), report_page(world).encode())
 
 
@@ -134,13 +138,6 @@ def _mending(reason: str) -> str:
     if "not in the file" not in reason:
         return ""
     return "; to have it whole, clip anew with whole relations (osmium extract -s smart), or take a larger extract"
-
-
-def _stage_table(stages: Sequence[StageReport]) -> str:
-    rows = [
-        (_label(s.name), "; ".join(f"{_label(name)} {number:,}" for name, number in s.counts.items())) for s in stages
-    ]
-    return _table(("stage", "made"), rows)
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -193,7 +190,7 @@ addEventListener("resize", fit); fit();
 _MAP_SIDE = 600  # pixels of a tile before it is zoomed
 
 
-def city_page(city: City) -> str:
+def _city_page(city: City) -> str:
     """Return the page, HTML; its pictures are those of the tiles, by relative path."""
     manifest = city.manifest
     (west, south), (east, north) = manifest.first, manifest.last
@@ -243,4 +240,4 @@ def city_page(city: City) -> str:
 
 def write_city_report(city: City) -> None:
     """Write ``report.html`` into a city's folder."""
-    write_bytes(city.path / "report.html", city_page(city).encode())
+    write_bytes(city.path / "report.html", _city_page(city).encode())

@@ -1,4 +1,4 @@
-"""What is asked of a build: which world, from which sources, and how it is made.
+"""Request for a build: which world, from which sources, and how it is made.
 
 `Sources` are the files and services that a world is made from; only the map is needed. `map_for` finds a map that
 covers a window: the packaged extract, else one from a server. A `WorldRequest` is everything that decides what is in
@@ -24,7 +24,7 @@ from vico.worldgen.stages import Progress
 
 @dataclass(frozen=True)
 class Sources:
-    """What a world is made from; only the map is needed.
+    """Sources that a world is made from; only the map is needed.
 
     Attributes
     ----------
@@ -287,7 +287,7 @@ class WorldRequest:
 
     @classmethod
     def from_json(cls, content: dict[str, Any], *, author: LlmLayoutAuthor | None) -> WorldRequest:
-        """Return the request that `to_json` was asked for, with an author who may draw for it."""
+        """Return the request that `to_json` wrote, with an author that may draw for it."""
         return cls(
             Sources.from_json(content["sources"]),
             content["lat"],

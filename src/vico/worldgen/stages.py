@@ -271,7 +271,7 @@ SUFFIX = ".stage"
 
 @dataclass(frozen=True)
 class _StageFile:
-    """What the file of a stage holds: what it made, what it left out, and of how many objects (0 if nothing)."""
+    """Content of a stage's file: what it made, what it left out, and of how many objects (0 if nothing)."""
 
     value: Any
     dropped: list[Dropped]
@@ -342,19 +342,19 @@ class Stages:
         self._elsewhere: dict[str, Callable[[], float | None]] = {}
         self._digests: dict[int, tuple[Callable[[], Any], str]] = {}
 
-    def given(self, value: T, digest: str) -> T:
+    def register(self, value: T, digest: str) -> T:
         """Make an input known by a digest of its own (of the file it was read from), and return it."""
         try:
-            # Known as long as somebody holds it: the meshes and photos of a district would fill gigabytes.
+            # Known as long as it is referenced: the meshes and photos of a district would fill gigabytes.
             self._digests[id(value)] = weakref.ref(value), digest
         except TypeError:
             if not isinstance(value, tuple):  # tuples are taken apart: none is the input of a stage
                 self._digests[id(value)] = lambda: value, digest
         return value
 
-    def digested(self, value: T) -> T:
+    def register_value(self, value: T) -> T:
         """Take the digest of a value that is the input of several stages, once, and return the value."""
-        return self.given(value, digest_of(value))
+        return self.register(value, digest_of(value))
 
     def digest(self, value: Any) -> str:
         """Return the digest of an input: as it is known by, else of its content."""
@@ -394,7 +394,7 @@ class Stages:
         self._elsewhere[name] = made
 
     @contextmanager
-    def timed(self, name: str) -> Iterator[None]:
+    def timer(self, name: str) -> Iterator[None]:
         """Time a step that keeps no product: reading the sources, writing files, taking pictures."""
         self._tell(name, 0)
         start = time.perf_counter()
@@ -459,12 +459,12 @@ class Stages:
                 if not made:
                     self.kept.append(name)
                 self._report_losses(name, known[0].dropped, known[0].tried)
-                return self.given(known[0].value, known[1])
+                return self.register(known[0].value, known[1])
         with _stage_errors(name) as losses:
             value = function(*inputs, **options)
         product = _StageFile(value, losses.dropped, len(losses.tried) if losses.dropped else 0)
         self._report_losses(name, product.dropped, product.tried)
-        return self.given(value, write_product(path, product, key=key))
+        return self.register(value, write_product(path, product, key=key))
 
     def _read(self, path: Path, key: str) -> tuple[_StageFile, str] | None:
         """Read the product, if it was made under this key and is whole: a torn one is simply made anew."""

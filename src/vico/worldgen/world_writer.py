@@ -1,4 +1,4 @@
-"""What stages made, written into the world's folder and told in its report."""
+"""Products of stages, written into the world's folder and reported."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class WorldParts:
-    """What a world consists of beside its surfaces; fields are named as the attributes of `World`."""
+    """Parts of a world beside its surfaces; fields are named as the attributes of `World`."""
 
     height: HeightField
     buildings: list[Building]
@@ -116,7 +116,7 @@ class WorldWriter:
         self._stages = stages
 
     def terrain(self, height: HeightField, *, flat: bool) -> None:
-        """Write the graded ground; `flat` says that nothing told its heights."""
+        """Write the graded ground; `flat` says that its heights are unknown."""
         write_terrain(self.folder / "terrain.npz", height)
         told = [Dropped(id="terrain", reason=FLAT_GROUND)] if flat else []
         self._stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(flat)}, told)
@@ -128,7 +128,7 @@ class WorldWriter:
         write_bytes(net, network.net_xml)
         if network.xodr is not None:
             write_bytes(self.folder / "roads.xodr", network.xodr)
-        lanes = self._stages.given(read_lanes(net), sha256_of(net))
+        lanes = self._stages.register(read_lanes(net), sha256_of(net))
         self._stages.report(
             "roads",
             {
@@ -211,7 +211,7 @@ class WorldWriter:
     def meshes(self, layers: Layers, models: dict[str, Sequence[Surface]]) -> None:
         """Write surfaces and prototypes."""
         meshes = self.folder / "meshes"
-        with self._stages.timed("write"):
+        with self._stages.timer("write"):
             write_glb(meshes / "ground.glb", {"ground": layers.ground})
             write_glb(meshes / "buildings.glb", {"walls": layers.walls, "doors": layers.fronts})
             write_glb(meshes / "roofs.glb", {"roofs": layers.roofs})

@@ -160,7 +160,12 @@ def textured_surfaces(
     parts = [part for plan in plans for part in plan.solids]
     levels = _levels(mesh, parts, plans, seats, looks)
     mesh = _cut(mesh, levels)
-    faces = _faces(mesh, edges)
+    corner = mesh.points[mesh.faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    line = lines_of_faces(corner.mean(axis=1), normal, mesh.part, edges)
+    entity = (FIRST_BUILDING + mesh.plan_of_part[mesh.part]).astype(np.int32)
+    faces = _Faces(corner, normal, mesh.part, entity, line)
     zone = _zones(faces, edges, levels)
     of = mesh.plan_of_part
     shops = [_SHOPS[zlib.crc32(plans[p].id.encode()) % len(_SHOPS)] for p in of]
@@ -223,15 +228,6 @@ def _cut(mesh: SolidMesh, levels: _Levels) -> SolidMesh:
         points, faces, owner = cut_at_heights(points, faces, owner, heights)
     faces, owner = without_needless(points, faces, owner, len(mesh.points))
     return replace(mesh, points=points, faces=faces, part=owner)
-
-
-def _faces(mesh: SolidMesh, edges: WallLines) -> _Faces:
-    corner = mesh.points[mesh.faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    line = lines_of_faces(corner.mean(axis=1), normal, mesh.part, edges)
-    entity = (FIRST_BUILDING + mesh.plan_of_part[mesh.part]).astype(np.int32)
-    return _Faces(corner, normal, mesh.part, entity, line)
 
 
 def _zones(faces: _Faces, edges: WallLines, levels: _Levels) -> NDArray[np.int64]:

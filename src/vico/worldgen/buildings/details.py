@@ -31,8 +31,10 @@ from vico.worldgen.facts.fault_isolation import drop_on_failure
 from vico.worldgen.facts.roofs import Roof, rings_of
 
 _SIZE = (0.85, 0.5)  # metres
-_STACK, _THICK = 1.7, 0.5  # metres along and across a wall between houses
-_POTS, _POT = 0.38, 0.2  # metres: height and width of a row of pots
+_STACK = 1.7  # metres of a chimney along a wall between houses
+_THICK = 0.5  # and across it
+_POTS = 0.38  # metres, height of a row of pots
+_POT = 0.2  # metres, its width
 _CLEAR = 0.75  # metres by which a chimney stands above the roof around it, at least
 _OVER_RIDGE = 0.5  # metres beyond which no chimney stands above its roof's ridge, unless it stands at it
 _LEAST_WALL = 5.0  # metres of a wall that carries a stack
@@ -169,7 +171,7 @@ def rooftop_parts(
     random
         The building's own stream.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
 
     Returns
     -------
@@ -327,7 +329,11 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
     for size, at in zip(random.uniform(2.2, 6.5, (4, 2)), random.random((4, 2)), strict=True):
         if len(made) >= min(int(part.polygon.area / 700.0) + 1, 4):
             break
-        box = _box(_spot(room, at), size, _box_direction(part.polygon))
+        west, south, east, north = room.bounds
+        middle = np.array([west + (east - west) * at[0], south + (north - south) * at[1]])
+        around = np.asarray(shapely.minimum_rotated_rectangle(part.polygon).exterior.coords)
+        side = around[1] - around[0]
+        box = _box(middle, size, math.atan2(side[1], side[0]))
         if free.contains(overlay.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
             made.append(_solid(box, part.eaves - 0.2, part.eaves + float(random.uniform(1.6, 3.0)), "penthouse"))
     return made
@@ -335,17 +341,6 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
 
 def _solid(polygon: Polygon, low: float, high: float, finish: str) -> PartPlan:
     return PartPlan(polygon, low, high, 0, Roof("flat", 0.0), {}, finish)
-
-
-def _spot(room: Polygon, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    west, south, east, north = room.bounds
-    return np.array([west + (east - west) * at[0], south + (north - south) * at[1]])
-
-
-def _box_direction(polygon: Polygon) -> float:
-    box = np.asarray(shapely.minimum_rotated_rectangle(polygon).exterior.coords)
-    side = box[1] - box[0]
-    return math.atan2(side[1], side[0])
 
 
 _LEAST_HEIGHT = 2.9  # metres under whatever hangs over a pavement
@@ -398,7 +393,7 @@ def projections(
     free
         Whether nothing stands in an outline between two heights above the building's base.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     random
         The building's own stream.
 
@@ -512,7 +507,8 @@ def _alpine(wall: _Wall, share: float, region: RegionalStyle, random: np.random.
     return made
 
 
-_ORIEL, _CANT = 0.85, 0.3  # metres: how far an oriel juts out, and by how much its front is narrower
+_ORIEL = 0.85  # metres that an oriel juts out
+_CANT = 0.3  # metres by which its front is narrower
 
 
 def _oriels(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:

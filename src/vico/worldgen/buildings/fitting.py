@@ -35,7 +35,8 @@ GAIN = 0.02  # metres that a change must bring
 _INSET = 1.2  # metres from a roof's edge, where photogrammetry rounds it off
 _SPACING = 1.3
 _MOST_POINTS = 600  # a part
-_ROOF_CLIP, _WALL_CLIP = 4.0, 3.0  # metres: what is farther off is something else
+_ROOF_CLIP = 4.0  # metres: a roof farther off is something else
+_WALL_CLIP = 3.0  # metres: a wall farther off is something else
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
@@ -176,7 +177,7 @@ _ABSENT = 1.5  # metres over the ground floor under which the mesh shows no buil
 
 
 def raised_to_mesh(plan: BuildingPlan, roofs: RoofSamples, k: int, base: float) -> tuple[BuildingPlan, str]:
-    """Return the plan with eaves and roofs where the mesh has them; or itself, and why, where nothing tells."""
+    """Return the plan with eaves and roofs where the mesh has them; or itself, and why, where no heights are known."""
     mine = np.flatnonzero(roofs.plan == k)
     if len(mine) < LEAST_POINTS:
         return plan, "too small or outside the tiles"
@@ -214,7 +215,7 @@ def _raised_part(part: PartPlan, model: NDArray[np.float64], seen: NDArray[np.fl
     levels = part.levels
     if levels and quantity(part.tags, "building:levels") is None:
         levels = max(round((eaves - part.low - 0.6) / STOREY), 1)
-    return replace(part, eaves=eaves, levels=levels, roof=part.roof.risen(round(new_rise, 3)))
+    return replace(part, eaves=eaves, levels=levels, roof=part.roof.with_height(round(new_rise, 3)))
 
 
 def _robust_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
@@ -260,7 +261,7 @@ _MOST_SCALE = 0.04
 Move = tuple[tuple[float, float], float]
 
 
-def moved_to_mesh(
+def _moved_to_mesh(
     plans: list[BuildingPlan], measure: Measure, failed: list[Dropped]
 ) -> tuple[list[BuildingPlan], list[Move]]:
     """Plans with their footprints where the mesh has its walls; and each one's shift and scale.
@@ -290,7 +291,7 @@ def moved_to_mesh(
             shift, scale = _best_move(walls.place[mine] - pivot, walls.normal[mine], walls.outward[mine], len(own) == 1)
             near = shapely.STRtree([shapes[k] for k in range(len(plans)) if group[k] != g])
             for _ in range(4):
-                new = [_displaced(plans[k], shift, scale, pivot) for k in own]
+                new = [_move_building(plans[k], shift, scale, pivot) for k in own]
                 outlines = [overlay.union_all([plan.outline, *(part.polygon for part in plan.parts)]) for plan in new]
                 grown = sum(
                     float(overlay.common_area(shape, near.geometries[i]))
@@ -370,26 +371,26 @@ def _best_move(
     return shift, scale
 
 
-def _displaced(
+def _move_building(
     plan: BuildingPlan, shift: NDArray[np.float64], scale: float, pivot: NDArray[np.float64]
 ) -> BuildingPlan:
     def move(xy: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(pivot + scale * (xy - pivot) + shift, np.float64)
 
-    def moved(polygon: Polygon) -> Polygon:
+    def place(polygon: Polygon) -> Polygon:
         return shapely.transform(polygon, move)
 
     return replace(
         plan,
-        outline=moved(plan.outline),
-        parts=[replace(part, polygon=moved(part.polygon), roof=part.roof.moved(move)) for part in plan.parts],
-        rooftop=[replace(part, polygon=moved(part.polygon)) for part in plan.rooftop],
+        outline=place(plan.outline),
+        parts=[replace(part, polygon=place(part.polygon), roof=part.roof.transform(move)) for part in plan.parts],
+        rooftop=[replace(part, polygon=place(part.polygon)) for part in plan.rooftop],
     )
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What became of a building.
+    """Result of fitting a building.
 
     Attributes
     ----------
@@ -419,7 +420,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class FitReport:
-    """What became of all buildings.
+    """Results of fitting all buildings.
 
     Attributes
     ----------
@@ -508,7 +509,7 @@ def fit_to_tiles(
         better = new is not plan and mean_of(higher.off(k)) < mean_of(roofs.off(k)) - GAIN
         kept.append(new if better else plan)
         reasons.append("" if better else reason or "already fits")
-    moved, moves = moved_to_mesh(kept, measure, failed)
+    moved, moves = _moved_to_mesh(kept, measure, failed)
     final_roofs, final_walls = measure.roofs(moved), measure.walls(moved)
     fits = []
     for k, (plan, new) in enumerate(zip(plans, moved, strict=True)):

@@ -56,7 +56,7 @@ class _Fault(NamedTuple):
 
 @dataclass
 class _Remedy:
-    """What is done about a building's faults, by their reasons; the last that has one counts.
+    """Remedies of a building's faults, by their reasons; the last that has one counts.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ def _remedies(faults: Iterator[_Fault], standing: Mapping[str, Draft], cut: set[
 
 
 def _apply_remedy(draft: Draft, remedy: _Remedy, terrain: HeightField, dropped: list[Dropped]) -> Draft:
-    """Return a building made again, plainer; tell what it lacks."""
+    """Return a building made again, plainer; add what it lacks to `dropped`."""
     name = draft.plan.id
     if remedy.block:
         made = draft_building(_block(draft.plan), draft.look, terrain)

@@ -1,4 +1,4 @@
-"""What belongs to a roof beside its slopes: eaves, stepped gables and dormers; closed solids each.
+"""Parts of a roof beside its slopes: eaves, stepped gables and dormers; closed solids each.
 
 Eaves: roofs reach out over the walls, each slope in its own plane, cut where a neighbour stands. What is built is the
 fringe outside the walls alone: along every edge of an outline the slopes that end there go on outwards and down (at
@@ -48,8 +48,9 @@ _WITH_EAVES = (
 _ON_EDGE = 0.03  # metres within which a corner of the mesh lies on an outline's edge
 _APART = 0.012  # metres kept free of neighbours, so that no two faces lie in one plane
 _HEADROOM = 2.3  # metres under the lowest edge
-_LANE, _LANE_HEADROOM = 4.0, 3.2  # near a street's centre line more is asked
-_SPECK = 0.004  # metres: detail that the kernel makes and nobody sees
+_LANE = 4.0  # metres from a street's centre line within which more headroom is asked for
+_LANE_HEADROOM = 3.2  # metres
+_SPECK = 0.004  # metres: detail that the kernel makes and that is too small to be seen
 _SHORTEST = 0.9  # metres of an edge that is worth a fringe
 _STEEPEST = 1.9  # rise per metre beyond which a roof is a spire and has none
 
@@ -310,14 +311,14 @@ def _fringe(
     for shape, slope in shapes:
         rings = [ring - centre for ring in rings_of(shape)]
 
-        def lifted(
+        def lift(
             points: NDArray[np.float64], slope: Slope = slope, centre: NDArray[np.float64] = centre
         ) -> NDArray[np.float64]:
             moved = np.array(points, np.float64)
             moved[:, 2] = slope.height(moved[:, :2] + centre) - np.where(moved[:, 2] > 0.5, 0.0, thick)
             return moved
 
-        solid = CrossSection(rings, manifold3d.FillRule.Positive).extrude(1.0).warp_batch(lifted)
+        solid = CrossSection(rings, manifold3d.FillRule.Positive).extrude(1.0).warp_batch(lift)
         if solid.is_empty():
             continue
         solids.append(solid)
@@ -329,9 +330,11 @@ def _fringe(
 
 
 _STEPS = 4
-_BEHIND, _BEFORE = 0.3, 0.05  # metres that a gable reaches into the roof, and before the wall's plane
+_BEHIND = 0.3  # metres that a gable reaches into the roof
+_BEFORE = 0.05  # metres that it stands before the wall's plane
 _COPING = 0.3  # metres by which each step stands above the slope behind it
-_NARROWEST_GABLE, _WIDEST_GABLE = 3.0, 12.0  # metres of front that have one
+_NARROWEST_GABLE = 3.0  # metres of front that have one, at least
+_WIDEST_GABLE = 12.0  # and at most
 _LOWEST_GABLE = 1.5  # metres of roof
 
 
@@ -418,7 +421,7 @@ def dormers(
     others
         What else sits on its roofs; dormers keep clear of it.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     random
         The building's own stream.
 

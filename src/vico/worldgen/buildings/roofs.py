@@ -1,7 +1,7 @@
 """Watertight building solids: an outline raised to its eaves under its roof.
 
 Simple 3D Buildings' roofs are built three ways. Over an outline that about fills its box, ridged roofs are the prism
-within one or two profiles drawn across the box (`profiled_solid`). Over wings and courtyards every edge cuts away what
+within one or two profiles drawn across the box (`_profiled_solid`). Over wings and courtyards every edge cuts away what
 lies above the plane that climbs from it (`sloped_solid`): where two edges meet, their cuts make the hip; at a reflex
 corner a third piece makes the valley; edges that get no cut become gables; a roof that bends (mansard, gambrel, round)
 is several planes an edge. Pyramids, domes and onions are the outline's ring drawn together towards a point above it.
@@ -44,7 +44,7 @@ _ONION = [
 ]
 
 
-def drawn_together(polygon: Polygon, rings: list[NDArray[np.float64]], low: float, roof: Roof) -> Manifold | None:
+def _drawn_together(polygon: Polygon, rings: list[NDArray[np.float64]], low: float, roof: Roof) -> Manifold | None:
     """Return the solid from `low` under a pyramid, dome or onion; the eaves are at 0.
 
     None for a pyramid over an outline that is not seen whole from any point of it.
@@ -132,7 +132,7 @@ class BoxFrame:
         return not holes and fill > _FILL.get(shape, 0.83)
 
 
-def box_frame(polygon: Polygon, direction: float | None) -> BoxFrame:
+def _box_frame(polygon: Polygon, direction: float | None) -> BoxFrame:
     """Return the smallest box around an outline, turned to `direction` (the ridge's yaw) unless a side agrees."""
     corners = np.asarray(shapely.minimum_rotated_rectangle(polygon).exterior.coords)[:3]
     sides = np.diff(corners, axis=0)
@@ -198,7 +198,7 @@ def _ends(shape: str, frame: BoxFrame, run: float) -> Profile | None:
     return left + right
 
 
-def profiled_solid(rings: list[NDArray[np.float64]], low: float, roof: Roof, frame: BoxFrame) -> Manifold:
+def _profiled_solid(rings: list[NDArray[np.float64]], low: float, roof: Roof, frame: BoxFrame) -> Manifold:
     """Return the prism from `low` under a ridged roof whose eaves are at 0."""
     half = frame.half_width
     rise = roof.height
@@ -291,16 +291,6 @@ def sloped_solid(polygon: Polygon, rings: list[NDArray[np.float64]], low: float,
     return _cut(rings, low, roof.height, slope, gables, roof.shape)
 
 
-def _planes(slope: Profile, rise: float) -> list[_Plane]:
-    planes = []
-    for (d0, z0), (d1, z1) in itertools.pairwise(slope):
-        rate = (z1 - z0) * rise / max(d1 - d0, 1e-3)
-        start = z0 * rise - rate * d0
-        if rate > 1e-3:
-            planes.append(_Plane(start, rate, (rise - start) / rate))
-    return planes
-
-
 def _cut(
     rings: list[NDArray[np.float64]],
     low: float,
@@ -309,7 +299,12 @@ def _cut(
     gables: list[list[bool]] | None,
     shape: str,
 ) -> Manifold:
-    planes = _planes(slope, rise)
+    planes = []
+    for (d0, z0), (d1, z1) in itertools.pairwise(slope):
+        climb = (z1 - z0) * rise / max(d1 - d0, 1e-3)
+        start = z0 * rise - climb * d0
+        if climb > 1e-3:
+            planes.append(_Plane(start, climb, (rise - start) / climb))
     ends: list[_Plane] = []
     if shape in ("half-hipped", "side_half-hipped"):
         rate = planes[0].slope
@@ -394,7 +389,7 @@ def _gable_ends(polygon: Polygon, rings: list[NDArray[np.float64]]) -> list[list
     return marks
 
 
-_SPECK = 0.002  # metres: detail that the kernel makes and nobody sees
+_SPECK = 0.002  # metres: detail that the kernel makes and that is too small to be seen
 
 
 def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Manifold:
@@ -425,16 +420,24 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
         return _with_parapet(polygon, low, eaves, roof.height) if roof.height > 0.05 else prism(rings, low, eaves)
     if roof.height <= 0.05:
         return prism(rings, low, eaves)
-    # The roof is made over eaves at 0: its highest point is then stretched to the height asked, exactly.
+    # The roof is made over eaves at 0: its highest point is then stretch to the height asked, exactly.
     if roof.shape == "skillion":
-        solid = _skillion(rings, low - eaves, roof)
+        yaw = roof.direction if roof.direction is not None else 0.0
+        fall = np.array([math.cos(yaw), math.sin(yaw)])
+        reach = [float(v) for ring in rings for v in dot(ring, fall)]
+        first, last = min(reach), max(reach)
+        body = prism(rings, low - eaves, roof.height)
+        slope = roof.height / max(last - first, 0.1)
+        normal = np.array([-fall[0] * slope, -fall[1] * slope, -1.0])
+        # Kept is what lies under the plane z = (last - p.fall) * slope.
+        solid = body.trim_by_plane(tuple(normal), -last * slope / math.hypot(*normal))
     elif roof.shape in ("dome", "onion", "pyramidal"):
-        made = drawn_together(polygon, rings, low - eaves, roof)
+        made = _drawn_together(polygon, rings, low - eaves, roof)
         solid = made if made is not None else sloped_solid(polygon, rings, low - eaves, replace(roof, shape="hipped"))
     else:
-        frame: BoxFrame = box_frame(polygon, roof.direction)
+        frame: BoxFrame = _box_frame(polygon, roof.direction)
         if frame.suits(roof.shape, polygon, holes=len(rings) > 1):
-            solid = profiled_solid(rings, low - eaves, roof, frame)
+            solid = _profiled_solid(rings, low - eaves, roof, frame)
         else:
             solid = sloped_solid(polygon, rings, low - eaves, roof)
     solid = solid.simplify(_SPECK)
@@ -451,12 +454,12 @@ def _as_high_as(solid: Manifold, height: float) -> Manifold:
         return solid
     share = height / top
 
-    def stretched(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stretch(points: NDArray[np.float64]) -> NDArray[np.float64]:
         result = np.array(points, np.float64)
         result[:, 2] = np.where(result[:, 2] > 0.0, result[:, 2] * share, result[:, 2])
         return result
 
-    return solid.warp_batch(stretched)
+    return solid.warp_batch(stretch)
 
 
 def _with_parapet(polygon: Polygon, low: float, eaves: float, height: float) -> Manifold:
@@ -467,15 +470,3 @@ def _with_parapet(polygon: Polygon, low: float, eaves: float, height: float) -> 
         return prism(rings, low, eaves)
     hollow = [prism(rings_of(pool), eaves, eaves + height + 1.0) for pool in pools]
     return Manifold.batch_boolean([prism(rings, low, eaves + height), *hollow], manifold3d.OpType.Subtract)
-
-
-def _skillion(rings: list[NDArray[np.float64]], low: float, roof: Roof) -> Manifold:
-    yaw = roof.direction if roof.direction is not None else 0.0
-    fall = np.array([math.cos(yaw), math.sin(yaw)])
-    reach = [float(v) for ring in rings for v in dot(ring, fall)]
-    first, last = min(reach), max(reach)
-    body = prism(rings, low, roof.height)
-    slope = roof.height / max(last - first, 0.1)
-    normal = np.array([-fall[0] * slope, -fall[1] * slope, -1.0])
-    # Kept is what lies under the plane z = (last - p.fall) * slope.
-    return body.trim_by_plane(tuple(normal), -last * slope / math.hypot(*normal))

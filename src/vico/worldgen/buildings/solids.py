@@ -86,7 +86,7 @@ def part_mesh(part: PartPlan, seat: Footing) -> Mesh:
     def near_origin(xy: NDArray[np.float64]) -> NDArray[np.float64]:
         return xy - np.array([x, y])
 
-    local, roof = shapely.transform(part.polygon, near_origin), part.roof.moved(near_origin)
+    local, roof = shapely.transform(part.polygon, near_origin), part.roof.transform(near_origin)
     solid = building_solid(local, low - eaves, 0.0, roof).simplify(0.002)
     body = solid.to_mesh64()
     vertices = np.asarray(body.vert_properties, np.float64)[:, :3]
@@ -103,7 +103,7 @@ def solid_meshes(plans: Sequence[BuildingPlan], seats: Sequence[Footing]) -> Sol
         meshes.append([])
         for solid in plan.solids:
             mesh = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-            with drop_on_failure(plan.id, []):  # the stage that builds it tells
+            with drop_on_failure(plan.id, []):  # the stage that builds it reports the failure
                 mesh = part_mesh(solid, seat)
             meshes[-1].append(mesh)
     return merge_solids(meshes)
@@ -276,7 +276,12 @@ def draft_building(plan: BuildingPlan, look: FacadeStyle, terrain: HeightField) 
     seat = seat_of(plan, terrain)
     meshes = [part_mesh(part, seat) for part in plan.parts]
     bodies = [body for part in plan.parts for body in collision_bodies(part, seat)]
-    return Draft(plan, seat, look, _footprint(plan), meshes, bodies)
+    # A millimetre grid, so that the written outline is the valid one and not its rounding.
+    merged = overlay.on_grid(overlay.union_all([part.polygon for part in standing_parts(plan)]), grid=0.001)
+    pieces = polygons_of(merged)
+    if not pieces:
+        raise OverlayError("nothing is left of its outline; draw it anew")
+    return Draft(plan, seat, look, max(pieces, key=lambda shape: shape.area), meshes, bodies)
 
 
 def with_rooftop(draft: Draft, rooftop: Sequence[PartPlan], dropped: list[Dropped]) -> Draft:
@@ -296,15 +301,6 @@ def with_rooftop(draft: Draft, rooftop: Sequence[PartPlan], dropped: list[Droppe
 def standing_parts(plan: BuildingPlan) -> list[PartPlan]:
     """Return the parts of a building that make its footprint: those at the ground, or all where there are none."""
     return [part for part in plan.parts if part.low < _STANDING] or plan.parts
-
-
-def _footprint(plan: BuildingPlan) -> Polygon:
-    # A millimetre grid, so that the written outline is the valid one and not its rounding.
-    merged = overlay.on_grid(overlay.union_all([part.polygon for part in standing_parts(plan)]), grid=0.001)
-    pieces = polygons_of(merged)
-    if not pieces:
-        raise OverlayError("nothing is left of its outline; draw it anew")
-    return max(pieces, key=lambda shape: shape.area)
 
 
 def record_of(draft: Draft, entity: int) -> Building:

@@ -51,9 +51,9 @@ _DEEPEST = 18.0  # metres of a house whose ridge is turned along the street
 _REACH = 25.0  # metres within which a street counts
 _SHORTEST = 2.5  # metres of a side that may be a house's front
 _PITCHED = range(2, 8)  # storeys of houses that have pitched roofs in a town of them
-_SLOPE = 0.62  # metres a metre: of roofs that nobody gave a height
+_SLOPE = 0.62  # metres a metre: of roofs without a height
 _PARAPET = 0.6  # metres
-_GARRET = 3.4  # metres: a mansard is a storey high, where nobody says its height
+_GARRET = 3.4  # metres: a mansard without a height is a storey high
 
 
 def with_customary_roofs(
@@ -76,7 +76,7 @@ def with_customary_roofs(
     streets
         Centre lines of streets: a ridge goes by the side of the house that lies nearest to one.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     flat_town
         Whether houses have flat roofs here (`is_flat_town`): then those that were supposed stay flat.
     random
@@ -185,7 +185,7 @@ def details_of(
     dropped
         Where it is told whose details can't be made.
     region
-        As `facades.catalogue.region_of` says.
+        As `facades.facade_styles.region_of` says.
     seed
         Decides what is there; each building's draws are its own.
 
@@ -267,7 +267,7 @@ class UncladBuildings:
 
 @dataclass(frozen=True)
 class Cladding:
-    """What covers buildings: layers "buildings" and "roofs", together closed, part by part."""
+    """Surfaces of buildings: layers "buildings" and "roofs", together closed, part by part."""
 
     walls: list[Surface]
     roofs: list[Surface]
@@ -275,7 +275,7 @@ class Cladding:
 
 @dataclass(frozen=True)
 class BuildingsResult:
-    """What the stage made.
+    """Product of the stage.
 
     Attributes
     ----------
@@ -357,7 +357,13 @@ def buildings_from_plans(decided: BuildingPlans, osm: OsmData, terrain: HeightFi
             random = rng(seed, "roof customs", plan.id)
             roofed = with_customary_roofs(plan, look.wall, streets, region=region, flat_town=flat, random=random)
             drafts.append(draft_building(roofed, look, terrain))
-    drafts = _with_distinct_styles(drafts)
+    # No two houses side by side look the same, unless the map says so.
+    outlines = np.array([draft.plan.outline for draft in drafts], object)
+    left, right = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=1.0)
+    pairs = sorted((i, j) for i, j in zip(left.tolist(), right.tolist(), strict=True) if i < j)
+    free = [not any("colo" in key and key.startswith("building:") for key in draft.plan.tags) for draft in drafts]
+    worn = facade_styles.distinct_styles([draft.look for draft in drafts], pairs, free)
+    drafts = [replace(draft, look=look) for draft, look in zip(drafts, worn, strict=True)]
     fronts = fronts_of([draft.plan for draft in drafts], [draft.seat for draft in drafts], osm)
     details = details_of(drafts, fronts, streets, dropped, region=region, seed=seed)
     drafts = [with_rooftop(draft, small, dropped) for draft, small in zip(drafts, details, strict=True)]
@@ -372,7 +378,9 @@ def buildings_from_plans(decided: BuildingPlans, osm: OsmData, terrain: HeightFi
     records = [record_of(draft, entity) for entity, draft in enumerate(drafts, FIRST_BUILDING)]
     collision = [body for entity, draft in enumerate(drafts, FIRST_BUILDING) for body in bodies_of(draft, entity)]
     rules = {rule: count for rule in RULES if (count := sum(plan.rule == rule for plan in plans))}
-    bare = UncladBuildings(mesh, [_without_meshes(plan) for plan in plans], seats, dress)
+    # All solids are in one mesh by now: plans need none of their own.
+    plain = [replace(plan, rooftop=[replace(part, mesh=None) for part in plan.rooftop]) for plan in plans]
+    bare = UncladBuildings(mesh, plain, seats, dress)
     return BuildingsResult(records, bare, collision, dropped, len(plans) - len(leaky_plans(mesh)), rules)
 
 
@@ -392,11 +400,6 @@ def clad(bare: UncladBuildings, osm: OsmData, *, seed: int) -> Cladding:
     return Cladding(*textured_surfaces(bare.mesh, lines, bare.plans, bare.seats, bare.looks, seed))
 
 
-def _without_meshes(plan: BuildingPlan) -> BuildingPlan:
-    """Return a plan without the meshes of its small solids: all solids are in one mesh by now."""
-    return replace(plan, rooftop=[replace(part, mesh=None) for part in plan.rooftop])
-
-
 _DRESS_KEYS = (
     "building:colour",
     "building:color",
@@ -411,13 +414,3 @@ _DRESS_KEYS = (
 def _dressed_apart(part: PartPlan, plan: BuildingPlan) -> bool:
     first = plan.parts[0].tags
     return any(part.tags.get(key) != first.get(key) for key in _DRESS_KEYS)
-
-
-def _with_distinct_styles(drafts: list[Draft]) -> list[Draft]:
-    """No two houses side by side in the same clothes, unless the map says so."""
-    outlines = np.array([draft.plan.outline for draft in drafts], object)
-    left, right = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=1.0)
-    pairs = sorted((i, j) for i, j in zip(left.tolist(), right.tolist(), strict=True) if i < j)
-    free = [not any("colo" in key and key.startswith("building:") for key in draft.plan.tags) for draft in drafts]
-    worn = facade_styles.distinct_styles([draft.look for draft in drafts], pairs, free)
-    return [replace(draft, look=look) for draft, look in zip(drafts, worn, strict=True)]

@@ -26,7 +26,7 @@ _FRONT_REACH = 17.0  # metres from a street's centre line within which a wall fa
 
 
 class WallSide(IntEnum):
-    """What a wall shows, by what it faces."""
+    """Kind of a wall, by what it faces."""
 
     BLANK = 0
     BACK = 1

@@ -1,1 +1,1 @@
-"""What walls look like: facades by use, age and height, doors, windows, signs, and the textures of all grounds."""
+"""Looks of walls: facades by use, age and height, doors, windows, signs, and the textures of all grounds."""

@@ -226,11 +226,14 @@ _ORDINARY_HOUSES = ("house", "residential", "apartments", "office", "yes")  # wh
 _SHEDS = ("shed", "hut", "barn", "cabin", "farm_auxiliary", "stable")
 _TOWN_USES = ("residential", "other", "retail", "commercial", "hotel")
 _TRADE_USES = ("office", "commercial", "retail", "transport", "hotel")
-_OLD, _POST_WAR = 1920, 1975  # years that ages of houses begin and end with
-_TOWN_HOUSE_YEAR = 1880  # of what is old, but nobody says since when
+_OLD = 1920  # year before which houses are old
+_POST_WAR = 1975  # year in which the age after it ends
+_TOWN_HOUSE_YEAR = 1880  # of what is old, but has no year
 _OLD_TOWN_SHARE = 0.6  # of houses on small plots that are old
-_OLD_SHARE, _MIDDLE_SHARE = 0.62, 0.86  # of houses that nothing is known of: old ones, and old and middle ones
-_MODERN_OFFICES, _MODERN_SHOPS = 0.7, 0.4  # shares that do not look like the old houses beside them
+_OLD_SHARE = 0.62  # share of old ones in houses that nothing is known of
+_MIDDLE_SHARE = 0.86  # share of old and middle ones
+_MODERN_OFFICES = 0.7  # share that does not look like the old houses beside it
+_MODERN_SHOPS = 0.4  # the same of shops
 
 #: Families with their shares; one may come twice.
 Table = Sequence[tuple[str, float]]
@@ -238,7 +241,7 @@ Table = Sequence[tuple[str, float]]
 
 @dataclass(frozen=True)
 class House:
-    """What is known of a building whose facade is looked for.
+    """Facts about a building that decide its facade.
 
     Attributes
     ----------
@@ -348,7 +351,7 @@ def tower(house: House) -> Table | None:
 
 
 def by_age(house: House) -> Table | None:
-    """Decide by the year it was built in, told or supposed, and the customs of that time."""
+    """Decide by the year it was built in, mapped or supposed, and the customs of that time."""
     year = house.year
     if year is None and _of_an_old_town(house):
         year = _TOWN_HOUSE_YEAR
@@ -528,7 +531,7 @@ def _tint(family: Family, tags: Mapping[str, str], draws: _Draws) -> Rgb:
     if given is None or not family.painted:
         return _colour_by_draw(_palette(family), draws.tint)
     # The pictures are paler than white plaster; brick is red of its own, so only a brick's shade is taken over.
-    return _mix_colours(_WHITE, _compensate_grey(given), 0.5 if family.own_colour else 1.0)
+    return mix_colours(_WHITE, _compensate_grey(given), 0.5 if family.own_colour else 1.0)
 
 
 def _ground_floor(family: Family, use: str, levels: int, draws: _Draws) -> str:
@@ -546,7 +549,7 @@ def _ground_tint(family: Family, ground: GroundFloor, tint: Rgb, draws: _Draws) 
         return _WHITE
     if family.own_colour and not ground.as_wall:
         return _colour_by_draw(styles().stone, draws.bay)
-    return _mix_colours(_PALE_STONE, tint, 0.3) if ground.stone and draws.variant < 0.5 else tint
+    return mix_colours(_PALE_STONE, tint, 0.3) if ground.stone and draws.variant < 0.5 else tint
 
 
 def _roof(family: Family, tags: Mapping[str, str], region: RegionalStyle, draws: _Draws) -> tuple[str, Rgb]:
@@ -573,7 +576,7 @@ def _back(family: Family, tint: Rgb, area: float, region: RegionalStyle, draws: 
         return family.name, tint
     if family.back == "wall_back_brick" or draws.variant < region.brick_backs:
         return "wall_back_brick", _BACK_BRICK
-    return "wall_back", _mix_colours(_BACK_PLASTER, tint, 0.5)
+    return "wall_back", mix_colours(_BACK_PLASTER, tint, 0.5)
 
 
 def _reach(family: Family, levels: int, region: RegionalStyle, draws: _Draws) -> float:
@@ -612,7 +615,8 @@ def distinct_styles(
     return made
 
 
-def _mix_colours(a: Rgb, b: Rgb, share: float) -> Rgb:
+def mix_colours(a: Rgb, b: Rgb, share: float) -> Rgb:
+    """Return a colour between two: `share` of the second."""
     r, g, b_ = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
     return r, g, b_
 

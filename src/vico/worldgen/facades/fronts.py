@@ -1,4 +1,4 @@
-"""What stands at the entrances: doors by use, shop fronts with the shop's name, canopies, awnings, projecting signs."""
+"""Fronts at the entrances: doors by use, shop fronts with the shop's name, canopies, awnings, projecting signs."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from vico.seeds import rng
 from vico.world.check.buildings import overlapping_faces
 from vico.world.mesh import Surface
 from vico.world.model import FAILED, Building, Category, Entrance, Place
+from vico.worldgen.facades.facade_styles import mix_colours
 from vico.worldgen.facades.signs import Board, Boards, Lettering, colours_of, drawable_text, paint_boards
 from vico.worldgen.facades.street_names import Streets, name_plates
 from vico.worldgen.facades.walls import (
@@ -240,9 +241,10 @@ def _ground_area(building: Building) -> float:
     return abs(float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())) / 2
 
 
-# Doors that have the house's number beside them; how tall it is, how high, and how far beside the door, metres.
-_NUMBERED = ("house", "stairs", "office", "hotel")
-_NUMBER, _NUMBER_AT, _BESIDE_DOOR = 0.2, 2.0, 0.34
+_NUMBERED = ("house", "stairs", "office", "hotel")  # doors that have the house's number beside them
+_NUMBER = 0.2  # metres, height of the number's plate
+_NUMBER_AT = 2.0  # metres above the ground
+_BESIDE_DOOR = 0.34  # metres beside the door
 _ASIDE = 0.13  # metres beside a shop front at which its projecting sign hangs
 _HEADROOM = 2.2  # metres below it
 _WIDTH = {
@@ -366,7 +368,7 @@ class _Front:
         kind = self.spot.kind
         height = min(2.5 if kind != "house" else 2.25, max(self.top - self.z - 0.35, 1.95))
         colour = _DOOR_COLOURS[int(self.random.integers(len(_DOOR_COLOURS)))]
-        stone = _mix_colours(_STONE, self._tint(), 0.6)
+        stone = mix_colours(_STONE, self._tint(), 0.6)
         if kind == "office" or (kind == "shop"):
             self._door("glass" if kind == "shop" else "office", height, 0.05)
             self._surround(height, (96, 98, 100), wide=0.12, deep=0.12)
@@ -558,11 +560,6 @@ class _Front:
             top, wide = low - 0.04, tall * short[0].aspect
             self.face.plate(side, top - tall, top, 0.16, 0.16 + wide, uv=short[0].uv, stuff=self._page(short[0]))
         self.counts["projecting_signs"] += 1
-
-
-def _mix_colours(a: Rgb, b: Rgb, share: float) -> Rgb:
-    r, g, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
-    return r, g, blue
 
 
 def _dim(colour: Rgb, factor: float) -> Rgb:

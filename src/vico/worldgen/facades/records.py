@@ -148,7 +148,7 @@ class Bounds(DataRecord):
 
 
 class StreetMix(DataRecord):
-    """What streets of a region are lined with, as shares of families.
+    """Facade families along streets of a region, as shares.
 
     Attributes
     ----------
@@ -268,7 +268,7 @@ class TagValues(DataRecord):
 
 
 class RoofCover(DataRecord):
-    """What covers a roof.
+    """Covering of a roof.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 from vico.world.mesh import Material
 from vico.world.model import Place
 from vico.worldgen.facades.facade_styles import styles
-from vico.worldgen.facades.records import BoardColours, Rgb, SignTrade
+from vico.worldgen.facades.records import BoardColours, Rgb
 
 _INSTEAD = {
     "’": "'", "‘": "'", "`": "'", "´": "'", "“": '"', "”": '"', "„": '"', "«": '"', "»": '"', "–": "-", "—": "-",
@@ -212,14 +212,17 @@ def draw_text(text: str, size: int, *, bold: bool = True) -> NDArray[np.uint8]:
     return np.asarray(image.resize((image.width // 2, height), Image.Resampling.BOX))
 
 
-_ROW, _FONT, _PAGE, _MOST_PAGES = 48, 30, 2048, 2
+_ROW = 48  # pixels, height of a board
+_FONT = 30  # pixels, size of its letters
+_PAGE = 2048  # pixels, side of a page of boards
+_MOST_PAGES = 2
 _MOST_BOARDS = 6000
 _RIM = 2  # pixels
 
 
 @dataclass(frozen=True)
 class Lettering:
-    """What is painted on a board.
+    """Text and colours of a board.
 
     Attributes
     ----------
@@ -239,7 +242,7 @@ class Lettering:
 
     @property
     def order(self) -> tuple[str, Rgb, Rgb, tuple[int, ...], bool]:
-        """What boards are sorted by."""
+        """Key that boards are sorted by."""
         return self.text, self.ground, self.letters, self.rim or (), self.shines
 
 
@@ -279,17 +282,13 @@ class Boards:
     by_lettering: dict[Lettering, Board] = field(default_factory=dict)
 
 
-def trade_of(place: Place) -> SignTrade:
-    """Return what kind of sign suits a place: by its kind, else by its category, else the last."""
+def colours_of(place: Place) -> BoardColours:
+    """Return the colours of a place's board: of a chain the same everywhere, since they hang on the name alone."""
+    # The sign that suits a place goes by its kind, else by its category, else it is the last.
     trades = list(styles().trades.values())
     of_kind = [trade for trade in trades if place.kind in trade.kinds]
     of_category = [trade for trade in trades if trade.category == place.category]
-    return (of_kind or of_category or trades)[-1]
-
-
-def colours_of(place: Place) -> BoardColours:
-    """Return the colours of a place's board: of a chain the same everywhere, since they hang on the name alone."""
-    boards = trade_of(place).boards
+    boards = (of_kind or of_category or trades)[-1].boards
     return boards[zlib.crc32(place.name.encode()) % len(boards)]
 
 
@@ -305,16 +304,12 @@ def board_text(place: Place) -> str | None:
         if len(text) > 22 and cut in text[3:]:
             text = text[: text.index(cut, 3)]
     if len(text) > _LONGEST_TEXT:
-        text = _cut_at_a_word(text)
+        # Keep as many first words as a board has room for; none ends in "of", "und" or "&".
+        words = text.split()
+        while len(words) > 1 and (len(" ".join(words)) > _LONGEST_TEXT or len(words[-1]) <= 3):
+            words.pop()
+        text = " ".join(words)
     return text.upper() if zlib.crc32(b"case" + place.name.encode()) % 3 == 0 else text
-
-
-def _cut_at_a_word(text: str) -> str:
-    """Return a name's first words, as many as a board has room for: it doesn't end in "of", "und" or "&"."""
-    words = text.split()
-    while len(words) > 1 and (len(" ".join(words)) > _LONGEST_TEXT or len(words[-1]) <= 3):
-        words.pop()
-    return " ".join(words)
 
 
 def paint_boards(places: Sequence[Place], plates: Iterable[Lettering] = ()) -> Boards:

@@ -17,19 +17,25 @@ from vico.worldgen.facades.signs import Boards, Lettering, drawable_text
 from vico.worldgen.facades.walls import Face, GroundFloors, Pieces, Wall
 from vico.worldgen.facts.street_habits import Plates
 
-_TALL, _LONGEST = 0.22, 2.2  # metres; longer names have lower plates
+_TALL = 0.22  # metres, height of a plate
+_LONGEST = 2.2  # metres, length of a plate; longer names have lower plates
 _OFF = 0.09  # metres before the wall: before its mouldings
 _END = 0.35  # metres between a plate and the end of its wall
 _ABOVE = 0.02  # metres above the ground floor: over its band, below windows
-# From a corner, metres: how far along the street its wall begins, and how far beside the street it stands, at most.
-_ALONG, _ASIDE = 26.0, 10.0
+_ALONG = 26.0  # metres along the street from a corner within which a wall begins
+_ASIDE = 10.0  # metres beside the street that the wall stands at most
 _PARALLEL = math.cos(math.radians(25.0))
 _LEAST_WALL = 3.0  # metres
-# Of the ground before a wall, metres below a plate: where houses stand on slopes, a storey may be below the street.
-_BEFORE, _LEAST_UP, _MOST_UP = 1.0, 2.0, 7.0
-# Of posts: metres from the corner at most, and heights that carry a name.
-_NEAR, _LOW, _HIGH = 16.0, 3.2, 14.0
-_ON_LAMP, _GAP, _THICK = 3.1, 0.05, 0.02  # metres
+_BEFORE = 1.0  # metres before a wall at which the ground below a plate is looked up
+# Metres of a plate above that ground: where houses stand on slopes, a storey may be below the street.
+_LEAST_UP = 2.0
+_MOST_UP = 7.0
+_NEAR = 16.0  # metres from the corner to a post at most
+_LOW = 3.2  # metres, the least height of a post that carries a name
+_HIGH = 14.0  # and the greatest
+_ON_LAMP = 3.1  # metres above the ground on a post
+_GAP = 0.05  # metres
+_THICK = 0.02  # metres
 _POSTS = ("street_lamp", "traffic_signals")  # those that are taken first come first
 _MOST_CHARACTERS = 36
 _NO_STREETS = ("service", "_link")  # kinds of roads whose names are those of ramps and ways out
@@ -87,7 +93,7 @@ class NamePlate:
 
 @dataclass(frozen=True)
 class Streets:
-    """What plates are hung by.
+    """Facts that decide where plates hang.
 
     Attributes
     ----------
@@ -132,13 +138,6 @@ def name_plates(streets: Streets, buildings: Sequence[Building], ground: GroundF
     return []
 
 
-def _lettering(name: str, plates: Plates) -> Lettering | None:
-    text = drawable_text(name.split(";")[0])
-    if text is None or len(text) > _MOST_CHARACTERS:
-        return None
-    return Lettering(text, plates.ground, plates.letters, plates.rim, shines=False)
-
-
 def _corners(roads: Roads) -> dict[tuple[float, float], list[tuple[Road, tuple[float, float]]]]:
     """Return where streets of different names meet: the roads there, and the way each leads from it."""
     ends: dict[tuple[float, float], list[tuple[Road, tuple[float, float]]]] = {}
@@ -165,11 +164,12 @@ def _way(line: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
 
 def _arms(streets: Streets) -> Iterator[tuple[tuple[float, float], Road, tuple[float, float], Lettering]]:
     """Yield the arms of all corners, of each name once a direction, in a fixed order."""
+    plates = streets.plates
     for point, here in sorted(_corners(streets.roads).items(), key=lambda one: one[0]):
         for road, way in sorted(here, key=lambda one: (one[0].name or "", one[1])):
-            lettering = _lettering(road.name or "", streets.plates)
-            if lettering is not None:
-                yield point, road, way, lettering
+            text = drawable_text((road.name or "").split(";")[0])
+            if text is not None and len(text) <= _MOST_CHARACTERS:
+                yield point, road, way, Lettering(text, plates.ground, plates.letters, plates.rim, shines=False)
 
 
 def _on_walls(streets: Streets, buildings: Sequence[Building], ground: GroundFloors) -> list[NamePlate]:

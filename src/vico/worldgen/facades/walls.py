@@ -163,9 +163,9 @@ class GroundFloors:
         mine = mine[same]
         corner = self._corner[mine]
         along = dot(corner[:, :, :2] - np.array([x, y]), r)
-        return self._joined(mine, corner, along, self._name[mine[0]], n, r, np.array([x, y]))
+        return self._join(mine, corner, along, self._name[mine[0]], n, r, np.array([x, y]))
 
-    def _joined(
+    def _join(
         self,
         mine: NDArray[np.int64],
         corner: NDArray[np.float64],

@@ -1,1 +1,1 @@
-"""What several stages need to know of a place, decided once: tags, outlines, levels, kinds of ground, sight."""
+"""Facts of a place that several stages need, decided once: tags, outlines, levels, kinds of ground, sight."""

@@ -18,7 +18,8 @@ STOREY = 3.2
 
 _NEAR = 100.0  # metres within which neighbours of the same use decide
 _REACH = 220.0  # metres within which the nearest of any use do
-_HOUSE, _TOWN_HOUSE = 60.0, 300.0  # square metres: less is a shed; median of houses up to which a dense place is a town
+_HOUSE = 60.0  # square metres: less is a shed
+_TOWN_HOUSE = 300.0  # square metres: median of houses up to which a dense place is a town
 # Slabs of flats: storeys, metres from front to back, and the least length.
 _SLAB_LEVELS, _SLAB_DEEP, _SLAB_LONG = 5, (9.0, 19.0), 40.0
 
@@ -151,7 +152,7 @@ def level_estimates(
 
 
 class _Town:
-    """What is known of all outlines, for those that don't say their storeys.
+    """Facts about all outlines, for those without mapped storeys.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What buildings there are: outlines and parts from OpenStreetMap, with heights, uses and roofs decided.
+"""Buildings of a place: outlines and parts from OpenStreetMap, with heights, uses and roofs decided.
 
 Facts win; where OpenStreetMap says nothing, type, area and the neighbours decide, then a seeded draw of each
 building's own. Spec section 1, buildings; OSM wiki, Simple 3D Buildings.
@@ -28,6 +28,7 @@ from vico.seeds import rng
 from vico.world.model import OPEN_KINDS, Dropped
 from vico.worldgen.facts.building_heights import STOREY, level_estimates, tagged_height, tagged_levels, weighted_median
 from vico.worldgen.facts.building_plans import (
+    OUTLINE_TOLERANCE,
     SMALL_KINDS,
     BuildingOrigin,
     BuildingPlan,
@@ -50,7 +51,7 @@ _SPANNED = 5.0  # metres of street beneath that make it a passage
 _BARE = Roof("flat", 0.0)
 
 
-def support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: list[Dropped]) -> list[BuildingPlan]:
+def _support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: list[Dropped]) -> list[BuildingPlan]:
     """Bring down what would hover: mappers give an upper part its first level and forget what is below.
 
     A part that begins above the ground stays where it is if enough of its area rests on other solids, enough of its
@@ -73,7 +74,7 @@ def support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: lis
         near = [j for j in sorted(tree.query(parts[k].polygon, predicate="intersects").tolist()) if j != k]
         crossed = [ways[j] for j in passages.query(parts[k].polygon, predicate="intersects").tolist()]
         with drop_on_failure(name[k], dropped):
-            settled[k], below = _settled(parts[k], [settled[j] for j in near], crossed)
+            settled[k], below = _settle_part(parts[k], [settled[j] for j in near], crossed)
             carrying.update(near[j] for j in below)
             continue
         failed.add(name[k])
@@ -86,7 +87,7 @@ def support_floating_parts(plans: list[BuildingPlan], osm: OsmData, dropped: lis
     return [plan for plan in made if plan.id not in failed]
 
 
-def _settled(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineString]) -> tuple[PartPlan, list[int]]:
+def _settle_part(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineString]) -> tuple[PartPlan, list[int]]:
     """Let a part that begins above the ground come to rest, if nothing holds it up there.
 
     Parameters
@@ -104,7 +105,10 @@ def _settled(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineStr
         The part, and the indices in `near` of what carries it.
     """
     under = [j for j, other in enumerate(near) if other.low < part.low - 0.3 and other.top > part.low - _GAP]
-    resting = _common_area(part.polygon, [near[j].polygon for j in under])
+    others = [near[j].polygon for j in under]
+    resting = 0.0
+    if others:
+        resting = float(overlay.common_area(overlay.union_all(others, grid=0.001), part.polygon))
     if resting >= _RESTING * part.polygon.area:
         tops = [
             near[j].eaves
@@ -138,12 +142,6 @@ def _extend_to_ground(parts: list[PartPlan]) -> list[PartPlan]:
     return [replace(part, low=0.0) if part.low == low and part.levels else part for part in parts]
 
 
-def _common_area(polygon: Polygon, others: list[Polygon]) -> float:
-    if not others:
-        return 0.0
-    return float(overlay.common_area(overlay.union_all(others, grid=0.001), polygon))
-
-
 def _carries(lower: PartPlan, upper: PartPlan) -> bool:
     """Whether a solid ends about where another, over a good share of it, begins."""
     return (
@@ -153,7 +151,7 @@ def _carries(lower: PartPlan, upper: PartPlan) -> bool:
     )
 
 
-def without_needless_corners(polygon: Polygon) -> Polygon:
+def _without_needless_corners(polygon: Polygon) -> Polygon:
     """Drop corners of a polygon that are none: a wall is one line from corner to corner, so that its bays are whole."""
     rings = []
     for ring in rings_of(polygon):
@@ -164,7 +162,7 @@ def without_needless_corners(polygon: Polygon) -> Polygon:
     return tidied if isinstance(tidied, Polygon) and tidied.is_valid and tidied.area > 0.0 else polygon
 
 
-def separate_overlapping_solids(plans: list[BuildingPlan], dropped: list[Dropped]) -> list[BuildingPlan]:
+def _separate_overlapping_solids(plans: list[BuildingPlan], dropped: list[Dropped]) -> list[BuildingPlan]:
     """Cut solids that overlap in plan and height.
 
     The taller keeps its ground and the lower gets what is left of it. Under a taller one that begins above the ground
@@ -194,7 +192,7 @@ def separate_overlapping_solids(plans: list[BuildingPlan], dropped: list[Dropped
             for j in sorted(near.get(i, []), key=lambda j: int(rank[j])):
                 for other in placed[j]:
                     pieces = [piece for mine in pieces for piece in _beside(mine, other)]
-            placed[i] = [replace(piece, polygon=without_needless_corners(piece.polygon)) for piece in pieces]
+            placed[i] = [replace(piece, polygon=_without_needless_corners(piece.polygon)) for piece in pieces]
             continue
         failed.add(rows[i][0])
     result: list[BuildingPlan] = []
@@ -262,7 +260,6 @@ def _turns_round(ring: NDArray[np.float64]) -> bool:
     return bool((np.abs(turn) > _TURN).any() or ((np.abs(both) > _TURN) & (length < _THIN)).any())
 
 
-_TOLERANCE = 0.05  # metres of outline detail that is not seen but costs triangles
 _COVERED = 0.85  # share of an outline that parts must cover for the outline to be dropped
 
 _USES = {
@@ -332,7 +329,7 @@ def _pieces(drawn: Polygon | MultiPolygon) -> list[Polygon]:
     return [
         piece
         for shape in polygons_of(whole)
-        for simple in polygons_of(overlay.simplify(shape, _TOLERANCE), _LEAST_AREA)
+        for simple in polygons_of(overlay.simplify(shape, OUTLINE_TOLERANCE), _LEAST_AREA)
         for piece in polygons_of(without_needles(simple), _LEAST_AREA)
     ]
 
@@ -370,13 +367,6 @@ def _reason_to_skip(area: OsmArea) -> str | None:
     return None
 
 
-def _shop_points(osm: OsmData) -> NDArray[np.float64]:
-    """Where shops, restaurants and services are mapped as points."""
-    trade = {"restaurant", "cafe", "bar", "pub", "fast_food", "bank", "pharmacy", "ice_cream", "cinema", "theatre"}
-    points = [n.xy for n in osm.nodes if "shop" in n.tags or n.tags.get("amenity") in trade]
-    return np.array(points).reshape(-1, 2)
-
-
 def building_plans(
     osm: OsmData,
     *,
@@ -412,7 +402,10 @@ def building_plans(
     owned = _owners(outlines, parts, dropped)
     parts, owner = [parts[k] for k in owned], list(owned.values())
     shapes = [row[1] for row in outlines]
-    points = _shop_points(osm)
+    # Shops, restaurants and services are mapped as points, too.
+    trade = {"restaurant", "cafe", "bar", "pub", "fast_food", "bank", "pharmacy", "ice_cream", "cinema", "theatre"}
+    trading = [n.xy for n in osm.nodes if "shop" in n.tags or n.tags.get("amenity") in trade]
+    points = np.array(trading).reshape(-1, 2)
     shops = np.zeros(len(outlines), int)
     if len(points) and shapes:
         hits = shapely.STRtree(shapes).query(shapely.points(points), predicate="dwithin", distance=1.5)
@@ -455,7 +448,7 @@ def building_plans(
             rule = "height tag" if tagged_height(tags) else "levels tag" if tagged_levels(tags) else "town"
             lone = BuildingPlan(name, tags.get("name"), use, tags, outline, part.levels, 0, [part], rule=rule)
             plans.append(_with_sources(lone, {}, origins, dropped))
-    return BuildingPlans(separate_overlapping_solids(support_floating_parts(plans, osm, dropped), dropped), dropped)
+    return BuildingPlans(_separate_overlapping_solids(_support_floating_parts(plans, osm, dropped), dropped), dropped)
 
 
 def _with_sources(

@@ -149,7 +149,6 @@ _INHERITED = {
     "roof:material",
     "name",
 }
-_HIPPED = ("hipped", "half-hipped", "side_hipped", "side_half-hipped", "hipped-and-gabled", "gabled", "crosspitched")
 
 
 def part_of(
@@ -267,7 +266,7 @@ def _roof(
             shape = "flat"
         else:
             # Storeys within the roof are said of pitched roofs; a roof said to have none is flat.
-            shape = "flat" if tiers == 0 else usual_roof(use, storeys, flat and not tiers, area, deep, float(draw[1]))
+            shape = "flat" if tiers == 0 else _usual_roof(use, storeys, flat and not tiers, area, deep, float(draw[1]))
     if shape == "flat":
         return Roof("flat", 0.0 if open_below or area < 60.0 else 0.5 + 0.5 * float(draw[2]))
     if shape in ("gabled", "round", "gambrel", "saltbox") and deep < 0.5:
@@ -296,7 +295,7 @@ def _usual_height(shape: str, tags: Tags, use: str, deep: float, draw: float) ->
     return min(deep * math.tan(math.radians(pitch)), 12.0 if use == "religious" else 5.5)
 
 
-def usual_roof(use: str, storeys: int, flat: bool, area: float, deep: float, draw: float) -> str:
+def _usual_roof(use: str, storeys: int, flat: bool, area: float, deep: float, draw: float) -> str:
     """Return the roof of a building that doesn't say."""
     if use == "religious":
         return "gabled"
@@ -357,7 +356,7 @@ def _direction(polygon: Polygon, tags: Tags, shape: str) -> float | None:
 _STEP = 0.35  # metres between roofs that are two
 _OWN_PART = 12.0  # square metres from which on a stretch of roof is a part of its own
 _SHARE = 0.03  # and of the building
-_TOLERANCE = 0.05
+OUTLINE_TOLERANCE = 0.05  # metres of outline detail that is not seen but costs triangles
 _LEAST_EAVES = 2.2
 _PARAPET = 0.6  # metres, of level roofs as large as those that get one without a model
 _WITH_PARAPET = 60.0  # square metres
@@ -383,7 +382,7 @@ def parts_of_roof(
         If they can't be made; the building then needs a roof that is fitted.
     """
     parts: list[PartPlan] = []
-    for piece in overlay.polygons_of(overlay.simplify(outline, _TOLERANCE), 2.0):
+    for piece in overlay.polygons_of(overlay.simplify(outline, OUTLINE_TOLERANCE), 2.0):
         cells = roof_cells(piece, facets)
         for members in _stretches(cells, piece.area):
             parts += _parts([cells[k] for k in members], facets, tags)
@@ -472,7 +471,9 @@ def _parts(cells: Sequence[RoofCell], facets: Sequence[RoofFacet], tags: Mapping
             made.append(plain)
             continue
         over = tuple(facets[k].moved(up=-eaves) for k in sorted(under))
-        solid = measured_solid(_near_origin(piece), -eaves, [_near(facet, piece) for facet in over])
+        x, y = _middle(piece)
+        near_origin = shapely.transform(piece, lambda xy, middle=(x, y): xy - middle)
+        solid = measured_solid(near_origin, -eaves, [facet.moved(east=-x, north=-y) for facet in over])
         *_, top = solid.bounding_box()
         roof = Roof(form.shape, round(max(top, 0.0), 3), None, over)
         made.append(replace(plain, eaves=eaves, roof=roof))
@@ -488,16 +489,6 @@ def _spread(facets: Sequence[RoofFacet]) -> float:
 def _middle(polygon: Polygon) -> tuple[float, float]:
     x, y = (round(v) for v in polygon.centroid.coords[0])
     return float(x), float(y)
-
-
-def _near_origin(polygon: Polygon) -> Polygon:
-    x, y = _middle(polygon)
-    return shapely.transform(polygon, lambda xy: xy - (x, y))
-
-
-def _near(facet: RoofFacet, polygon: Polygon) -> RoofFacet:
-    x, y = _middle(polygon)
-    return facet.moved(east=-x, north=-y)
 
 
 def _levels(tags: Mapping[str, str], eaves: float) -> int:

@@ -40,7 +40,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Precedence(DataRecord):
-    """Order of sources by what they tell; see data/worldgen/sources/precedence.toml.
+    """Order of sources by kind of fact; see data/worldgen/sources/precedence.toml.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ _LEAST_AREA = 2.0  # square metres
 
 @dataclass(frozen=True)
 class Claim:
-    """What a file says of a building of the map.
+    """Facts in a file about a building of the map.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class ResolvedBuilding:
     facets: tuple[RoofFacet, ...]
 
 
-def resolve_building(area: OsmArea, claims: Sequence[Claim], precedence: Precedence) -> ResolvedBuilding:
+def _resolve_building(area: OsmArea, claims: Sequence[Claim], precedence: Precedence) -> ResolvedBuilding:
     """Decide outline, height, roof and name of a building of the map.
 
     Parameters
@@ -170,7 +170,7 @@ def resolve_building(area: OsmArea, claims: Sequence[Claim], precedence: Precede
     """
 
     def first(order: Sequence[str], of_map: bool, tells: Callable[[Claim], bool]) -> Claim | None:
-        """Return the claim that goes first; None if the map does, or nobody tells."""
+        """Return the claim that goes first; None if the map does, or there is none."""
         ranked = [
             (rank, k) for k, claim in enumerate(claims)
             if tells(claim) and (rank := rank_of(claim.main.kind, claim.main.file, order)) is not None
@@ -291,7 +291,7 @@ def conflate_buildings(osm: OsmData, sources: Sequence[FoundBuildings], preceden
         made = area
         if mine is not None:
             with drop_on_failure(area.id, dropped):
-                result = resolve_building(area, mine, precedence)
+                result = _resolve_building(area, mine, precedence)
                 results[area.id], made = result, result.area
         areas.append(made)
     origins |= {name: result.origin for name, result in results.items()}

@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 @dataclass
 class Losses:
-    """What was left out while somebody listened.
+    """Objects that were left out within a `with` block.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ def collect_losses() -> Iterator[Losses]:
 
 
 def leave_out(name: str, reason: str, dropped: list[Dropped] | None = None) -> None:
-    """Tell whoever listens that an object is left out, and why; or list it in `dropped`."""
+    """Report an object that is left out, and why, to the enclosing stage; or list it in `dropped`."""
     losses, lost = _LISTENER.get(), Dropped(id=name, reason=reason)
     _log.info("%s is left out: %s", name, reason)
     listed = dropped if dropped is not None else losses.dropped if losses is not None else []

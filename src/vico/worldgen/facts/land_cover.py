@@ -54,7 +54,8 @@ _RAILS = ("rail", "light_rail", "narrow_gauge")
 _BESIDE = 8.0  # metres from a mapped water within which the line of a stream is that water's
 _BED = 2.6  # metres of ballast on each side of a track: tracks side by side share it
 # Square metres: smaller pieces of ground are left out; smaller ones still at the window's edge.
-_LEAST_PIECE, _SPECK = 0.02, 1e-4
+_LEAST_PIECE = 0.02  # square metres of a piece within the window
+_SPECK = 1e-4  # square metres of a piece at its edge
 
 
 def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> dict[str, list[Polygon]]:
@@ -176,7 +177,7 @@ def _by_paving(
     return {**({kind: rest} if rest else {}), **parted}
 
 
-def pitch_surface(tags: dict[str, str]) -> str:
+def _pitch_surface(tags: dict[str, str]) -> str:
     """Say what a sports pitch is covered with: turf, court, clay, sand, gravel or concrete."""
     said = tags.get("surface", "")
     known = {
@@ -212,7 +213,7 @@ def _kind_of(tags: dict[str, str]) -> str | None:
     if natural in ("sand", "beach", "dune") or tags.get("golf") == "bunker":
         return "sand"
     if leisure in ("pitch", "track"):
-        return pitch_surface(tags)
+        return _pitch_surface(tags)
     if natural in _BARE or landuse == "railway":
         return "ballast"
     if natural in _WOODS or landuse == "forest":

@@ -34,7 +34,7 @@ class _CategoriesFile(DataRecord):
 
 
 class Ending(DataRecord):
-    """What a word means that ends so."""
+    """Meaning of words with an ending."""
 
     endings: Words
     category: Category
@@ -95,7 +95,7 @@ class PlaceNames:
         """Return a kind in words."""
         return self.what.get(kind) or kind.replace("_", " ").capitalize()
 
-    def called(self, what: str, *, where: str | None = None, street: str | None = None) -> str:
+    def describe(self, what: str, *, where: str | None = None, street: str | None = None) -> str:
         """Return what something is, with its address or its street if it has any."""
         if where:
             return self.at_address.format(what=what, where=where)

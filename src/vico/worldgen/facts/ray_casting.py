@@ -1,4 +1,4 @@
-"""What can be seen from where: rays cast at a triangle mesh."""
+"""Lines of sight: rays cast at a triangle mesh."""
 
 from __future__ import annotations
 

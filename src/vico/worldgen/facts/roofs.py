@@ -124,13 +124,13 @@ class Roof:
     direction: float | None = None
     facets: tuple[RoofFacet, ...] = ()
 
-    def moved(self, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Roof:
+    def transform(self, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Roof:
         """Return the roof over an outline that was moved, and perhaps scaled, by `move` (points, shape ``(n, 2)``)."""
         if not self.facets:
             return self
         return replace(self, facets=tuple(_transform_facet(facet, move) for facet in self.facets))
 
-    def risen(self, height: float) -> Roof:
+    def with_height(self, height: float) -> Roof:
         """Return the roof with another height, metres; a measured one is stretched."""
         if not self.facets or self.height <= 0.0:
             return replace(self, height=height)

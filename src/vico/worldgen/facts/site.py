@@ -1,4 +1,4 @@
-"""What the map says of a place that several stages need, decided once: levels, bridges over streets, bodies of water.
+"""Facts of a map that several stages need, decided once: levels, bridges over streets, bodies of water.
 
 A bridge over water, a railway or nothing mapped is the ground there. A bridge over a street is not: the street keeps
 the ground, and the deck above it is a surface of its own, which is used where it comes down to the ground. A river, a
@@ -75,7 +75,7 @@ _THROUGH = {
     for link in ("", "_link")
 } | {"living_street", "busway"}
 _FLIGHTS = 4  # of stairs one after the other that lead to a deck
-_RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
+RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
 
 
 CLEARANCE = 4.7
@@ -114,12 +114,6 @@ class StreetLevels:
     passages: list[Passage]
 
 
-def street_levels(osm: OsmData) -> StreetLevels:
-    """Decide which ways of a map pass above a street."""
-    above = overpasses(osm)
-    return StreetLevels(above, passages(osm, above))
-
-
 def ways_over_or_under(way: OsmWay, others: list[OsmWay], tree: shapely.STRtree) -> list[tuple[OsmWay, shapely.Point]]:
     """Ways among `others` (the tree's lines, in order) that a way passes over or under, each with the place."""
     line = shapely.LineString(way.line)
@@ -150,7 +144,7 @@ def overpasses(osm: OsmData) -> frozenset[int]:
         way
         for way in osm.ways
         if is_bridge(way.tags)
-        and ("highway" in way.tags or way.tags.get("railway") in _RAILS)
+        and ("highway" in way.tags or way.tags.get("railway") in RAILS)
         and level_of(way.tags) > 0
         and not (way.closed and way.tags.get("area") == "yes")
     ]
@@ -311,4 +305,5 @@ class SiteFacts:
 
 def site_facts(osm: OsmData, waters: list[WaterBody] | None = None) -> SiteFacts:
     """Read the facts of a site off its map; see `SiteFacts` for its waters."""
-    return SiteFacts(osm, street_levels(osm), keeps_left(osm), named_places(osm), waters)
+    above = overpasses(osm)
+    return SiteFacts(osm, StreetLevels(above, passages(osm, above)), keeps_left(osm), named_places(osm), waters)

@@ -105,7 +105,7 @@ Ring = tuple[tuple[float, float], ...]
 
 
 class Paving(DataRecord):
-    """What a kind of ground is covered with: a material of ours, metres that its texture covers, and a tint."""
+    """Covering of a kind of ground: a material of ours, metres that its texture covers, and a tint."""
 
     material: str
     tile: float
@@ -181,7 +181,7 @@ class Markings:
 
 @dataclass(frozen=True)
 class Plates:
-    """What plates with the names of streets and the numbers of houses look like.
+    """Colours of plates with the names of streets and the numbers of houses.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ class Plates:
 
 @dataclass(frozen=True)
 class StreetHabits:
-    """What is usual in the streets of a place.
+    """Customs in the streets of a place.
 
     Attributes
     ----------
@@ -259,24 +259,8 @@ def habits_at(lat: float, lon: float, country: str | None = None) -> StreetHabit
     """Return what is usual at a place, degrees, in a country (ISO 3166-1; None: unknown)."""
     entries = _entries()
     holding = [entry for entry in entries.values() if _is_valid_at(entry, lat, lon, country)]
-    return _complete_habits((holding or list(entries.values()))[-1 if holding else 0], entries)
-
-
-def _is_valid_at(entry: _Entry, lat: float, lon: float, country: str | None) -> bool:
-    if entry.only and not _within(entry.only, lat, lon):
-        return False
-    if country is not None:
-        return country in entry.countries
-    return _within(entry.outlines, lat, lon)
-
-
-def _within(rings: Iterable[Ring], lat: float, lon: float) -> bool:
-    point = shapely.Point(lon, lat)
-    return any(shapely.Polygon(ring).contains(point) for ring in rings)
-
-
-def _complete_habits(entry: _Entry, entries: dict[str, _Entry]) -> StreetHabits:
-    """Fill in what an entry leaves open."""
+    # What the entry leaves open comes from those it is like.
+    entry = (holding or list(entries.values()))[-1 if holding else 0]
     line = [entry]
     while line[-1].like is not None:
         line.append(entries[line[-1].like])
@@ -294,3 +278,16 @@ def _complete_habits(entry: _Entry, entries: dict[str, _Entry]) -> StreetHabits:
     if plates.get("rim") == "none":
         plates["rim"] = None
     return StreetHabits(entry.name, family, Markings(**said), Plates(**plates), pavings)  # type: ignore[arg-type]
+
+
+def _is_valid_at(entry: _Entry, lat: float, lon: float, country: str | None) -> bool:
+    if entry.only and not _within(entry.only, lat, lon):
+        return False
+    if country is not None:
+        return country in entry.countries
+    return _within(entry.outlines, lat, lon)
+
+
+def _within(rings: Iterable[Ring], lat: float, lon: float) -> bool:
+    point = shapely.Point(lon, lat)
+    return any(shapely.Polygon(ring).contains(point) for ring in rings)

@@ -31,7 +31,7 @@ _SERVICE_WIDTH = {"driveway": 3.0, "parking_aisle": 5.5, "alley": 3.2, "drive-th
 
 
 class StreetClass(NamedTuple):
-    """What is usual for a class of streets where OpenStreetMap says nothing.
+    """Defaults of a class of streets, for ways without tags.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is seen beyond the edge of a world: plain houses where its edge is built up, trees where it is not.
+"""Backdrop beyond the edge of a world: plain houses where its edge is built up, trees where it is not.
 
 Nobody knows what stands there, and nothing of it is a record of the world: it is like the painted cloth behind a stage,
 so that streets do not end in a bare plain. Heights and colours are those of the buildings near by, water stays open.
@@ -28,7 +28,8 @@ from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.texture_canvas import Canvas
 
 _APRON = 40.0  # metres of ground beyond the square
-_FRONT, _BEHIND = 16.0, 2.0  # metres before the end of the ground, and where a street runs out of it
+_FRONT = 16.0  # metres from houses to the end of the ground
+_BEHIND = 2.0  # and where a street runs out of it
 _DEPTH = 13.0  # of a house, metres
 _WIDTHS = (11.0, 24.0)
 _TOWN = 60.0  # metres from the edge within which a building makes it built up

@@ -25,7 +25,7 @@ from vico.geometry import arc_lengths
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, merge_surfaces, surface_of_quads
 from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, union_named
-from vico.worldgen.facts.site import ON_FOOT, SLAB, SLAB_ON_FOOT, SiteFacts, is_bridge, on_the_ground
+from vico.worldgen.facts.site import ON_FOOT, RAILS, SLAB, SLAB_ON_FOOT, SiteFacts, is_bridge, on_the_ground
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
 from vico.worldgen.ground.grading import Network, deck_clearance_constraints, ramp_slope
 from vico.worldgen.ground.kerbs_and_banks import KERB
@@ -99,12 +99,12 @@ class QuadMeshBuilder:
 _SPACING = 3.0
 _ABREAST = 2.5  # metres between decks that lie as high as each other
 _PIER_EVERY = 22.0
-_KERBED_END, _TAPER = 3.5, 8.0  # metres: a street's kerbs go on under a deck, and run out where it has none
+_KERBED_END = 3.5  # metres that a street's kerbs go on under a deck
+_TAPER = 8.0  # metres over which kerbs run out where a street has none
 FILLED = 2.6
 """Metres: a ramp lower than this is an embankment between walls."""
 
-_RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
-_TRACK_WIDTH = 4.6
+TRACK_WIDTH = 4.6  # metres
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def deck_width(way: OsmWay) -> float:
     """Of a deck, its sidewalks included, metres."""
     kind = way.tags.get("highway")
     if kind is None:
-        return _TRACK_WIDTH
+        return TRACK_WIDTH
     if kind in ON_FOOT:
         return min(max(quantity(way.tags, "width") or 2.6, 1.6), 10.0)
     return carriageway_width(way.tags) + 2 * deck_sidewalk_width(way.tags)
@@ -177,7 +177,7 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
         wide[row] = np.maximum(wide[row], deck_width(way) / 2)
     level = [row for way, row in zip(ways, network.rows, strict=True) if way.tags.get("highway") != "steps"]
     beside = network.abreast(wide, level, _ABREAST)
-    found = network.levelled(ground, weight, length=15.0, spacing=_SPACING, abreast=beside)
+    found = network.fit_heights(ground, weight, length=15.0, spacing=_SPACING, abreast=beside)
     high, least = deck_clearance_constraints(
         network.points, np.arange(len(found)), found, site.levels.passages, terrain
     )
@@ -186,7 +186,7 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
         wanted = ground.copy()
         wanted[high], weight[high] = least, 30.0
         for _ in range(2):
-            found = network.levelled(wanted, weight, length=10.0, spacing=_SPACING, abreast=beside)
+            found = network.fit_heights(wanted, weight, length=10.0, spacing=_SPACING, abreast=beside)
             low = (found < bound - 0.02) & (weight < 1.0)
             wanted[low], weight[low] = bound[low], 10.0
         found[high] = np.maximum(found[high], least)
@@ -222,7 +222,7 @@ def pier_free_area(osm: OsmData, streets: StreetPolygons) -> BaseGeometry:
     """Return where no pier may stand: streets and railways at ground level, with a metre beside them."""
     kept = [NamedShape("carriageways", streets.carriageway)]
     for way in osm.ways:
-        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and not is_bridge(way.tags):
+        if way.tags.get("railway") in RAILS and on_the_ground(way.tags) and not is_bridge(way.tags):
             with drop_on_failure(f"w{way.id}"):
                 kept.append(NamedShape(f"w{way.id}", overlay.buffer(shapely.LineString(way.line), 1.8)))
     return overlay.buffer(union_named(kept), 1.0, quad_segs=2)
@@ -239,7 +239,7 @@ def left_normals(line: Floats) -> Floats:
 
 
 def pier_feet(decks: Sequence[Deck], terrain: HeightField, keep_clear: BaseGeometry) -> list[Polygon]:
-    """Return where the piers of decks stand, for those who must not walk through them, metres."""
+    """Return the footprints of the piers of decks, which block walking, metres."""
     feet: list[Polygon] = []
     for deck in decks:
         with drop_on_failure(f"w{deck.way.id}"):
@@ -271,7 +271,8 @@ def pier_boxes(
     return found
 
 
-_SEAM, _STEP_BETWEEN = 1.2, 0.8  # metres beside and above a deck where another counts as the same bridge
+_SEAM = 1.2  # metres beside a deck where another counts as the same bridge
+_STEP_BETWEEN = 0.8  # and metres above or below it
 _WIDEST = 25.0  # metres: no deck is twice as wide
 _RAIL_STEEL: tuple[int, int, int] = (96, 102, 104)
 
@@ -295,7 +296,7 @@ def bridge_surfaces(
 
 @dataclass(frozen=True)
 class _Beside:
-    """All decks, to tell where one borders on another: no parapet stands between two decks of one bridge."""
+    """All decks, to find where one borders on another: no parapet stands between two decks of one bridge."""
 
     decks: list[Deck]
     tree: shapely.STRtree
@@ -334,14 +335,9 @@ class _Beside:
             apart = np.hypot(*(mine.line[:, None] - deck.line[None]).transpose(2, 0, 1))
             i, j = np.unravel_index(int(apart.argmin()), apart.shape)
             if abs(float(mine.z[i] - deck.z[j])) < _STEP_BETWEEN:
-                found.append(overlay.make_valid(_deck_carriageway(deck)))
+                side = left_normals(deck.line) * (deck.width / 2 - deck_sidewalk_width(deck.way.tags))
+                found.append(overlay.make_valid(Polygon(np.concatenate([deck.line + side, (deck.line - side)[::-1]]))))
         return overlay.union_all(found)
-
-
-def _deck_carriageway(deck: Deck) -> Polygon:
-    """Return where a deck's carriageway lies, metres."""
-    side = left_normals(deck.line) * (deck.width / 2 - deck_sidewalk_width(deck.way.tags))
-    return Polygon(np.concatenate([deck.line + side, (deck.line - side)[::-1]]))
 
 
 def _draw_deck(
@@ -394,7 +390,8 @@ def _draw_deck(
     for end, at in ((0, deck.ends[0]), (len(line) - 1, deck.ends[1])):
         if at and z[end] - terrain(line[end]) > 0.3:
             _abutment(stone, a[end], b[end], float(z[end]), float(min(ground_a[end], ground_b[end])), end > 0)
-    _piers(stone, deck, left, terrain, keep_clear, reach)
+    for pier, bottom, head in pier_boxes(deck, left, terrain, keep_clear, reach):
+        stone.box(pier, bottom, head, "kerb", (178, 175, 170))
 
 
 def _road_top(stone: QuadMeshBuilder, deck: Deck, ends: tuple[int, int], left: Floats, driven: BaseGeometry) -> None:
@@ -428,7 +425,7 @@ def _cut_pavement(stone: QuadMeshBuilder, corners: Sequence[Floats], driven: Bas
     start, end = corners[0], corners[1]
     run = end[:2] - start[:2]
 
-    def lifted(xy: Floats, by: float) -> Floats:
+    def lift(xy: Floats, by: float) -> Floats:
         share = np.clip((np.asarray(xy)[:2] - start[:2]) @ run / max(float(run @ run), 1e-9), 0.0, 1.0)
         return np.r_[np.asarray(xy)[:2], start[2] + share * (end[2] - start[2]) + by]
 
@@ -436,10 +433,10 @@ def _cut_pavement(stone: QuadMeshBuilder, corners: Sequence[Floats], driven: Bas
     for shape in polygons_of(left, 0.02):
         flat, faces = triangulate([shape])
         for a, b, c in flat[faces]:
-            stone.add([lifted(a, KERB), lifted(b, KERB), lifted(c, KERB), lifted(c, KERB)], look)
+            stone.add([lift(a, KERB), lift(b, KERB), lift(c, KERB), lift(c, KERB)], look)
         ring = np.asarray(shapely.geometry.polygon.orient(shape).exterior.coords)
         for a, b in pairwise(ring):
-            stone.add([lifted(a, 0.0), lifted(b, 0.0), lifted(b, KERB), lifted(a, KERB)], "kerb")
+            stone.add([lift(a, 0.0), lift(b, 0.0), lift(b, KERB), lift(a, KERB)], "kerb")
 
 
 def _on_foot(tags: dict[str, str]) -> bool:
@@ -505,13 +502,6 @@ def _abutment(stone: QuadMeshBuilder, a: Floats, b: Floats, top: float, ground: 
     stone.add(corner if far else corner[::-1], "quay")
 
 
-def _piers(
-    stone: QuadMeshBuilder, deck: Deck, left: Floats, terrain: HeightField, keep_clear: BaseGeometry, reach: float
-) -> None:
-    for foot, low, high in pier_boxes(deck, left, terrain, keep_clear, reach):
-        stone.box(foot, low, high, "kerb", (178, 175, 170))
-
-
 def _draw_rails(stone: QuadMeshBuilder, site: SiteFacts, terrain: HeightField, window: Polygon) -> None:
     """Railings along bridges that are the ground."""
     osm, above = site.osm, site.levels.above
@@ -529,27 +519,21 @@ def _draw_rails(stone: QuadMeshBuilder, site: SiteFacts, terrain: HeightField, w
             continue
         with drop_on_failure(f"w{way.id}"):
             drawn = QuadMeshBuilder()
-            _draw_rail(drawn, way, terrain, window, tree, ids)
+            # No railing stands where other ways go on beside the bridge.
+            line = np.asarray(shapely.segmentize(shapely.LineString(way.line), 4.0).coords)
+            left = left_normals(line)
+            width = deck_width(way) + (1.2 if way.tags["highway"] not in ON_FOOT else 0.0)
+            for side in (1.0, -1.0):
+                edge = line + side * left * (width / 2 - 0.1)
+                z = terrain.upper(edge)
+                for k in range(len(edge) - 1):
+                    middle = shapely.Point((edge[k] + edge[k + 1]) / 2)
+                    crowded = [j for j in tree.query(middle, predicate="intersects") if ids[int(j)] != way.id]
+                    if crowded or not window.contains(middle):
+                        continue
+                    p, q = np.r_[edge[k], z[k]], np.r_[edge[k + 1], z[k + 1]]
+                    out = side * np.r_[left[k], 0.0]
+                    if side > 0:
+                        p, q = q, p
+                    _parapet(drawn, p, q, out, solid=False)
             stone.take(drawn)
-
-
-def _draw_rail(
-    stone: QuadMeshBuilder, way: OsmWay, terrain: HeightField, window: Polygon, others: shapely.STRtree, ids: list[int]
-) -> None:
-    """Railings along one bridge, but not where other ways (`others`, with these ids) go on beside it."""
-    line = np.asarray(shapely.segmentize(shapely.LineString(way.line), 4.0).coords)
-    left = left_normals(line)
-    width = deck_width(way) + (1.2 if way.tags["highway"] not in ON_FOOT else 0.0)
-    for side in (1.0, -1.0):
-        edge = line + side * left * (width / 2 - 0.1)
-        z = terrain.upper(edge)
-        for k in range(len(edge) - 1):
-            middle = shapely.Point((edge[k] + edge[k + 1]) / 2)
-            crowded = [j for j in others.query(middle, predicate="intersects") if ids[int(j)] != way.id]
-            if crowded or not window.contains(middle):
-                continue
-            p, q = np.r_[edge[k], z[k]], np.r_[edge[k + 1], z[k + 1]]
-            out = side * np.r_[left[k], 0.0]
-            if side > 0:
-                p, q = q, p
-            _parapet(stone, p, q, out, solid=False)

@@ -121,7 +121,7 @@ class _Mesh(NamedTuple):
 
 
 class _Ring(NamedTuple):
-    """What lies about one corner; room for the largest.
+    """Surroundings of one corner; room for the largest.
 
     Attributes
     ----------
@@ -196,7 +196,8 @@ def _has_corner(triangles, t, v):  # type: ignore[no-untyped-def]
 def _gather_ring(mesh, ring, v, count):  # type: ignore[no-untyped-def]
     """Gather a corner's neighbours, and the pieces on both sides of the edge to each; -1 if there are too many."""
     triangles, piece = mesh.triangles, mesh.piece
-    star, near, sides, one, two = ring
+    star, near, sides = ring.star, ring.near, ring.sides
+    one, two = ring.one, ring.two
     size = 0
     for k in range(count):
         t = star[k]

@@ -27,6 +27,7 @@ from vico.worldgen.facts.site import ON_FOOT, SiteFacts, on_the_ground
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges import (
     PARAPET,
+    TRACK_WIDTH,
     Deck,
     QuadMeshBuilder,
     bridge_surfaces,
@@ -45,8 +46,8 @@ Floats = NDArray[np.float64]
 _DARK: tuple[int, int, int] = (26, 27, 29)
 _LEAST_TUNNEL = 12.0  # metres: the mouths of a shorter one would stand back to back
 _BEHIND = 7.0  # metres into a tunnel where the ground tells whether there is a hill
-_FOOT_HEADROOM, _HEADROOM = 2.8, 4.8
-_TRACK_WIDTH = 4.6  # metres
+_FOOT_HEADROOM = 2.8  # metres, of the mouths of tunnels for walkers
+_HEADROOM = 4.8  # and for vehicles
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def _mouths(
 ) -> list[Portal]:
     """Return the mouths of a tunnel that lie in the open: streets lead to their nodes (`walked`), nothing is built."""
     foot = way.tags.get("highway") in ON_FOOT
-    width = deck_width(way) - (1.0 if foot else 2.0) if "highway" in way.tags else _TRACK_WIDTH
+    width = deck_width(way) - (1.0 if foot else 2.0) if "highway" in way.tags else TRACK_WIDTH
     width = max(width, 2.2)
     found: list[Portal] = []
     for end, beyond, node in ((0, 1, way.nodes[0]), (-1, -2, way.nodes[-1])):
@@ -134,11 +135,11 @@ def _end_of(way: OsmWay, here: Floats, inward: Floats) -> BaseGeometry:
     out = line[1] - line[0]
     if float(dot(out, inward)) > -0.7 * float(np.hypot(*out)):
         return shapely.Point()
-    return overlay.buffer(shapely.Point(here), (deck_width(way) if "highway" in way.tags else _TRACK_WIDTH) / 2 + 3.0)
+    return overlay.buffer(shapely.Point(here), (deck_width(way) if "highway" in way.tags else TRACK_WIDTH) / 2 + 3.0)
 
 
 def portal_feet(portals: Sequence[Portal]) -> list[Polygon]:
-    """Where the mouths of tunnels stand, for those who must not walk through them, metres."""
+    """Return the footprints of the mouths of tunnels, which block walking, metres."""
     return [Polygon([corner[:2] for corner in _mouth(portal)[0]]) for portal in portals]
 
 
@@ -152,7 +153,7 @@ def _mouth(portal: Portal) -> tuple[list[Floats], Floats, Floats]:
     return [c - side, c + deep - side, c + deep + side, c + side], u, left
 
 
-def portal_surfaces(portals: Sequence[Portal], terrain: HeightField, window: Polygon) -> list[Surface]:
+def _portal_surfaces(portals: Sequence[Portal], terrain: HeightField, window: Polygon) -> list[Surface]:
     """Draw the mouths of tunnels: a body of stone with a dark opening in its face."""
     stone = QuadMeshBuilder()
     for portal in portals:
@@ -174,7 +175,22 @@ def _portal_mesh(portal: Portal, terrain: HeightField, window: Polygon) -> QuadM
         return stone
     top = ground + portal.height + 0.9
     stone.box(foot, low, top, "wall")
-    _opening(stone, portal, ground, u, left)
+    # The dark mouth and the lintel above it lie a hand's breadth before the face.
+    middle = np.array(portal.place) - u * 0.04
+    side = left * portal.width / 2
+    rise = portal.height
+    profile: list[tuple[float, float]] = [(-1.0, rise * 0.72), (-0.8, rise * 0.88), (-0.4, rise), (0.4, rise)]
+    profile += [(0.8, rise * 0.88), (1.0, rise * 0.72)]
+    corner: Callable[[float, float], Floats] = lambda s, z: np.r_[middle + side * s, ground + z]  # noqa: E731
+    for (s0, z0), (s1, z1) in pairwise(profile):
+        # Seen from outside, looking in, left is to the left.
+        stone.add([corner(s1, 0.0), corner(s0, 0.0), corner(s0, z0), corner(s1, z1)], "kerb", _DARK)
+    before = middle - u * 0.12
+    lintel = [
+        np.r_[before + side * s * 1.08, ground + portal.height + z]
+        for s, z in ((1, 0.1), (-1, 0.1), (-1, 0.5), (1, 0.5))
+    ]
+    stone.add(lintel, "kerb")
     return stone
 
 
@@ -192,32 +208,14 @@ def _well(stone: QuadMeshBuilder, foot: Sequence[Floats], u: Floats, left: Float
         stone.box(wall, ground - 0.3, ground + PARAPET + 0.1, "wall")
 
 
-def _opening(stone: QuadMeshBuilder, portal: Portal, ground: float, u: Floats, left: Floats) -> None:
-    """Build the dark mouth and the lintel above it, a hand's breadth before the face."""
-    middle = np.array(portal.place) - u * 0.04
-    side = left * portal.width / 2
-    rise = portal.height
-    profile: list[tuple[float, float]] = [(-1.0, rise * 0.72), (-0.8, rise * 0.88), (-0.4, rise), (0.4, rise)]
-    profile += [(0.8, rise * 0.88), (1.0, rise * 0.72)]
-    corner: Callable[[float, float], Floats] = lambda s, z: np.r_[middle + side * s, ground + z]  # noqa: E731
-    for (s0, z0), (s1, z1) in pairwise(profile):
-        # Seen from outside, looking in, left is to the left.
-        stone.add([corner(s1, 0.0), corner(s0, 0.0), corner(s0, z0), corner(s1, z1)], "kerb", _DARK)
-    before = middle - u * 0.12
-    lintel = [
-        np.r_[before + side * s * 1.08, ground + portal.height + z]
-        for s, z in ((1, 0.1), (-1, 0.1), (-1, 0.5), (1, 0.5))
-    ]
-    stone.add(lintel, "kerb")
-
-
 _LANDED = 0.35  # metres from the ground at which the end of a deck counts as down
-_STEEPEST, _STEEPEST_ON_FOOT = 0.13, 0.25  # slopes of what can be driven and walked up; stairs may be steeper
+_STEEPEST = 0.13  # slope of what can be driven up
+_STEEPEST_ON_FOOT = 0.25  # slope of what can be walked up; stairs may be steeper
 _STEEPEST_STAIRS = 1.1
 _ON_THE_GROUND = 0.3  # metres
 
 
-def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -> frozenset[int]:
+def _usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -> frozenset[int]:
     """Return the ways above streets that lead from the ground to the ground on slopes that can be used.
 
     Decks that meet are one bridge. Of each, streets are usable if those of its ends that streets on the ground go on
@@ -246,22 +244,7 @@ def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -
     return frozenset(found)
 
 
-def deck_surfaces(decks: Sequence[Deck], bores: Sequence[Bore]) -> Decks | None:
-    """Return usable decks and tunnels as surfaces of the world; None if there are none."""
-    strips: list[tuple[NDArray[np.float64], float, float, float]] = []
-    for deck in decks:
-        if "highway" in deck.way.tags:
-            kind, half = deck.way.tags["highway"], deck.width / 2
-            pavement = 0.0 if kind in ON_FOOT else half - deck_sidewalk_width(deck.way.tags)
-            rise = 0.0 if kind == "steps" else KERB
-            strips.append((np.c_[deck.line, deck.z], half, pavement if kind != "steps" else half, rise))
-    for bore in bores:
-        pavement = 0.0 if bore.on_foot else bore.width / 2 - bore.walk
-        strips.append((np.c_[bore.line, bore.z], bore.width / 2, pavement, KERB))
-    return Decks.of(strips) if strips else None
-
-
-def low_parts(decks: Sequence[Deck], terrain: HeightField) -> list[Polygon]:
+def _low_parts(decks: Sequence[Deck], terrain: HeightField) -> list[Polygon]:
     """Return where decks lie too low for people to pass under them, and too high to be the ground, metres."""
     found: list[Polygon] = []
     for deck in decks:
@@ -353,7 +336,18 @@ class Bridges:
 
     def levels(self) -> Decks | None:
         """Return the decks and tunnels that can be used as surfaces of the world; None if there are none."""
-        return deck_surfaces([deck for deck in self.decks if deck.way.id in self.usable], self.bores)
+        decks = [deck for deck in self.decks if deck.way.id in self.usable]
+        strips: list[tuple[NDArray[np.float64], float, float, float]] = []
+        for deck in decks:
+            if "highway" in deck.way.tags:
+                kind, half = deck.way.tags["highway"], deck.width / 2
+                pavement = 0.0 if kind in ON_FOOT else half - deck_sidewalk_width(deck.way.tags)
+                rise = 0.0 if kind == "steps" else KERB
+                strips.append((np.c_[deck.line, deck.z], half, pavement if kind != "steps" else half, rise))
+        for bore in self.bores:
+            pavement = 0.0 if bore.on_foot else bore.width / 2 - bore.walk
+            strips.append((np.c_[bore.line, bore.z], bore.width / 2, pavement, KERB))
+        return Decks.of(strips) if strips else None
 
     def surfaces(
         self, site: SiteFacts, terrain: HeightField, streets: StreetPolygons, window: Polygon
@@ -361,7 +355,7 @@ class Bridges:
         """Draw them, and the railings of bridges that are the ground."""
         return [
             *bridge_surfaces(self.decks, site, terrain, streets, window),
-            *portal_surfaces(self.portals, terrain, window),
+            *_portal_surfaces(self.portals, terrain, window),
             *bore_surfaces(self.bores, terrain, window),
         ]
 
@@ -389,5 +383,5 @@ def bridges_of(
     used = {bore.way.id for bore in bores}
     portals = [portal for portal in portals_of(site.osm, streets) if portal.way not in used]
     feet = [*pier_feet(decks, terrain, pier_free_area(site.osm, streets)), *portal_feet(portals)]
-    usable = usable_decks(site, decks, terrain)
-    return Bridges(decks, portals, feet, usable, low_parts(decks, terrain), bores, cuts_of(bores))
+    usable = _usable_decks(site, decks, terrain)
+    return Bridges(decks, portals, feet, usable, _low_parts(decks, terrain), bores, cuts_of(bores))

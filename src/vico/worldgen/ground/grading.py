@@ -184,7 +184,7 @@ class Network:
                     heapq.heappush(heap, (-lower, other))
         return found
 
-    def levelled(
+    def fit_heights(
         self, wanted: Floats, weight: Floats, *, length: float, spacing: float, abreast: Abreast | None = None
     ) -> Floats:
         """Heights near the wanted ones that change their slope slowly.
@@ -246,11 +246,15 @@ _CELL = 2.0
 _SPACING = 5.0
 _SMOOTH = 40.0  # metres: shorter bumps are not a street's
 _SHOULDER = 3.5  # metres beside a carriageway that lie level with it
-_TERRACE, _STEEPEST = 0.3, 0.15  # metres and slope that heights along one street differ by at most
+_TERRACE = 0.3  # metres that heights along one street differ by at most
+_STEEPEST = 0.15  # slope that heights along one street differ by at most
 _WALL_ROOM = 2.0  # metres between two streets for a wall that holds the upper one
-_HIGH, _RAMP = 12.0, 4.0  # how much a deck's height over a street counts, and its ramps', where the ground counts 1
+_HIGH = 12.0  # weight of a deck's height over a street, where the ground's is 1
+_RAMP = 4.0  # weight of its ramps' heights
 _BANK = 8.0  # metres over which the ground goes back to the elevation model's
-_STEP_CELL, _STEP_CELL_LARGE, _LARGE = 0.5, 1.0, 700.0
+_STEP_CELL = 0.5  # metres, cells of the field of steps
+_STEP_CELL_LARGE = 1.0  # and in large places
+_LARGE = 700.0  # metres, half the side from which a place is large
 
 
 def grade_ground(height: HeightField, site: SiteFacts, streets: StreetPolygons) -> HeightField:
@@ -304,7 +308,7 @@ def _ground_with_streets(height: HeightField, site: SiteFacts) -> HeightField:
             weight[[row[0], row[-1]]] = np.maximum(weight[[row[0], row[-1]]], 1.0)
     streets_alone = [row for row, deck, width in zip(network.rows, decks, widths, strict=True) if not deck and width]
     beside = network.abreast(wide, streets_alone, _WALL_ROOM)
-    found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
+    found = network.fit_heights(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
     needs = site.levels.passages
     if needs:
         rows = [row for row, deck in zip(network.rows, decks, strict=True) if deck]
@@ -312,7 +316,7 @@ def _ground_with_streets(height: HeightField, site: SiteFacts) -> HeightField:
         bound = network.ramps(high, least, slopes, found)
         weight[high], wanted[high] = _HIGH, least
         for _ in range(2):
-            found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
+            found = network.fit_heights(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
             low = found < bound - 0.02
             wanted[low], weight[low] = bound[low], np.maximum(weight[low], _RAMP)
     if is_level(height) and float(np.abs(found - height(network.points))[covers].max(initial=0.0)) < 0.02:

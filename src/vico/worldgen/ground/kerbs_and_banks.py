@@ -28,8 +28,11 @@ from vico.worldgen.facts.streets import Crossing, StreetPolygons
 
 Floats = NDArray[np.float64]
 
-_FREEBOARD, _FREEBOARD_SMALL, _BRIM = 1.3, 0.4, 0.12  # metres from banks down to waters, ponds, basins
-_SMALL, _BASIN = 2500.0, 150.0  # square metres
+_FREEBOARD = 1.3  # metres from banks down to waters
+_FREEBOARD_SMALL = 0.4  # to ponds
+_BRIM = 0.12  # to basins
+_SMALL = 2500.0  # square metres, of ponds at most
+_BASIN = 150.0  # and of basins
 _PARTED = 24.0  # metres between pieces that only a bridge parts
 _CORNER = 1.0  # metres
 _MOST_SAMPLES = 400  # points of a body's banks
@@ -147,12 +150,6 @@ def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:
     return shapely.MultiLineString(lines)
 
 
-def lower_side(streets: StreetPolygons, waters: Sequence[Polygon]) -> BaseGeometry:
-    """Return what lies below its surroundings, carriageways and water: its outline is where kerbs and banks are."""
-    shapes = [streets.carriageway, *overlay.on_grid(np.array(list(waters), object), grid=_GRID)]
-    return overlay.union_all(shapes, grid=_GRID)
-
-
 def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[Water], *, cell: float) -> Steps | None:
     """Lay kerbs and banks on a field.
 
@@ -177,14 +174,16 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     half = smooth.half
     n = round(2 * half / cell) + 1
     cell = 2 * half / (n - 1)
-    region = lower_side(streets, [water.polygon for water in waters])
+    # Carriageways and water lie below their surroundings: their outline is where kerbs and banks are.
+    water = overlay.on_grid(np.array([water.polygon for water in waters], object), grid=_GRID)
+    region = overlay.union_all([streets.carriageway, *water], grid=_GRID)
     inside = nodes_in_polygons(polygons_of(region), n, half, cell)
     near = _near(region, n, half, cell, EDGE_RANGE)
     edge = np.where(inside, -near, near)
     sunk = _near(streets.sunken, n, half, cell, 2 * _FADE)
     sunk[nodes_in_polygons(polygons_of(streets.sunken), n, half, cell)] = 0.0
     low = np.full((n, n), -KERB)
-    # Only on drives the carriageway comes up: beyond the kerbs its height has nobody to mind it, and stays even.
+    # Only on drives the carriageway comes up: beyond the kerbs its height does not matter, and stays even.
     drives = polygons_of(overlay.buffer(overlay.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
     rising = nodes_in_polygons(drives, n, half, cell) & ~nodes_in_polygons(polygons_of(streets.sunken), n, half, cell)
     low[rising] = (-KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0))[rising]

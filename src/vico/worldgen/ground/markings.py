@@ -60,7 +60,7 @@ def subdivide_line(line: NDArray[np.float64], longest: float | None) -> NDArray[
     return np.asarray(shapely.segmentize(LineString(line), longest).coords)
 
 
-def dashed_strokes(line: LineString, dash: float, gap: float, width: float) -> list[NDArray[np.float64]]:
+def _dashed_strokes(line: LineString, dash: float, gap: float, width: float) -> list[NDArray[np.float64]]:
     """Draw dashes along a line, as many as fit, the same rest at both ends; none where not even two fit.
 
     One dash alone on the asphalt says nothing to a driver, and nobody paints it.
@@ -103,7 +103,8 @@ def _quads_of(shape: Polygon) -> list[NDArray[np.float64]]:
     return found
 
 
-_STRIPE, _STRIPE_PERIOD = 0.5, 1.0  # of a zebra, metres along the walk
+_STRIPE = 0.5  # metres, breadth of a stripe of a zebra
+_STRIPE_PERIOD = 1.0  # metres from stripe to stripe
 # Rows of marks at both sides: metres from one to the next, along the walk and across it.
 _ROWS = {
     "dashes": (1.0, 0.5, 0.4),
@@ -214,8 +215,10 @@ _YELLOW = (226, 184, 70)
 _FADED = (206, 205, 200)
 _CYCLE_WIDTH = 1.5
 _STEEL, _GROOVE, _SLEEPERS = (134, 131, 127), (46, 45, 44), (84, 77, 70)
-# Metres: breadth of a rail's head and of the groove beside it; between sleepers; a sleeper along and across the track.
-_HEAD, _GROOVE_WIDTH, _SLEEPER_GAP, _SLEEPER = 0.075, 0.05, 0.65, (0.26, 2.5)
+_HEAD = 0.075  # metres, breadth of a rail's head
+_GROOVE_WIDTH = 0.05  # metres, breadth of the groove beside it
+_SLEEPER_GAP = 0.65  # metres from sleeper to sleeper
+_SLEEPER = (0.26, 2.5)  # metres, a sleeper along and across the track
 _LINED = {"motorway", "trunk", "primary", "secondary", "tertiary"}
 _OVERPAINTED = 0.2  # share of a mark that lies on another crossing, above which it is left out
 _AT_KERB = 0.8  # metres from a kerb within which lines follow it
@@ -293,7 +296,7 @@ def road_markings(
     bays: list[NDArray[np.float64]] = []
     for shape in streets.parking.geoms:
         with drop_on_failure(_name_at("car park", shape)):
-            bays += _car_park(shape)
+            bays += [quad for row in lot_rows(shape) for line in row for quad in ribbon(line, 0.0, 0.1)]
     groups = [
         Quads(clip_quads(lanes if habits.cycle_lane else [], window), habits.cycle_lane or _PAINT, rank=0),
         Quads(clip_quads(zebra + dashes + edges, window), _PAINT),
@@ -405,7 +408,7 @@ def _painted_lines(
             if not isinstance(piece, LineString):
                 continue
             if not (between_directions and habits.solid_centre):
-                found.append((between_directions, dashed_strokes(piece, habits.dash, habits.gap, habits.line)))
+                found.append((between_directions, _dashed_strokes(piece, habits.dash, habits.gap, habits.line)))
             elif piece.length > _LEAST_SOLID:
                 path = subdivide_line(np.asarray(piece.coords), longest)
                 quads = [quad for side in (-1.0, 1.0) for quad in ribbon(path, side * habits.line, habits.line)]
@@ -466,26 +469,20 @@ def _stop_lines(streets: StreetPolygons, left_driving: bool, thick: float) -> li
             street, line = streets.streets[int(k)], lines[int(k)]
             if street.kind != "service" and (crossing.signals or street.kind in _LINED):
                 with drop_on_failure(crossing.id):
-                    found += _stop_lines_of(crossing, street, line, walk, left_driving, thick)
-    return found
-
-
-def _stop_lines_of(
-    crossing: Crossing, street: Street, line: LineString, walk: LineString, left_driving: bool, thick: float
-) -> list[NDArray[np.float64]]:
-    """Lines on both sides of a crossing (`walk`) of one street (`line`), or on the one that its traffic comes from."""
-    found: list[NDArray[np.float64]] = []
-    place = float(line.project(overlay.crossing(walk, line).centroid))
-    for ahead in (1.0,) if street.oneway else (1.0, -1.0):
-        at = place - ahead * (crossing.width / 2 + 1.1)
-        if not 0.5 < at < line.length - 0.5:
-            continue
-        here, there = (np.asarray(line.interpolate(v).coords[0]) for v in (at, at + 0.2))
-        u = (there - here) / max(distance(there, here), 1e-9) * ahead
-        right = np.array([u[1], -u[0]]) * (-1.0 if left_driving else 1.0)
-        inner = -street.width / 2 + 0.3 if street.oneway else 0.1
-        ends = np.array([here + right * inner, here + right * (street.width / 2 - 0.3)])
-        found += ribbon(ends, 0.0, thick)
+                    # On both sides of the crossing, or on the one that the street's traffic comes from
+                    stop_lines: list[NDArray[np.float64]] = []
+                    place = float(line.project(overlay.crossing(walk, line).centroid))
+                    for ahead in (1.0,) if street.oneway else (1.0, -1.0):
+                        at = place - ahead * (crossing.width / 2 + 1.1)
+                        if not 0.5 < at < line.length - 0.5:
+                            continue
+                        here, there = (np.asarray(line.interpolate(v).coords[0]) for v in (at, at + 0.2))
+                        u = (there - here) / max(distance(there, here), 1e-9) * ahead
+                        right = np.array([u[1], -u[0]]) * (-1.0 if left_driving else 1.0)
+                        inner = -street.width / 2 + 0.3 if street.oneway else 0.1
+                        ends = np.array([here + right * inner, here + right * (street.width / 2 - 0.3)])
+                        stop_lines += ribbon(ends, 0.0, thick)
+                    found += stop_lines
     return found
 
 
@@ -497,45 +494,32 @@ def _kerbside(
     edges: list[NDArray[np.float64]] = []
     for street in streets.streets:
         with drop_on_failure(f"w{street.way}"):
-            own_lanes, own_edges = _kerbside_of(street, breaks, longest, thick)
+            own_lanes: list[NDArray[np.float64]] = []
+            own_edges: list[NDArray[np.float64]] = []
+            for side, parking, cycle in (
+                (1.0, street.parking_left, street.cycle_left),
+                (-1.0, street.parking_right, street.cycle_right),
+            ):
+                if not parking and not cycle:
+                    continue
+                outer = street.width / 2 - parking
+                for piece in free_pieces(street, side * outer, breaks):
+                    path = subdivide_line(np.asarray(piece.coords), longest)
+                    if parking:
+                        own_edges += ribbon(path, 0.0, 0.1)
+                        for place in bay_borders(piece, slanted=is_perpendicular_parking(street, parking)):
+                            a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
+                            u = (b - a) / max(distance(b, a), 1e-9)
+                            out = side * np.array([-u[1], u[0]])
+                            own_edges += ribbon(np.array([a, a + out * (parking - 0.2)]), 0.0, 0.1)
+                if cycle:
+                    for piece in free_pieces(street, side * (outer - _CYCLE_WIDTH / 2 - 0.1), breaks):
+                        path = subdivide_line(np.asarray(piece.coords), longest)
+                        own_lanes += ribbon(path, 0.0, _CYCLE_WIDTH)
+                        own_edges += ribbon(path, -side * (_CYCLE_WIDTH / 2), thick)
             lanes += own_lanes
             edges += own_edges
     return lanes, edges
-
-
-def _kerbside_of(
-    street: Street, breaks: BaseGeometry, longest: float | None, thick: float
-) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Lanes and edges along the kerbs of one street."""
-    lanes: list[NDArray[np.float64]] = []
-    edges: list[NDArray[np.float64]] = []
-    for side, parking, cycle in (
-        (1.0, street.parking_left, street.cycle_left),
-        (-1.0, street.parking_right, street.cycle_right),
-    ):
-        if not parking and not cycle:
-            continue
-        outer = street.width / 2 - parking
-        for piece in free_pieces(street, side * outer, breaks):
-            path = subdivide_line(np.asarray(piece.coords), longest)
-            if parking:
-                edges += ribbon(path, 0.0, 0.1)
-                for place in bay_borders(piece, slanted=is_perpendicular_parking(street, parking)):
-                    a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
-                    u = (b - a) / max(distance(b, a), 1e-9)
-                    out = side * np.array([-u[1], u[0]])
-                    edges += ribbon(np.array([a, a + out * (parking - 0.2)]), 0.0, 0.1)
-        if cycle:
-            for piece in free_pieces(street, side * (outer - _CYCLE_WIDTH / 2 - 0.1), breaks):
-                path = subdivide_line(np.asarray(piece.coords), longest)
-                lanes += ribbon(path, 0.0, _CYCLE_WIDTH)
-                edges += ribbon(path, -side * (_CYCLE_WIDTH / 2), thick)
-    return lanes, edges
-
-
-def _car_park(shape: Polygon) -> list[NDArray[np.float64]]:
-    """Lines between the bays of a car park."""
-    return [quad for row in lot_rows(shape) for line in row for quad in ribbon(line, 0.0, 0.1)]
 
 
 def _lane_lines(street: Street) -> list[tuple[float, bool]]:

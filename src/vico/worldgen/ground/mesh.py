@@ -33,8 +33,10 @@ Floats = NDArray[np.float64]
 #: Heights at points, shape ``(n, 2)`` -> ``(n,)``.
 Heights = Callable[[Floats], Floats]
 
-CLOSE, NEAR, ROUGH = 0.03, 0.15, 2.5
-"""Metres by which the middle of an uncut square may lie off its heights: of streets, of other ground, out of sight."""
+# Metres by which the middle of an uncut square may lie off its heights.
+CLOSE = 0.03  # of streets
+NEAR = 0.15  # of other ground
+ROUGH = 2.5  # out of sight
 
 _USUAL = 1.75  # metres: cells where the field has none
 _WIDEST = 14.0  # metres: vertices carry the large patches of colour
@@ -128,11 +130,11 @@ class Grid:
             if level == 0 or not len(polygons):
                 break
             for axis in (0, 1):
-                polygons, place, lot = self._halved(polygons, place, lot, axis, side)
+                polygons, place, lot = self._halve(polygons, place, lot, axis, side)
         every, owner = (np.concatenate(parts) for parts in zip(*done, strict=True))
         return [every[owner == number].tolist() for number in range(len(own))]
 
-    def _halved(
+    def _halve(
         self, polygons: NDArray[np.object_], place: NDArray[np.int64], lot: NDArray[np.int64], axis: int, side: float
     ) -> tuple[NDArray[np.object_], NDArray[np.int64], NDArray[np.int64]]:
         """Part polygons at the middles of their squares; along the second axis the columns are halved already."""

@@ -1,4 +1,4 @@
-"""What the ground is covered with: seeded, tileable textures, and patches of colour too large to tile."""
+"""Coverings of the ground: seeded, tileable textures, and patches of colour too large to tile."""
 
 from __future__ import annotations
 

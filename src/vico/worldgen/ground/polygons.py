@@ -43,8 +43,8 @@ def split_polygons(
     rings = _Rings.of(polygons[easy])
     easy[easy] = rings.convex() | rings.crossed_twice(middle[easy], axis)
     rings = _Rings.of(polygons[easy])
-    below[easy] = rings.clipped(middle[easy], axis, 1.0)
-    beyond[easy] = rings.clipped(middle[easy], axis, -1.0)
+    below[easy] = rings.clip(middle[easy], axis, 1.0)
+    beyond[easy] = rings.clip(middle[easy], axis, -1.0)
     hard = np.flatnonzero(~easy)
     if len(hard):
         box = shapely.bounds(polygons[hard])
@@ -93,7 +93,7 @@ class _Rings:
         clear = np.minimum.reduceat(np.abs(away), self.start) > 1e-6
         return np.asarray(clear & (crossings == 2))
 
-    def clipped(self, middle: Floats, axis: int, side: float) -> NDArray[np.object_]:
+    def clip(self, middle: Floats, axis: int, side: float) -> NDArray[np.object_]:
         """Clip rings to what lies before a line, or beyond it, in one piece (Sutherland and Hodgman, 1974)."""
         at = middle[self.row]
         away, away_after = side * (self.a[:, axis] - at), side * (self.b[:, axis] - at)

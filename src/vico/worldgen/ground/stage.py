@@ -28,7 +28,7 @@ from vico.worldgen.facts.fault_isolation import NamedShape, drop_on_failure, nam
 from vico.worldgen.facts.land_cover import ground_partition, mapped_areas, pieces_in
 from vico.worldgen.facts.site import SiteFacts, on_the_ground
 from vico.worldgen.facts.street_habits import street_habits
-from vico.worldgen.facts.streets import Crossing, StreetPolygons
+from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges import spans_over_water
 from vico.worldgen.ground.decimation import decimate_mesh
 from vico.worldgen.ground.grade_separation import Bridges
@@ -56,7 +56,8 @@ from vico.worldgen.ground.polygons import region_above
 from vico.worldgen.ground.stairs import Flights
 from vico.worldgen.ground.yards import Yards
 
-_FROM_KERB, _DEEP = 0.25, 0.6  # metres: behind the kerb stone, and on from there
+_FROM_KERB = 0.25  # metres from the kerb to ribbed slabs
+_DEEP = 0.6  # metres on from there
 _WIDEST = 3.0
 _LEAST = 0.25  # square metres of a field worth laying
 
@@ -81,35 +82,31 @@ def tactile_fields(streets: StreetPolygons, window: Polygon) -> list[Polygon]:
     for crossing in streets.crossings:
         if crossing.painted:
             with drop_on_failure(crossing.id):
-                found += _tactile_strips(crossing, streets.carriageway, pavement)
+                a, b = np.array(crossing.start), np.array(crossing.end)
+                along = (b - a) / max(distance(b, a), 1e-9)
+                reach = _FROM_KERB + _DEEP
+                strips: list[BaseGeometry] = []
+                for end, out in ((a, -along), (b, along)):
+                    if not shapely.intersects_xy(pavement, *(end + out * (_FROM_KERB + _DEEP / 2))):
+                        continue
+                    # Slanting crossings meet the kerb before or behind their end.
+                    middle = LineString([end - out * 1.5, end + out * 2.0])
+                    strip = overlay.buffer(middle, min(crossing.width, _WIDEST) / 2, cap_style="flat")
+                    x, y = end
+                    road = shapely.clip_by_rect(streets.carriageway, x - 6.0, y - 6.0, x + 6.0, y + 6.0)
+                    band = overlay.difference(
+                        overlay.buffer(road, reach, quad_segs=3), overlay.buffer(road, _FROM_KERB, quad_segs=3)
+                    )
+                    field = overlay.areas_of(overlay.intersection(overlay.intersection(strip, band), pavement))
+                    strips += [part for part in shapely.get_parts(field) if part.area > _LEAST]
+                found += strips
     inside = [shape for shape in found if window.contains(shape)]
     return polygons_of(overlay.union_all(inside, grid=0.001), _LEAST) if inside else []
 
 
-def _tactile_strips(crossing: Crossing, carriageway: BaseGeometry, pavement: BaseGeometry) -> list[BaseGeometry]:
-    a, b = np.array(crossing.start), np.array(crossing.end)
-    along = (b - a) / max(distance(b, a), 1e-9)
-    reach = _FROM_KERB + _DEEP
-    found: list[BaseGeometry] = []
-    for end, out in ((a, -along), (b, along)):
-        if not shapely.intersects_xy(pavement, *(end + out * (_FROM_KERB + _DEEP / 2))):
-            continue
-        # Slanting crossings meet the kerb before or behind their end.
-        strip = overlay.buffer(
-            LineString([end - out * 1.5, end + out * 2.0]), min(crossing.width, _WIDEST) / 2, cap_style="flat"
-        )
-        x, y = end
-        road = shapely.clip_by_rect(carriageway, x - 6.0, y - 6.0, x + 6.0, y + 6.0)
-        band = overlay.difference(
-            overlay.buffer(road, reach, quad_segs=3), overlay.buffer(road, _FROM_KERB, quad_segs=3)
-        )
-        field = overlay.areas_of(overlay.intersection(overlay.intersection(strip, band), pavement))
-        found += [part for part in shapely.get_parts(field) if part.area > _LEAST]
-    return found
-
-
 _KINDS_WITH_PITS = ("sidewalk", "pedestrian", "yard", "parking")
-_FRAME, _EARTH = 1.7, 1.4  # metres, outer sides
+_FRAME = 1.7  # metres, outer side of a pit's frame
+_EARTH = 1.4  # metres, outer side of its earth
 _WHOLE = 0.98  # share of a pit's frame on paving
 _STONE_COLOUR, _EARTH_COLOUR = (150, 147, 141), (86, 72, 56)
 
@@ -152,7 +149,8 @@ GROUND_APRON = 40.0
 # another depth in a tile whose ground is not level.
 _UNDERLAY, _UNDERLAY_SLOPED = 0.6, 3.0
 _UNDER_STAIRS = 0.3
-_LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
+_LIFT = 0.02  # metres of paint above the ground
+_LIFT_SLOPED = 0.035  # and where it slopes
 _STEEP = 1.08  # slope from which bare ground is held by a wall
 _SLOPING = 0.17  # ... and from which a yard is not paved
 _SLOPE_CELL = 2.0
@@ -222,7 +220,7 @@ def ground_from_osm(
     if terrain.steps is not None:
         pieces = _with_tactile(pieces, tactile_fields(streets, window), window)
     waters = open_water(site, terrain, pieces.get("water", [])) if terrain.steps is not None else []
-    # Along the window's sides all is drawn: who draws what lies beyond may know of other walls.
+    # Along the window's sides all is drawn: the tile beyond may know of other walls.
     hidden = overlay.intersection(
         _ground_under_buildings(osm, standing), overlay.buffer(window, -_SHOWN, join_style="mitre")
     )
@@ -463,7 +461,9 @@ def _surface(
 
 def _draped_surface(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightField) -> Surface:
     """Lay a piece of the plan on its heights."""
-    flat, faces = _compact_vertices(plan.corners, plan.triangles[plan.piece == number])
+    # Points that no triangle of the piece uses are left out.
+    kept, index = np.unique(plan.triangles[plan.piece == number], return_inverse=True)
+    flat, faces = plan.corners[kept], index.reshape(-1, 3)
     z = piece.heights(flat)
     if piece.water >= 0:
         up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
@@ -479,14 +479,6 @@ def _draped_surface(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightF
     uv = np.stack([np.where(east, flat[corner, 0], flat[corner, 1]), z[corner]], axis=1)
     own = np.arange(len(corner)).reshape(-1, 3)
     return _surface(flat[corner], z[corner], normals[corner], own, piece.look, uv)
-
-
-def _compact_vertices(
-    flat: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Keep the points that triangles use, numbered anew."""
-    kept, index = np.unique(faces, return_inverse=True)
-    return flat[kept], index.reshape(-1, 3)
 
 
 def _kerbs(

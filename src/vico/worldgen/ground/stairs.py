@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmWay
 from vico.geo.quantities import quantity
 from vico.world.heights import HeightField, Stairs
 from vico.world.mesh import Surface, surface_of_quads
@@ -106,7 +105,18 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
         if tags.get("highway") != "steps" or not on_the_ground(tags) or way.id in above or way.closed:
             continue
         with drop_on_failure(f"w{way.id}"):
-            for area, own in _flights(way, terrain, where):
+            width = min(max(quantity(way.tags, "width") or _WIDTH, 1.2), 12.0)
+            flights: list[tuple[BaseGeometry, list[Face]]] = []
+            for piece in shapely.get_parts(overlay.intersection(shapely.LineString(way.line), where)):
+                if piece.geom_type != "LineString" or piece.length < 0.8:
+                    continue
+                if np.abs(piece.bounds).max() > terrain.half - 1.0:
+                    continue
+                run = _rising(np.asarray(piece.coords), terrain)
+                steps = list(_flight(*run, width)) if run is not None else []
+                if steps and run is not None:
+                    flights.append((overlay.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"), steps))
+            for area, own in flights:
                 areas.append(NamedShape(f"w{way.id}", area))
                 faces += own
     return Flights(
@@ -115,20 +125,6 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
         np.array([normal for _, normal, _ in faces]).reshape(-1, 3),
         np.array([going for *_, going in faces], np.float64),
     )
-
-
-def _flights(way: OsmWay, terrain: HeightField, where: BaseGeometry) -> list[tuple[BaseGeometry, list[Face]]]:
-    """Return the flights of a way: where each lies, and its faces with their normals."""
-    width = min(max(quantity(way.tags, "width") or _WIDTH, 1.2), 12.0)
-    found: list[tuple[BaseGeometry, list[Face]]] = []
-    for piece in shapely.get_parts(overlay.intersection(shapely.LineString(way.line), where)):
-        if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > terrain.half - 1.0:
-            continue
-        run = _rising(np.asarray(piece.coords), terrain)
-        faces = list(_flight(*run, width)) if run is not None else []
-        if faces and run is not None:
-            found.append((overlay.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"), faces))
-    return found
 
 
 def _rising(line: Floats, terrain: HeightField) -> tuple[Floats, Floats] | None:

@@ -32,7 +32,8 @@ _CLEAR = 2.5  # metres around buildings where a mesh's walls run into the ground
 _MIN_WIDTH = {"footway", "path", "steps", "cycleway", "pedestrian", "corridor", "bridleway", "track"}
 
 _NEAREST_SAMPLES = 48
-_STICKS_OUT, _SINKS = 0.35, 1.0  # metres over and under the ground around that are no noise
+_STICKS_OUT = 0.35  # metres over the ground around that are no noise
+_SINKS = 1.0  # and under it
 _MOST_STICKS_OUT = 1.2  # however uneven it is around
 _BIN, _BIN_REACH = 10.0, 45.0
 _BIN_OVER = 2.5  # metres that a whole bin may lie above the low ground around it
@@ -57,7 +58,7 @@ class GroundSamples:
     missed: int
 
 
-def ground_samples(sight: RayCaster, osm: OsmData, *, reach: float, top: float) -> GroundSamples:
+def _ground_samples(sight: RayCaster, osm: OsmData, *, reach: float, top: float) -> GroundSamples:
     """Cast rays down at streets and open ground.
 
     Parameters
@@ -72,7 +73,17 @@ def ground_samples(sight: RayCaster, osm: OsmData, *, reach: float, top: float) 
         Where the rays start: above everything, metres.
     """
     square = shapely.box(-reach, -reach, reach, reach)
-    covered = _hiding_shapes(osm, square)
+    # Buildings, bridges, and water, whose surface no photo can place, hide the ground from above.
+    covered: list[BaseGeometry] = []
+    for area in osm.areas:
+        tags = area.tags
+        solid = tags.get("building", "no") != "no" or tags.get("building:part", "no") != "no"
+        wet = tags.get("natural") == "water" or "water" in tags
+        if (solid or wet or tags.get("man_made") == "bridge") and shapely.intersects(area.polygon, square):
+            covered.append(area.polygon)
+    for way in osm.ways:
+        if way.tags.get("highway") and len(way.line) >= 2 and way.tags.get("bridge", "no") != "no":
+            covered.append(overlay.buffer(shapely.LineString(way.line), 4.0, cap_style="flat"))
     places: list[NDArray[np.float64]] = []
     for way in osm.ways:
         kind = way.tags.get("highway")
@@ -109,21 +120,6 @@ def _is_off_ground(tags: dict[str, str]) -> bool:
         or tags.get("tunnel", "no") != "no"
         or tags.get("layer", "0") not in ("0", "")
     )
-
-
-def _hiding_shapes(osm: OsmData, square: BaseGeometry) -> list[BaseGeometry]:
-    """Find what hides the ground from above: buildings, bridges, and water, whose surface no photo can place."""
-    hiding: list[BaseGeometry] = []
-    for area in osm.areas:
-        tags = area.tags
-        solid = tags.get("building", "no") != "no" or tags.get("building:part", "no") != "no"
-        wet = tags.get("natural") == "water" or "water" in tags
-        if (solid or wet or tags.get("man_made") == "bridge") and shapely.intersects(area.polygon, square):
-            hiding.append(area.polygon)
-    for way in osm.ways:
-        if way.tags.get("highway") and len(way.line) >= 2 and way.tags.get("bridge", "no") != "no":
-            hiding.append(overlay.buffer(shapely.LineString(way.line), 4.0, cap_style="flat"))
-    return hiding
 
 
 def _along(line: NDArray[np.float64], offsets: Sequence[float]) -> list[NDArray[np.float64]]:
@@ -224,7 +220,7 @@ def _low_plane(
         plane = np.linalg.solve(normal, right[..., None])[..., 0]
         plane[:, 2] += middle
         residual = height - np.einsum("nki,ni->nk", design, plane)
-        # The spread of the lower part tells noise; the upper half may be half full of cars.
+        # The spread of the lower part is noise; the upper half may be half full of cars.
         spread = np.maximum(-np.quantile(residual, 0.2, axis=1) / 0.84, 0.06)
         ratio = residual / spread[:, None]
         weight = 1.0 / (1.0 + np.where(ratio > 0, ratio / 2.0, ratio / 3.0) ** 2)
@@ -406,7 +402,7 @@ def terrain_from_tiles(
         raise EmptyInputError("terrain: the tile mesh has no triangles; give a tileset of this place, or a DEM")
     reach = half + apron
     rays = sight or RayCaster(mesh.positions, mesh.triangles)
-    found = ground_samples(rays, osm, reach=reach, top=float(mesh.positions[:, 2].max()) + 10.0)
+    found = _ground_samples(rays, osm, reach=reach, top=float(mesh.positions[:, 2].max()) + 10.0)
     ground = found.points[on_ground(found.points)] if len(found.points) else found.points
     if len(ground) < 12:
         raise EmptyInputError(

@@ -47,11 +47,14 @@ WALL = 0.35
 """Thickness of the walls of cuts, metres."""
 
 _ROOF = 0.4  # metres of ground above the clear height where a tunnel is covered
-_STEEPEST, _STEEPEST_ON_FOOT = 0.11, 0.12
-_LONGEST_CUT, _SHORT_CUT = 62.0, 30.0  # metres; a straight tunnel is preferred to a dive up to cuts of the second
-_LEAST, _SPACING = 12.0, 3.0
+_STEEPEST = 0.11  # slope of what can be driven up
+_STEEPEST_ON_FOOT = 0.12  # slope of what can be walked up
+_LONGEST_CUT = 62.0  # metres
+_SHORT_CUT = 30.0  # metres of cut up to which a straight tunnel is preferred to a dive
+_LEAST = 12.0  # metres, length of a tunnel
+_SPACING = 3.0  # metres between the points of floors
 _SAME_FLOOR = 0.4  # metres by which floors that meet may differ where they overlap
-_LEDGE = 0.6  # metres, where nobody walks
+_LEDGE = 0.6  # metres, too narrow to be walked on
 _JOINT = 5.0  # metres at a mouth where a cut meets the street that leads in
 _MOST_PAVED = 6.0  # m2 that a cut may take of other streets: corners that overlap
 _TAPER = 8.0  # metres in which the floor comes down by a kerb where the street at the mouth has none
@@ -60,7 +63,7 @@ _PRIVATE = {"no", "private", "permit", "delivery", "agricultural", "forestry", "
 
 
 class Ground(Protocol):
-    """What tunnels lie under: the ground with streets graded into it, of one place or of all tiles of a city."""
+    """Ground above tunnels: with streets graded into it, of one place or of all tiles of a city."""
 
     def smooth(self, xy: Floats, /) -> Floats:
         """Return heights without kerbs at points, metres, shape ``(n, 2)`` or ``(2,)``."""
@@ -107,11 +110,11 @@ class Bore:
         """Return where it lies, between its walls, metres."""
         return _strip(self.line, np.ones(len(self.line), bool), self.width / 2)
 
-    def roofed(self) -> BaseGeometry:
+    def roofed_area(self) -> BaseGeometry:
         """Return where it lies under a roof, metres."""
         return _strip(self.line, self.covered, self.width / 2, both=True)
 
-    def driven(self) -> BaseGeometry:
+    def carriageway(self) -> BaseGeometry:
         """Return where its carriageway lies, metres; nowhere if nothing drives in it."""
         inner = 0.0 if self.on_foot else self.width / 2 - self.walk
         return _strip(self.line, np.full(len(self.line), inner > 0.0), inner)
@@ -192,7 +195,7 @@ def _strip(line: Floats, chosen: NDArray[np.bool_], half: float, *, both: bool =
 
 
 def _is_bore(way: OsmWay, window: Box) -> bool:
-    """Whether a way is a tunnel outdoors for everybody, long enough for two mouths, within the window."""
+    """Whether a way is a public tunnel outdoors, long enough for two mouths, within the window."""
     tags = way.tags
     kind = tags.get("highway", "").removesuffix("_link")
     if tags.get("tunnel", "no") in ("no", "building_passage", "culvert") or tags.get("indoor", "no") != "no":
@@ -258,7 +261,7 @@ def _floor(
     weight = np.where(is_mouth & is_known, 30.0, 0.0)
     if not weight.any():
         return np.asarray(ground - roof)
-    straight = network.levelled(ground, weight, length=25.0, spacing=_SPACING)
+    straight = network.fit_heights(ground, weight, length=25.0, spacing=_SPACING)
     straight[is_mouth & is_known] = ground[is_mouth & is_known]
     # How low the floor can be at each point, coming down from the mouths, and how low it has to be for what is ahead.
     everywhere, unbounded = np.arange(len(ground)), np.full(len(ground), -np.inf)
@@ -444,15 +447,22 @@ def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) 
     reach = min(terrain.half - 0.5, float(window.bounds[2]))
     window = shapely.box(-reach, -reach, reach, reach)
     plan = overlay.intersection(overlay.union_all([bore.plan() for bore in bores]), window)
-    roofed = overlay.intersection(overlay.union_all([bore.roofed() for bore in bores]), plan)
-    driven = overlay.intersection(overlay.union_all([bore.driven() for bore in bores]), plan)
+    roofed = overlay.intersection(overlay.union_all([bore.roofed_area() for bore in bores]), plan)
+    driven = overlay.intersection(overlay.union_all([bore.carriageway() for bore in bores]), plan)
     raised = overlay.difference(plan, driven)
     for piece in _pieces(bores):
         _lay(stone, overlay.intersection(piece.plan, driven), piece, 0.0, "carriageway")
         _lay(stone, overlay.intersection(piece.plan, raised), piece, KERB, "sidewalk")
         if piece.headroom:
-            _roof(stone, overlay.intersection(piece.plan, roofed), piece)
-    _kerbs(stone, driven, plan, floors)
+            flat, faces = triangulate(polygons_of(overlay.intersection(piece.plan, roofed), 0.005))
+            for a, b, c in np.c_[flat, piece.heights(flat) + piece.headroom][faces]:
+                stone.add([a, c, b, b], "kerb", _CEILING)
+    # Kerbs stand between carriageways and what is raised beside them.
+    unbroken = overlay.buffer(plan, -_AT)
+    for a, b in _edges(driven):
+        if unbroken.contains(shapely.Point((a + b) / 2)):
+            (low_a, low_b), _ = floors.at(np.stack([a, b]))
+            stone.add([np.r_[a, low_a], np.r_[b, low_b], np.r_[b, low_b + KERB], np.r_[a, low_a + KERB]][::-1], "kerb")
     # Mouths stay open, and so do tubes where they leave the window.
     mouths = overlay.union_all([shapely.LineString(end) for bore in bores for end in bore.end_lines()])
     ways_in = overlay.buffer(mouths, _AT, cap_style="flat")
@@ -461,7 +471,8 @@ def bore_surfaces(bores: Sequence[Bore], terrain: HeightField, window: Polygon) 
         if ways_in.intersects(middle) or np.abs((a + b) / 2).max() > reach - _AT:
             continue
         if roofed.distance(middle) < _AT:
-            _tube_wall(stone, a, b, floors)
+            low, headroom = floors.at(np.stack([a, b]))
+            _upright(stone, a, b, low, low + headroom, _TILES)
         else:
             _cut_wall(stone, a, b, floors, terrain)
     inner = overlay.buffer(plan, -4 * _AT)
@@ -504,25 +515,11 @@ def _lay(stone: QuadMeshBuilder, area: BaseGeometry, piece: _Piece, lift: float,
         stone.add([a, b, c, c], look)
 
 
-def _kerbs(stone: QuadMeshBuilder, driven: BaseGeometry, plan: BaseGeometry, floors: _Floors) -> None:
-    """Build the faces between carriageways and what is raised beside them."""
-    inside = overlay.buffer(plan, -_AT)
-    for a, b in _edges(driven):
-        if inside.contains(shapely.Point((a + b) / 2)):
-            (low_a, low_b), _ = floors.at(np.stack([a, b]))
-            stone.add([np.r_[a, low_a], np.r_[b, low_b], np.r_[b, low_b + KERB], np.r_[a, low_a + KERB]][::-1], "kerb")
-
-
 def _upright(
     stone: QuadMeshBuilder, a: Floats, b: Floats, low: Floats, high: Floats, tint: Rgb, look: str = "kerb"
 ) -> None:
     """Build an upright face from `a` to `b` that is seen from the left of that way."""
     stone.add([np.r_[b, low[1]], np.r_[a, low[0]], np.r_[a, high[0]], np.r_[b, high[1]]], look, tint)
-
-
-def _tube_wall(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors) -> None:
-    low, headroom = floors.at(np.stack([a, b]))
-    _upright(stone, a, b, low, low + headroom, _TILES)
 
 
 def _cut_wall(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors, terrain: HeightField) -> None:
@@ -537,13 +534,6 @@ def _cut_wall(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors, ter
     _upright(stone, a, b, low, high, _CONCRETE)
     _upright(stone, b + out, a + out, foot[::-1], high[::-1], _CONCRETE)
     stone.add([np.r_[a, high[0]], np.r_[a + out, high[0]], np.r_[b + out, high[1]], np.r_[b, high[1]]], "kerb")
-
-
-def _roof(stone: QuadMeshBuilder, area: BaseGeometry, piece: _Piece) -> None:
-    """Build a part of a piece's ceiling."""
-    flat, faces = triangulate(polygons_of(area, 0.005))
-    for a, b, c in np.c_[flat, piece.heights(flat) + piece.headroom][faces]:
-        stone.add([a, c, b, b], "kerb", _CEILING)
 
 
 def _portal(stone: QuadMeshBuilder, a: Floats, b: Floats, floors: _Floors, terrain: HeightField) -> None:

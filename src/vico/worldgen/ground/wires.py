@@ -21,7 +21,8 @@ CONTACT = 5.5
 """Metres above the rail: 4.2 to 6 over streets (EN 50119)."""
 
 _ANCHOR = 7.0  # metres above the street where a span wire meets a wall
-_SPAN_EVERY, _APART = 28.0, 14.0  # metres along a track, and from a span to that of the next track
+_SPAN_EVERY = 28.0  # metres along a track from span to span
+_APART = 14.0  # metres from a span to that of the next track
 _REACH = 19.0  # metres from a track within which a wall holds a span
 _STEP = 14.0  # metres, longest piece of wire
 _THICK = 0.035  # wider than it is: 12 mm would be between two pixels
@@ -67,35 +68,25 @@ def contact_wires(
                 if piece.geom_type == "LineString" and piece.length > 2.0:
                     xy = np.asarray(shapely.segmentize(piece, _STEP).coords)
                     wires.append(np.c_[xy, terrain.lower(xy) + CONTACT])
-                    spans += _spans(piece, walls, terrain, spans)
+                    # Wires across the street hold the contact wire of a track; shape ``(3, 3)`` each.
+                    middles = np.array([span[1, :2] for span in spans]).reshape(-1, 2)
+                    found: list[NDArray[np.float64]] = []
+                    for place in np.arange(_SPAN_EVERY / 2, piece.length, _SPAN_EVERY):
+                        a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place - 0.5, place + 0.5))
+                        here = (a + b) / 2
+                        if len(middles) and distances(middles, here).min() < _APART:
+                            continue
+                        along = (b - a) / max(distance(b, a), 1e-9)
+                        across = np.array([-along[1], along[0]])
+                        left, right = (_wall(here, side * across, walls) for side in (1.0, -1.0))
+                        if left is None or right is None:
+                            continue
+                        ground = float(terrain.lower(here[None])[0])
+                        anchors = np.r_[left, ground + _ANCHOR], np.r_[right, ground + _ANCHOR]
+                        found.append(np.array([anchors[0], np.r_[here, ground + CONTACT + 0.15], anchors[1]]))
+                    spans += found
     lines = wires + spans
     return [_tubes(lines).of_entity(ENTITY_WIRE)] if lines else []
-
-
-def _spans(
-    track: shapely.LineString,
-    walls: shapely.STRtree,
-    terrain: HeightField,
-    known: Sequence[NDArray[np.float64]],
-) -> list[NDArray[np.float64]]:
-    """Wires across the street that hold the contact wire of one track, shape ``(3, 3)`` each."""
-    middles = np.array([span[1, :2] for span in known]).reshape(-1, 2)
-    found: list[NDArray[np.float64]] = []
-    for place in np.arange(_SPAN_EVERY / 2, track.length, _SPAN_EVERY):
-        a, b = (np.asarray(track.interpolate(v).coords[0]) for v in (place - 0.5, place + 0.5))
-        here = (a + b) / 2
-        if len(middles) and distances(middles, here).min() < _APART:
-            continue
-        along = (b - a) / max(distance(b, a), 1e-9)
-        across = np.array([-along[1], along[0]])
-        ends = [_wall(here, side * across, walls) for side in (1.0, -1.0)]
-        if ends[0] is None or ends[1] is None:
-            continue
-        ground = float(terrain.lower(here[None])[0])
-        found.append(
-            np.array([[*ends[0], ground + _ANCHOR], [*here, ground + CONTACT + 0.15], [*ends[1], ground + _ANCHOR]])
-        )
-    return found
 
 
 def _wall(here: NDArray[np.float64], out: NDArray[np.float64], walls: shapely.STRtree) -> NDArray[np.float64] | None:

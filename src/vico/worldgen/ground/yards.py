@@ -1,4 +1,4 @@
-"""What the open ground between houses is, where no map says so: gardens, lawns, lots of asphalt; else it is paved."""
+"""Kinds of open ground between houses that no map knows: gardens, lawns, lots of asphalt; else it is paved."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ from vico.worldgen.ground.polygons import region_above
 
 _SMALL = 320.0  # square metres of houses, wall to wall, up to which they have gardens
 _MOSTLY = 0.55  # share of the built ground near by that such houses have, at least
-_DENSE, _BARE = 0.36, 0.015  # shares of built ground from which nothing is green, and below which nobody lives
+_DENSE = 0.36  # share of built ground from which nothing is green
+_BARE = 0.015  # share of built ground below which there are no homes
 _LONELY = 0.002  # share of built ground up to which open ground is a field
 _OPEN = 0.2  # share of built ground up to which yards are lawns: between slabs, not within blocks
 _AROUND = 20.0  # metres, spread of what counts as near by
 _BEYOND = 80.0  # metres beyond the square that are looked at, where the map has them: four spreads
 _CELL = 4.0
-# Metres along walls and kerbs that stay paved, and width up to which a lawn is none.
-_PAVED, _NARROW = 3.0, 6.0
+_PAVED = 3.0  # metres along walls and kerbs that stay paved
+_NARROW = 6.0  # metres of width up to which a lawn is none
 _WORK = 15.0  # metres round a shed that belong to it
 _SHEDS = {"industrial", "warehouse", "supermarket", "garages", "manufacture", "hangar", "depot", "factory", "silo"}
 _WORKED, _TRADED = {"industrial", "garages", "port", "depot", "harbour"}, {"commercial", "retail"}
@@ -37,7 +38,7 @@ _WORKED, _TRADED = {"industrial", "garages", "port", "depot", "harbour"}, {"comm
 
 @dataclass(frozen=True)
 class Yards:
-    """Regions in which open ground that no map tells more of is not paved as yards usually are; they don't overlap.
+    """Regions in which unmapped open ground is not paved as yards usually are; they don't overlap.
 
     Attributes
     ----------

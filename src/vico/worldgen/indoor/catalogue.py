@@ -37,7 +37,7 @@ from vico.worldgen.indoor.records import (
 
 ROOM = "worldgen/indoor"
 GUIDE = "docs/adding_a_room.md"
-#: Rooms that plans make themselves; nobody furnishes them.
+#: Rooms that plans make themselves; they are not furnished.
 UNFURNISHED = ("stairs", "lift")
 #: Plans that are drawn in Python, see `floorplans`.
 DRAWN = ("flat_small", "flat_medium", "flat_large", "maisonette", "galleries")

@@ -129,7 +129,7 @@ class _Draft:
             x = round(x + _CAR, 2)
         return x
 
-    def done(self, use: str, size: tuple[float, float]) -> Sketch:
+    def finish(self, use: str, size: tuple[float, float]) -> Sketch:
         return Sketch(use, size, tuple(self.rooms), tuple(self.doors))
 
 
@@ -285,7 +285,7 @@ def sketch_of(use: str, size: int = 0, storeys: int = 1, *, mirrored: bool = Fal
         _spine(draft, wanted.plan, (w, h), floors)
     else:
         _DRAWN[wanted.plan.drawn](draft, w, h, floors)
-    sketch = draft.done(use, (w, h))
+    sketch = draft.finish(use, (w, h))
     return _mirror_sketch(sketch) if mirrored else sketch
 
 

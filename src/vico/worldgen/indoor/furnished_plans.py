@@ -54,7 +54,7 @@ class SmallThings:
     tops: dict[int, Top | None]
 
 
-def small_things_for_room(kind: str, items: Sequence[Furnishing], chance: np.random.Generator) -> SmallThings:
+def _small_things(kind: str, items: Sequence[Furnishing], chance: np.random.Generator) -> SmallThings:
     """Lay small things on the tables, desks and counters of a room.
 
     Parameters
@@ -220,8 +220,12 @@ def furnish_sketch(sketch: Sketch, chance: np.random.Generator, variant: int = 0
         elif room.kind == "lift":
             items = [Furnishing("lift_panel", *_lift_panel(draft))]
         else:
-            items = _furniture(draft, kind)
-        dress = small_things_for_room(room.kind, items, chance) if room.kind not in UNFURNISHED else SmallThings((), {})
+            if kind.composition is not None:
+                kind.composition(draft)
+            else:
+                furnish_room(draft, kind.entry.furniture, room_kinds().names)
+            items = draft.items
+        dress = _small_things(room.kind, items, chance) if room.kind not in UNFURNISHED else SmallThings((), {})
         spots = _spots(room, draft, items, dress) if room.kind not in UNFURNISHED else ()
         rooms.append(
             RoomPlan(
@@ -243,15 +247,6 @@ def furnish_sketch(sketch: Sketch, chance: np.random.Generator, variant: int = 0
         )
         insides.append(_inside(i, room, kind, (cx, cy, z), size, mine, windows, variant))
     return FloorPlan(sketch.use, tuple(rooms), sketch.size, round(sketch.height, 3), tuple(shell(insides)))
-
-
-def _furniture(draft: RoomDraft, kind: RoomKind) -> list[Furnishing]:
-    """Furnish a room by its kind."""
-    if kind.composition is not None:
-        kind.composition(draft)
-    else:
-        furnish_room(draft, kind.entry.furniture, room_kinds().names)
-    return draft.items
 
 
 def _inner(room: SketchRoom) -> tuple[float, float, float, float]:
@@ -449,7 +444,7 @@ def _spots(
 
 @dataclass(frozen=True)
 class Indoors:
-    """What the stage made.
+    """Product of the stage.
 
     Attributes
     ----------

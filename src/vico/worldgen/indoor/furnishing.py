@@ -23,9 +23,9 @@ from vico.geometry import distances
 GRID = 0.1
 BODY = 0.3  # bodies are 0.25 m; the rest is for the raster
 STEP_IN = 0.6  # metres from a doorway to the spot inside it
-# A bed is got out of at a side, so far from the hips, at a spot no farther from there; metres. Points at which the line
-# to the hips is looked at for other furniture.
-_BESIDE_BED, _NEAR_SIDE, _SAMPLES = 0.85, 1.4, 16
+_BESIDE_BED = 0.85  # metres from the hips to the side at which a bed is got out of
+_NEAR_SIDE = 1.4  # metres from there to the spot at most
+_SAMPLES = 16  # points at which the line to the hips is looked at for other furniture
 _DOOR_CLEAR = (1.1, 0.95)  # width and depth kept free before a doorway, metres
 _LOW = 1.0  # what is lower may stand before a window
 _BESIDE = ndimage.generate_binary_structure(2, 1)  # cells that one steps between
@@ -126,7 +126,7 @@ class RoomDraft:
 
     @property
     def sides(self) -> list[int]:
-        """The walls to the left and right of who comes in, the longer choice first decided by chance."""
+        """The walls to the left and right of the first door, the longer choice first decided by chance."""
         found = [(self.near + 1) % 4, (self.near + 3) % 4]
         return found if self.chance.random() < 0.5 else found[::-1]
 
@@ -183,7 +183,7 @@ class RoomDraft:
         return np.asarray((labels == home) & (home > 0))
 
     def _are_left(self, beds: Sequence[_Bed], new: Sequence[Box]) -> bool:
-        """Whether who came in by the first door can lie down in all of some beds, and get up, with new pieces there."""
+        """Whether all of some beds can be reached from the first door and lain in, with new pieces there."""
         if not beds:
             return True
         iy, ix = np.nonzero(self.reachable())
@@ -341,7 +341,7 @@ class RoomDraft:
             steps = max(1, min(36, round(2 * free / 0.12)))
             spots = [-free + 2 * free * k / steps for k in range(steps + 1)] if free > 0.01 else [0.0]
             tries = 0
-            for at in self._ordered(spots, along, side):
+            for at in self._order_spots(spots, along, side):
                 if model.size[2] > _LOW and self._covers_window(side, at, wide):
                     continue
                 inner = deep / 2 + gap + max([deep / 2, *(e[1] + max(models[e[0]].size[:2]) / 2 + 0.02 for e in extra)])
@@ -366,7 +366,7 @@ class RoomDraft:
             count += 1
         return count
 
-    def _ordered(self, spots: list[float], along: str | float, side: int) -> list[float]:
+    def _order_spots(self, spots: list[float], along: str | float, side: int) -> list[float]:
         if isinstance(along, float):
             return sorted(spots, key=lambda s: abs(s - along))
         if along == "middle":
@@ -435,7 +435,7 @@ class RoomDraft:
             free = (self.length(side) - wide) / 2 - 0.1
             if free < 0:
                 continue
-            spots = [at] if at is not None else self._ordered([free * k / 6 for k in range(-6, 7)], "middle", side)
+            spots = [at] if at is not None else self._order_spots([free * k / 6 for k in range(-6, 7)], "middle", side)
             for s in spots:
                 if abs(s) > free:
                     continue

@@ -1,4 +1,4 @@
-"""Layouts of one's own: a folder of JSON files with rooms, doors and furniture, and an author who may draw them.
+"""Layouts of one's own: JSON files with rooms, doors and furniture, and the interface of authors that draw them.
 
 A layout file holds one floor plan of a use or a category::
 
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
@@ -40,7 +40,8 @@ from vico.worldgen.indoor.furnishing import Furnishing
 SCHEMA = "vico.layout"
 VERSION = 1
 _MOST_BYTES = 4 << 20
-_MOST_ROOMS, _MOST_PIECES = 60, 400
+_MOST_ROOMS = 60  # of a layout
+_MOST_PIECES = 400  # of a room's furniture
 _LEAST_ROOM = 1.4
 _EDGE = 0.06  # metres a point may lie off the wall it is meant to be on
 _CLEAR_WIDTH = 0.9
@@ -61,7 +62,7 @@ class LayoutPiece(_Strict):
     yaw: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
 
     @model_validator(mode="after")
-    def _known(self) -> LayoutPiece:
+    def _check_model(self) -> LayoutPiece:
         if self.model not in furniture_models():
             raise ValueError(
                 f"there is no furniture called {self.model!r}; see vico.assets.models.library.furniture_models"
@@ -209,14 +210,10 @@ def _well_formed(text: str | bytes, where: str) -> Layout:
 
 def findings_of(layout: Layout) -> list[str]:
     """Return what keeps a layout from being built, one sentence each, by field; empty if nothing does."""
-    wrong = _plan_findings(layout)
-    return wrong or _furniture_findings(layout)
-
-
-def _plan_findings(layout: Layout) -> list[str]:
-    """Check the plan without its furniture; doors are looked at once the rooms are right."""
+    # Doors are looked at once the rooms are right, furniture once the plan is.
     wrong = [*_purpose_findings(layout), *_rooms_findings(layout)]
-    return wrong or [*_doors_findings(layout), *_ways_out_findings(layout), *_unreachable_rooms(layout)]
+    wrong = wrong or [*_doors_findings(layout), *_ways_out_findings(layout), *_unreachable_rooms(layout)]
+    return wrong or _furniture_findings(layout)
 
 
 def _purpose_findings(layout: Layout) -> Iterator[str]:
@@ -230,70 +227,39 @@ def _rooms_findings(layout: Layout) -> Iterator[str]:
     for k, room in enumerate(layout.rooms):
         here = f"rooms.{k} ({room.id})"
         before = layout.rooms[:k]
-        yield from _id_findings(here, room, before)
-        yield from _kind_findings(here, room)
-        yield from _size_findings(here, room)
-        yield from _extent_findings(here, room, layout.size)
-        yield from _overlap_findings(here, room, before)
-
-
-def _id_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> Iterator[str]:
-    if room.id == "outside" or any(room.id == other.id for other in before):
-        yield f"{here}.id: ids have to differ, and none may be 'outside'"
-
-
-def _kind_findings(here: str, room: LayoutRoom) -> Iterator[str]:
-    known = _room_kinds()
-    if room.kind not in known and room.furniture is None:
-        yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(known)}"
-
-
-def _size_findings(here: str, room: LayoutRoom) -> Iterator[str]:
-    x0, y0, x1, y1 = room.rect
-    if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
-        yield f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least"
-
-
-def _extent_findings(here: str, room: LayoutRoom, size: Sequence[float]) -> Iterator[str]:
-    x0, y0, x1, y1 = room.rect
-    w, h = size
-    if x0 < -1e-6 or y0 < -1e-6 or x1 > w + 1e-6 or y1 > h + 1e-6:
-        yield f"{here}.rect: it leaves the plan of {w:g} x {h:g} m"
-
-
-def _overlap_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> Iterator[str]:
-    x0, y0, x1, y1 = room.rect
-    for j, other in enumerate(before):
-        a = other.rect
-        if x0 < a[2] - 0.01 and a[0] < x1 - 0.01 and y0 < a[3] - 0.01 and a[1] < y1 - 0.01:
-            yield f"{here}.rect: it overlaps rooms.{j} ({other.id})"
+        if room.id == "outside" or any(room.id == other.id for other in before):
+            yield f"{here}.id: ids have to differ, and none may be 'outside'"
+        known = _room_kinds()
+        if room.kind not in known and room.furniture is None:
+            yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(known)}"
+        x0, y0, x1, y1 = room.rect
+        if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
+            yield f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least"
+        w, h = layout.size
+        if x0 < -1e-6 or y0 < -1e-6 or x1 > w + 1e-6 or y1 > h + 1e-6:
+            yield f"{here}.rect: it leaves the plan of {w:g} x {h:g} m"
+        for j, other in enumerate(before):
+            a = other.rect
+            if x0 < a[2] - 0.01 and a[0] < x1 - 0.01 and y0 < a[3] - 0.01 and a[1] < y1 - 0.01:
+                yield f"{here}.rect: it overlaps rooms.{j} ({other.id})"
 
 
 def _doors_findings(layout: Layout) -> Iterator[str]:
     rooms = {room.id: room for room in layout.rooms}
     for k, door in enumerate(layout.doors):
         here = f"doors.{k}"
-        unlinked = list(_between_findings(here, door, rooms))
-        yield from unlinked or _door_place_findings(here, door, rooms, layout.size)
-
-
-def _between_findings(here: str, door: LayoutDoor, rooms: Mapping[str, LayoutRoom]) -> Iterator[str]:
-    """Say that a door does not join two rooms of the plan, or one of them and the outdoors."""
-    lost = [name for name in door.between if name != "outside" and name not in rooms]
-    if lost:
-        yield f"{here}.between: there is no room {lost[0]!r}"
-    elif door.between[0] == door.between[1]:
-        yield f"{here}.between: twice the same room"
-
-
-def _door_place_findings(
-    here: str, door: LayoutDoor, rooms: Mapping[str, LayoutRoom], size: Sequence[float]
-) -> Iterator[str]:
-    for name in door.between:
-        if name != "outside" and not _on_wall(rooms[name].rect, door):
-            yield f"{here}.at: {door.at} with {door.width:g} m is not on a wall of {name!r}, clear of its ends"
-    if "outside" in door.between and not _on_wall([0.0, 0.0, *size], door):
-        yield f"{here}.at: {door.at} leads outside, but is not on the plan's edge"
+        lost = [name for name in door.between if name != "outside" and name not in rooms]
+        if lost:
+            yield f"{here}.between: there is no room {lost[0]!r}"
+            continue
+        if door.between[0] == door.between[1]:
+            yield f"{here}.between: twice the same room"
+            continue
+        for name in door.between:
+            if name != "outside" and not _on_wall(rooms[name].rect, door):
+                yield f"{here}.at: {door.at} with {door.width:g} m is not on a wall of {name!r}, clear of its ends"
+        if "outside" in door.between and not _on_wall([0.0, 0.0, *layout.size], door):
+            yield f"{here}.at: {door.at} leads outside, but is not on the plan's edge"
 
 
 def _ways_out_findings(layout: Layout) -> Iterator[str]:
@@ -355,12 +321,8 @@ def _furniture_findings(layout: Layout) -> list[str]:
     for made in plan.rooms:
         if not made.spots:
             wrong.append(f"rooms ({made.kind}): furniture stands in its doorway: leave 1 m before each door free")
-    return wrong or _walking_findings(plan)
-
-
-def _walking_findings(plan: FloorPlan) -> list[str]:
     rooms, objects = rooms_of_plan(plan)
-    return [f"{f.where}: {f.what}" for f in walkable_inside(rooms, objects)]
+    return wrong or [f"{f.where}: {f.what}" for f in walkable_inside(rooms, objects)]
 
 
 @dataclass(frozen=True)
@@ -409,7 +371,7 @@ def read_library(folder: Path) -> Library:
 
 
 class LayoutAuthor(Protocol):
-    """Somebody who draws floor plans: a language model, a vision model, a script."""
+    """Author of floor plans: a language model, a vision model, a script."""
 
     def draw(self, request: LayoutRequest, feedback: Sequence[str]) -> str | None:
         """Answer with a layout as JSON text; None gives up.
@@ -425,7 +387,7 @@ class LayoutAuthor(Protocol):
 
 @dataclass(frozen=True)
 class LayoutRequest:
-    """What an author is asked for.
+    """Request for a floor plan.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.errors import LlmBudgetError, LlmReplyError, SourceError
-from vico.llm import LanguageModel, Message, system, user
+from vico.llm import LanguageModel, system, user
 from vico.world.heights import HeightField
 from vico.world.model import Building, Dropped, Entrance, Place
 from vico.worldgen.indoor.layout_library import Layout, LayoutRequest, layout_guide, layout_problems, layout_schema
@@ -85,7 +85,7 @@ class LlmLayoutAuthor:
 
     @property
     def digest(self) -> str:
-        """What plans hang on besides the places, to know a stage's inputs by: model, options, what it is told."""
+        """Digest of what plans depend on besides the places: model, options, prompt."""
         told = json.dumps([self.model.name, self.rounds, _briefing()])
         return hashlib.sha256(told.encode()).hexdigest()
 
@@ -109,8 +109,8 @@ class LlmLayoutAuthor:
         InputError
             If a recording is replayed that holds no answer.
         """
-        layout, reason = self._drawn(request)
-        return self._told(request, layout, reason)
+        layout, reason = self._ask_for_plan(request)
+        return self._book_plan(request, layout, reason)
 
     def draw_all(self, requests: Sequence[LayoutRequest]) -> dict[LayoutRequest, str]:
         """Draw many plans, some at a time; requests that got none are missing, and are in `dropped`.
@@ -121,7 +121,7 @@ class LlmLayoutAuthor:
         for request in requests:
             groups.setdefault(replace(request, place=""), []).append(request)
         with ThreadPoolExecutor(1 if self.model.recorded else max(1, self.workers)) as pool:
-            waiting = [pool.submit(self._drawn, members[0]) for members in groups.values()]
+            waiting = [pool.submit(self._ask_for_plan, members[0]) for members in groups.values()]
             try:
                 drawn = [one.result() for one in waiting]
             except BaseException:
@@ -130,21 +130,36 @@ class LlmLayoutAuthor:
         plans: dict[LayoutRequest, str] = {}
         for members, (layout, reason) in zip(groups.values(), drawn, strict=True):
             for request in members:
-                text = self._told(request, layout, reason)
+                text = self._book_plan(request, layout, reason)
                 if text is not None:
                     plans[request] = text
         return plans
 
-    def _drawn(self, request: LayoutRequest) -> tuple[Layout | None, str]:
+    def _ask_for_plan(self, request: LayoutRequest) -> tuple[Layout | None, str]:
         """Return a plan, or why there is none."""
         if self._over is not None:
             return None, self._over
         try:
+            place = {
+                "name": request.name[:120],
+                "kind": request.kind[:60],
+                "category": request.category,
+                "use": request.use,
+                "largest size": list(request.size),
+            }
+            question = (
+                f"The place, as map data describe it:\n{json.dumps(place, ensure_ascii=False)}\n"
+                "Draw its floor plan: what would one find behind a door with this name? Fill about the largest size if "
+                "a place of this kind needs it, less if not."
+            )
             reply = self.model.ask(
-                _messages(request), Layout, check=lambda layout: _faults(layout, request), rounds=self.rounds
+                [system(_briefing()), user(question)],
+                Layout,
+                check=lambda layout: _faults(layout, request),
+                rounds=self.rounds,
             )
         except LlmReplyError as error:
-            self._answered()
+            self._note_answer()
             return None, str(error)
         except LlmBudgetError as error:
             self._over = str(error)
@@ -157,14 +172,14 @@ class LlmLayoutAuthor:
                 if self._failed >= _PATIENCE:
                     self._over = f"{error}; not asked again after {_PATIENCE} places"
             return None, str(error)
-        self._answered()
+        self._note_answer()
         return reply.value, ""
 
-    def _answered(self) -> None:
+    def _note_answer(self) -> None:
         with self._lock:
             self._heard, self._failed = True, 0
 
-    def _told(self, request: LayoutRequest, layout: Layout | None, reason: str) -> str | None:
+    def _book_plan(self, request: LayoutRequest, layout: Layout | None, reason: str) -> str | None:
         """Book a plan, or that there is none."""
         if layout is not None:
             self.drawn += 1
@@ -218,7 +233,7 @@ def furnish_drawn(
 
 
 class _Collector:
-    """An author who only notes what is asked for."""
+    """An author that only collects requests."""
 
     def __init__(self) -> None:
         self.requests: list[LayoutRequest] = []
@@ -242,24 +257,6 @@ def _faults(layout: Layout, request: LayoutRequest) -> list[str]:
     if layout.use != request.use or layout.category is not None:
         wrong.insert(0, f"use: it has to be {request.use!r}, and category null")
     return wrong
-
-
-def _messages(request: LayoutRequest) -> list[Message]:
-    place = {
-        "name": request.name[:120],
-        "kind": request.kind[:60],
-        "category": request.category,
-        "use": request.use,
-        "largest size": list(request.size),
-    }
-    return [
-        system(_briefing()),
-        user(
-            f"The place, as map data describe it:\n{json.dumps(place, ensure_ascii=False)}\n"
-            "Draw its floor plan: what would one find behind a door with this name? Fill about the largest size if a "
-            "place of this kind needs it, less if not."
-        ),
-    ]
 
 
 def _briefing() -> str:

@@ -20,7 +20,7 @@ Spot = tuple[int, float]  # a wall, and where along it
 
 @dataclass(frozen=True)
 class NamedPieces:
-    """What steps may name: sets of pieces that stand together, and pieces of which chance picks one."""
+    """Names that steps may use: sets of pieces that stand together, and pieces of which chance picks one."""
 
     sets: Mapping[str, tuple[Member, ...]]
     choices: Mapping[str, tuple[str, ...]]
@@ -52,7 +52,20 @@ def furnish_room(room: RoomDraft, steps: Sequence[records.Step], names: NamedPie
     """
     for step in steps:
         if isinstance(step, records.StandStep):
-            _stand(room, step, names, spot)
+            for one in names.pieces(step.stand, step.times, room):
+                along: str | float = step.along
+                if step.along == "same":
+                    along = "any" if spot is None else spot[1]
+                found = room.against(
+                    one,
+                    _walls(room, step.walls, spot),
+                    along=along,
+                    front=step.front,
+                    gap=step.gap,
+                    extra=step.beside,
+                    width=step.width,
+                )
+                furnish_room(room, step.then if found else step.else_, names, found or spot)
         elif isinstance(step, records.PutStep):
             after = step.then if _put(room, step, names) else step.else_
             furnish_room(room, after, names, spot)
@@ -71,7 +84,11 @@ def furnish_room(room: RoomDraft, steps: Sequence[records.Step], names: NamedPie
             for piece in names.pieces(step.hang, step.times, room):
                 room.hang(piece, _walls(room, step.walls, spot), at=step.at)
         else:
-            _lay(room, step)
+            if step.at == "door":
+                room.lay(step.lay, *room.doors[0].point(room.size, STEP_IN), turn=room.doors[0].side)
+            else:
+                for x, y in step.at:
+                    room.lay(step.lay, x + step.shares[0] * room.size[0], y + step.shares[1] * room.size[1], step.turn)
 
 
 def _walls(room: RoomDraft, names: Sequence[records.WallName], spot: Spot | None) -> list[int] | None:
@@ -87,23 +104,6 @@ def _walls(room: RoomDraft, names: Sequence[records.WallName], spot: Spot | None
         else:
             found += room.sides if name == "sides" else room.walls
     return found or None
-
-
-def _stand(room: RoomDraft, step: records.StandStep, names: NamedPieces, spot: Spot | None) -> None:
-    for piece in names.pieces(step.stand, step.times, room):
-        along: str | float = step.along
-        if step.along == "same":
-            along = "any" if spot is None else spot[1]
-        found = room.against(
-            piece,
-            _walls(room, step.walls, spot),
-            along=along,
-            front=step.front,
-            gap=step.gap,
-            extra=step.beside,
-            width=step.width,
-        )
-        furnish_room(room, step.then if found else step.else_, names, found or spot)
 
 
 def _put(room: RoomDraft, step: records.PutStep, names: NamedPieces) -> bool:
@@ -132,14 +132,6 @@ def _is_so(room: RoomDraft, wanted: records.RoomSize) -> bool:
     if any(least is not None and size <= least for least, size in sizes):
         return False
     return wanted.chance is None or bool(room.chance.random() < wanted.chance)
-
-
-def _lay(room: RoomDraft, step: records.LayStep) -> None:
-    if step.at == "door":
-        room.lay(step.lay, *room.doors[0].point(room.size, STEP_IN), turn=room.doors[0].side)
-        return
-    for x, y in step.at:
-        room.lay(step.lay, x + step.shares[0] * room.size[0], y + step.shares[1] * room.size[1], step.turn)
 
 
 def rows(room: RoomDraft, step: records.RowsStep) -> None:

@@ -22,7 +22,7 @@ Point = tuple[Offset, Offset]
 Placed = tuple[str, Offset, Offset, float]  # piece, ahead and to the left of the set's middle, yaw in degrees
 Pieces = str | tuple[str, ...]
 Times = Annotated[int, Field(ge=1, le=99)]
-#: A wall as who comes in sees it: opposite, beside, behind them; where the step before stood, or opposite to that.
+#: A wall as seen from the door: opposite, beside, behind; where the step before stood, or opposite to that.
 WallName = Literal["far", "sides", "near", "walls", "same", "opposite"]
 Floor = Literal["planks", "tiles", "carpet", "stone", "concrete", "parquet", "chequer"]
 WallCover = Literal["plaster", "wallpaper", "tiled", "brick", "panels"]
@@ -166,7 +166,7 @@ class RowsStep(DataRecord):
 
 
 class RoomSize(DataRecord):
-    """What has to hold of a room: larger than an area, a longer or shorter side longer than; or by chance a share."""
+    """Condition on a room: larger than an area, a longer or shorter side longer than; or by chance a share."""
 
     area: float | None = None
     long_side: float | None = None
@@ -336,7 +336,7 @@ Plan = Annotated[
 
 
 class Use(DataRecord):
-    """What a place's floor plan is for.
+    """Use of a place that a floor plan is for.
 
     Attributes
     ----------

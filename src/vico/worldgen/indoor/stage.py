@@ -177,24 +177,20 @@ def _plan(
             return drawn.plan(seed)
     variant = int(chance.integers(VARIANTS))
     if use == "flat":
-        return plan_of(_home(building.levels, share, chance), 0, 1, variant)
+        # Homes that fit the house and the place's part of it are drawn by how common they are.
+        known = uses()
+        smallest = area_of(known.homes[0], 0)
+        options = [
+            name
+            for name in known.homes
+            if area_of(name, 0) * known.uses[name].storeys <= max(share, smallest)
+            and known.uses[name].least_storeys <= max(building.levels, 1)
+        ]
+        weights = np.array([known.uses[name].home for name in options], float)
+        return plan_of(options[int(chance.choice(len(options), p=weights / weights.sum()))], 0, 1, variant)
     storeys = _storeys(use, building.levels, share)
     size = max((k for k in range(len(uses().uses[use].sizes)) if area_of(use, k) * storeys <= share), default=0)
     return plan_of(use, size, storeys, variant)
-
-
-def _home(levels: int, share: float, chance: np.random.Generator) -> str:
-    """Choose a home that fits the house and the place's part of it, by how common they are."""
-    known = uses()
-    smallest = area_of(known.homes[0], 0)
-    options = [
-        name
-        for name in known.homes
-        if area_of(name, 0) * known.uses[name].storeys <= max(share, smallest)
-        and known.uses[name].least_storeys <= max(levels, 1)
-    ]
-    weights = np.array([known.uses[name].home for name in options], float)
-    return options[int(chance.choice(len(options), p=weights / weights.sum()))]
 
 
 def _storeys(use: str, levels: int, share: float) -> int:

@@ -25,7 +25,7 @@ Names = tuple[str, ...]
 
 
 class Condition(DataRecord):
-    """What a tag's value has to be, beside equal to something.
+    """Condition on a tag's value, other than being equal to something.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class FinerKind(DataRecord):
         value = next((tags[key] for key in self.by if key in tags), "")
         return (self.models[value],) if value in self.models else None
 
-    def named(self) -> Iterable[str]:
+    def every_model(self) -> Iterable[str]:
         """All models that this may lead to."""
         single = (self.model,) if isinstance(self.model, str) else self.model or ()
         return (*single, *self.models.values())
@@ -164,7 +164,7 @@ class Standing(DataRecord):
 
 
 class PlantMix(DataRecord):
-    """What is planted along streets and grows in woods of a climate; what comes twice is twice as common."""
+    """Plants along streets and in woods of a climate; a plant that comes twice is twice as common."""
 
     streets: Names = Field(min_length=1)
     woods: Names = Field(min_length=1)
@@ -204,7 +204,7 @@ class Barriers(DataRecord):
 
 @dataclass(frozen=True)
 class Kinds:
-    """What tags lead to.
+    """Models that tags lead to.
 
     Attributes
     ----------
@@ -243,7 +243,7 @@ def kinds() -> Kinds:
     finer: dict[str, tuple[FinerKind, ...]] = {}
     for path, finer_file in reversed(_read("finer", _FinerFile)):
         for k, entry in enumerate(finer_file.finer):
-            _check(path, [(f"finer.{k}.of", entry.of), *((f"finer.{k}.model", model) for model in entry.named())])
+            _check(path, [(f"finer.{k}.of", entry.of), *((f"finer.{k}.model", model) for model in entry.every_model())])
             finer[entry.of] = (*finer.get(entry.of, ()), entry)
     return Kinds(tuple(tables), finer)
 

@@ -1,4 +1,4 @@
-"""Things that photos show: where they stand, which of them the map knows already, and who is right about that.
+"""Things that photos show: where they stand, which of them the map knows already, and which source is right.
 
 What the classes of detectors stand for, and the rules by which they are placed, are data, read once. Photos of one
 thing are found together with its place. Candidates are where rays of two photos cross, and where a ray through the foot
@@ -53,7 +53,7 @@ class Rules(DataRecord):
 
 
 class DetectedClass(DataRecord):
-    """What a class stands for.
+    """Meaning of a class of detections.
 
     Attributes
     ----------
@@ -139,12 +139,12 @@ class Rays:
     score: Floats
     photo: NDArray[np.int64]
 
-    def taken(self, which: NDArray[np.bool_]) -> Rays:
+    def select(self, which: NDArray[np.bool_]) -> Rays:
         """Return some of them."""
         return Rays(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def agreeing_places(rays: Rays, rules: Rules) -> list[tuple[Floats, list[int]]]:
+def _agreeing_places(rays: Rays, rules: Rules) -> list[tuple[Floats, list[int]]]:
     """Return places and the rays that agree on each, most agreed first; every ray is in one of them."""
     candidates = _candidates(rays, rules)
     agrees = _agreement(candidates, rays, rules)
@@ -284,8 +284,8 @@ class LocatedThing:
     how: str
 
 
-def locate_things(found: Detections, height: HeightField, classes: Classes) -> tuple[list[LocatedThing], list[Dropped]]:
-    """Return the things that a file of detections tells of, and what of it is left out, with the reason.
+def _locate(found: Detections, height: HeightField, classes: Classes) -> tuple[list[LocatedThing], list[Dropped]]:
+    """Return the things in a file of detections, and those that are left out, with the reason.
 
     Parameters
     ----------
@@ -343,16 +343,19 @@ def _of_class(
             for k in np.flatnonzero(floating).tolist()
         ]
         sightings = [sightings[k] for k in np.flatnonzero(~floating).tolist()]
-        rays = rays.taken(~floating)
+        rays = rays.select(~floating)
     alone: list[int] = []
-    for xy, members in agreeing_places(rays, rules):
+    for xy, members in _agreeing_places(rays, rules):
         few = len(members) < (rules.raised_photos if raised else 2)
         if few:
             alone += members
             continue
         side = lateral_offsets(rays, members, xy)
         spread = round(float(np.sqrt((side**2).mean())), 3)
-        spots.append(_located_thing(sightings, members, name, xy, spread, "triangulated"))
+        taken = [sightings[k] for k in sorted(members)]
+        score = round(sum(one.score for one in taken) / len(taken), 3)
+        photos = tuple(one.photo for one in taken)
+        spots.append(LocatedThing(taken[0].id, name, np.round(xy, 3), photos, score, spread, "triangulated"))
     for k in alone:
         spot, reason = _alone(sightings[k], rays, k, raised, name, rules)
         if spot is not None and any(math.dist(spot.xy, other.xy) < rules.apart for other in spots):
@@ -362,14 +365,6 @@ def _of_class(
         else:
             spots.append(spot)
     return spots, dropped
-
-
-def _located_thing(
-    sightings: Sequence[Sighting], members: Sequence[int], name: str, xy: Floats, spread: float | None, how: str
-) -> LocatedThing:
-    taken = [sightings[k] for k in sorted(members)]
-    score = round(sum(one.score for one in taken) / len(taken), 3)
-    return LocatedThing(taken[0].id, name, np.round(xy, 3), tuple(one.photo for one in taken), score, spread, how)
 
 
 def _alone(one: Sighting, rays: Rays, k: int, raised: bool, name: str, rules: Rules) -> tuple[LocatedThing | None, str]:
@@ -419,7 +414,7 @@ def _to_the_ground(one: Sighting, height: HeightField, reach: float) -> tuple[fl
     return distance, ROUGH + (distance**2 + drop**2) / drop * _TILT
 
 
-def merge_nearby(spots: Sequence[LocatedThing], apart: float) -> tuple[list[LocatedThing], list[Dropped]]:
+def _merge_nearby(spots: Sequence[LocatedThing], apart: float) -> tuple[list[LocatedThing], list[Dropped]]:
     """Return things of which no two of a class are nearer than `apart`; the one that more photos show stays."""
     kept: list[LocatedThing] = []
     dropped: list[Dropped] = []
@@ -434,7 +429,7 @@ def merge_nearby(spots: Sequence[LocatedThing], apart: float) -> tuple[list[Loca
 
 @dataclass(frozen=True)
 class DetectedThings:
-    """What detections change about the map that outdoor objects are made of.
+    """Changes by detections to the map that outdoor objects are made of.
 
     Attributes
     ----------
@@ -484,8 +479,8 @@ def things_from_detections(osm: OsmData, found: Detections, height: HeightField,
         As for `objects_from_osm`: decides between models that suit equally well.
     """
     classes = detected_classes()
-    spots, dropped = locate_things(found, height, classes)
-    spots, twins = merge_nearby(spots, classes.rules.apart)
+    spots, dropped = _locate(found, height, classes)
+    spots, twins = _merge_nearby(spots, classes.rules.apart)
     nodes = [OsmNode(-k - 1, spot.xy, classes.by_name[spot.name.lower()].tags) for k, spot in enumerate(spots)]
     alone = replace(osm, nodes=nodes, ways=[], areas=[])
     wishes = {wish.id: wish for wish in mapped_placements(alone, height, seed)}
@@ -514,7 +509,7 @@ def _match_by_rules(
     rules: Rules,
     dropped: list[Dropped],
 ) -> DetectedThings:
-    """Decide by the rules who is right about each; only what the map has as a point can be moved."""
+    """Decide by the rules which source is right about each; only mapped points can be moved."""
     partner = _partners(seen, known, rules.same)
     new: list[OsmNode] = []
     moved: dict[int, Floats] = {}

@@ -242,7 +242,7 @@ def _blocks(key: str, shape: BaseGeometry, tall: float | None) -> list[Placement
     return found
 
 
-def gate_yaws(osm: OsmData) -> dict[int, float]:
+def _gate_yaws(osm: OsmData) -> dict[int, float]:
     """Which way each gate leads through, by node id: across the barrier it hangs in, else along its way."""
     barriers: dict[int, float] = {}
     ways: dict[int, float] = {}
@@ -265,19 +265,15 @@ def gate_yaws(osm: OsmData) -> dict[int, float]:
 def mapped_placements(osm: OsmData, height: HeightField, seed: int) -> list[Placement]:
     """Wish for everything that is mapped as a point or as a row of trees."""
     zone = planting(osm, height)
-    return [*_point_placements(osm, seed, zone, region(osm)), *row_placements(osm, seed, zone)]
-
-
-def _point_placements(osm: OsmData, seed: int, zone: str, where: str) -> list[Placement]:
-    """Wish for what is mapped as points."""
-    found: list[Placement] = []
-    gates = gate_yaws(osm)
+    where = region(osm)
+    points: list[Placement] = []
+    gates = _gate_yaws(osm)
     for node in osm.nodes:
         with drop_on_failure(f"n{node.id}"):
             wish = _point_placement(node, seed, zone, where, gates.get(node.id))
             if wish is not None:
-                found.append(wish)
-    return found
+                points.append(wish)
+    return [*points, *row_placements(osm, seed, zone)]
 
 
 def _point_placement(node: OsmNode, seed: int, zone: str, where: str, gate: float | None) -> Placement | None:
@@ -335,7 +331,12 @@ def _of_area(
         names = ("cafe_parasol", "cafe_table") if tags.get("leisure") else ("picnic_table", "picnic_table")
         return _grid(area, names, (3.1, 3.1), 24, random)
     if tags.get("landuse") == "flowerbed" or tags.get("garden:type") == "flower_bed":
-        return _flower_bed(area, random)
+        inner = overlay.buffer(area.polygon, -0.35)
+        name = _BEDS[int(random.integers(3))]
+        return [
+            Placement(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0)
+            for k, xy in enumerate(blue_noise_points(inner, 1.7, 60, random, least=0.98))
+        ]
     if tags.get("leisure") == "playground":
         return _playground(area, played, random)
     if tags.get("leisure") == "pitch":
@@ -343,15 +344,6 @@ def _of_area(
     if tags.get("leisure") == "fitness_station":
         return [Placement(area.id, "fitness_station", _middle(area))]
     return _single(area, seed, where)
-
-
-def _flower_bed(area: OsmArea, random: np.random.Generator) -> list[Placement]:
-    inner = overlay.buffer(area.polygon, -0.35)
-    name = _BEDS[int(random.integers(3))]
-    return [
-        Placement(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0)
-        for k, xy in enumerate(blue_noise_points(inner, 1.7, 60, random, least=0.98))
-    ]
 
 
 def _middle(area: OsmArea) -> NDArray[np.float64]:
@@ -443,7 +435,7 @@ def _grid(
 
 
 def _playground(area: OsmArea, played: list[NDArray[np.float64]], random: np.random.Generator) -> list[Placement]:
-    """Equipment by the ground's size, unless somebody mapped it piece by piece."""
+    """Return equipment by the ground's size, unless it is mapped piece by piece."""
     shape = area.polygon
     if any(shape.contains(shapely.Point(xy)) for xy in played):
         return []
@@ -487,7 +479,8 @@ def _pitch(area: OsmArea) -> list[Placement]:
 SPACING = 28.0
 _APART = 20.0
 # Metres between the kerb and a lamp, and how far from a street's middle a kerb is looked for.
-_BESIDE_KERB, _WIDEST = 0.6, 16.0
+_BESIDE_KERB = 0.6  # metres from the kerb to a lamp
+_WIDEST = 16.0  # metres from the middle of a way within which its kerb is looked for
 # Where nothing says whether a street is lit, it is where houses stand this near, metres.
 _TOWN = 45.0
 _REACH = 2.4

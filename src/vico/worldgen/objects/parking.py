@@ -48,13 +48,19 @@ _HABIT = ("residential", "unclassified", "tertiary")  # where people park though
 _HABIT_DEPTH = 2.1  # metres
 _HABIT_ROOM = 3.0  # metres of carriageway for a lane beside parked cars
 _BUMPER = 0.09  # metres that a car leaves to the ends of its bay
-_WALL, _THING, _WALKER = 0.3, 0.15, 0.45  # metres to walls, things and the lines that walkers follow
+_WALL = 0.3  # metres to walls
+_THING = 0.15  # metres to things
+_WALKER = 0.45  # metres to the lines that walkers follow
 _JUNCTION = 2.0  # beyond where lines are painted: 5 m from the corner in all
-_CROSSING, _HYDRANT = 4.0, 5.0
-_STOP_BEFORE, _STOP_AFTER, _STOP_WIDE = 18.0, 6.0, 4.5  # metres of the lane about a bus stop
+_CROSSING = 4.0  # metres to crossings
+_HYDRANT = 5.0  # metres to hydrants and to the gates of garages
+_STOP_BEFORE = 18.0  # metres of the lane before a bus stop
+_STOP_AFTER = 6.0  # and after it
+_STOP_WIDE = 4.5  # metres, breadth of the strip that stays free there
 _RAIL = 1.8  # metres from a tram track's middle
 _STEEP = 0.06  # slope along a car on which it still stands level
-_LANE_REACH, _LANE_TURN = 6.5, 0.35
+_LANE_REACH = 6.5  # metres from a bay to the lane beside it
+_LANE_TURN = 0.35  # rad between the two at most
 
 
 class _Candidate(NamedTuple):
@@ -115,9 +121,21 @@ def parking_from_osm(
     found = [*_kerb_candidates(osm, streets, site.left_driving), *_lot_candidates(osm, streets)]
     if not found:
         return Parking(Objects.from_rows([]), [])
-    feet = _feet(found)
-    keep = _standing(found, feet, streets, osm.half) & _on_level_ground(found, height)
-    keep &= _clear(feet, _kept_free(osm, streets, lanes, transit, solids, objects))
+    # The ground that a car in each bay may take is shorter and narrower than the bay.
+    less = {"kerb": (0.3, -0.1), "across": (0.1, 0.1), "lot": (0.3, 0.1)}  # along the kerb mirrors stick out
+    sizes = [(one.bay.length - less[one.kind][0], one.bay.width - less[one.kind][1]) for one in found]
+    feet = np.asarray(
+        shapely.polygons([_rectangle(one.bay, *size) for one, size in zip(found, sizes, strict=True)]), object
+    )
+    # Bays at kerbs lie on the carriageway, others on car parks, all within the world.
+    within = np.abs(shapely.bounds(feet)).max(axis=1) < osm.half - 1.0
+    lot = np.array([one.kind == "lot" for one in found])
+    for shape, own in ((streets.carriageway, ~lot), (streets.parking, lot)):
+        shapely.prepare(shape)
+        within[own] &= shapely.covers(shape, feet[own])
+    keep = np.asarray(within, bool) & _on_level_ground(found, height)
+    for shapes, away in _kept_free(osm, streets, lanes, transit, solids, objects):
+        keep[shapely.STRtree(shapes).query(feet, predicate="dwithin", distance=max(away, 1e-6))[0]] = False
     chosen = _apart(np.flatnonzero(keep), feet)
     entity = max([FIRST_OBJECT - 1, *objects.entity[objects.entity < FIRST_STOP].tolist()]) + 1
     rows, spots = [], []
@@ -155,35 +173,31 @@ def _kerb_candidates(osm: OsmData, streets: StreetPolygons, left_driving: bool) 
         if raised or not shapely.intersects(window, shapely.LineString(street.line)):
             continue
         with drop_on_failure(f"w{street.way}"):
-            yield from _along_street(street, tags, breaks, left_driving)
-
-
-def _along_street(street: Street, tags: Tags, breaks: BaseGeometry, left_driving: bool) -> Iterator[_Candidate]:
-    turned = tags.get("oneway") == "-1"
-    depths = {"left": street.parking_left, "right": street.parking_right}
-    free = street.width - street.parking_left - street.parking_right
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        depth = depths[side]
-        mapped = {"left": "right", "right": "left"}[side] if turned else side
-        if not depth:
-            if not _by_habit(street, _parking_tag(tags, mapped), free):
-                continue
-            depth = _HABIT_DEPTH
-            free -= depth
-        elif _for_loading(tags, mapped):
-            continue
-        against = not street.oneway and (side == "right" if left_driving else side == "left")
-        kind = "across" if is_perpendicular_parking(street, depth) else "kerb"
-        for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
-            if shapely.dwithin(breaks, shapely.Polygon(_rectangle(bay, bay.length, bay.width)), _JUNCTION):
-                continue
-            turn = math.pi if against and kind == "kerb" else 0.0
-            bay = bay._replace(yaw=math.remainder(bay.yaw + turn, 2 * math.pi))
-            yield _Candidate(f"w{street.way}.{side}.{k}", f"w{street.way}.{side}", kind, bay)
+            turned = tags.get("oneway") == "-1"
+            depths = {"left": street.parking_left, "right": street.parking_right}
+            free = street.width - street.parking_left - street.parking_right
+            for side, sign in (("left", 1.0), ("right", -1.0)):
+                depth = depths[side]
+                mapped = {"left": "right", "right": "left"}[side] if turned else side
+                if not depth:
+                    if not _by_habit(street, _parking_tag(tags, mapped), free):
+                        continue
+                    depth = _HABIT_DEPTH
+                    free -= depth
+                elif _for_loading(tags, mapped):
+                    continue
+                against = not street.oneway and (side == "right" if left_driving else side == "left")
+                kind = "across" if is_perpendicular_parking(street, depth) else "kerb"
+                for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
+                    if shapely.dwithin(breaks, shapely.Polygon(_rectangle(bay, bay.length, bay.width)), _JUNCTION):
+                        continue
+                    turn = math.pi if against and kind == "kerb" else 0.0
+                    bay = bay._replace(yaw=math.remainder(bay.yaw + turn, 2 * math.pi))
+                    yield _Candidate(f"w{street.way}.{side}.{k}", f"w{street.way}.{side}", kind, bay)
 
 
 def _by_habit(street: Street, said: str | None, free: float) -> bool:
-    """Whether people park at a kerb of which the map tells no parking lane."""
+    """Whether people park at a kerb without a mapped parking lane."""
     if said is not None or street.kind not in _HABIT or street.slanted or street.cycle_left or street.cycle_right:
         return False
     return free >= _HABIT_DEPTH + _HABIT_ROOM * max(street.lanes, 1)
@@ -209,27 +223,6 @@ def _rectangle(bay: Bay, length: float, width: float) -> NDArray[np.float64]:
     c, s = math.cos(bay.yaw), math.sin(bay.yaw)
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length / 2, width / 2)
     return np.asarray(bay.centre) + corners @ np.array([[c, s], [-s, c]])
-
-
-def _feet(found: Sequence[_Candidate]) -> NDArray[np.object_]:
-    """Ground that a car in each bay may take."""
-    less = {"kerb": (0.3, -0.1), "across": (0.1, 0.1), "lot": (0.3, 0.1)}  # along the kerb mirrors stick out
-    sizes = [(one.bay.length - less[one.kind][0], one.bay.width - less[one.kind][1]) for one in found]
-    return np.asarray(
-        shapely.polygons([_rectangle(one.bay, *size) for one, size in zip(found, sizes, strict=True)]), object
-    )
-
-
-def _standing(
-    found: Sequence[_Candidate], feet: NDArray[np.object_], streets: StreetPolygons, half: float
-) -> NDArray[np.bool_]:
-    """Which bays lie on the ground they should lie on, within the world."""
-    within = np.abs(shapely.bounds(feet)).max(axis=1) < half - 1.0
-    lot = np.array([one.kind == "lot" for one in found])
-    for shape, own in ((streets.carriageway, ~lot), (streets.parking, lot)):
-        shapely.prepare(shape)
-        within[own] &= shapely.covers(shape, feet[own])
-    return np.asarray(within, bool)
 
 
 def _on_level_ground(found: Sequence[_Candidate], height: HeightField) -> NDArray[np.bool_]:
@@ -289,13 +282,6 @@ def _stop_zones(transit: Transit, lanes: LaneGraph) -> list[BaseGeometry]:
     return zones
 
 
-def _clear(feet: NDArray[np.object_], kept: list[tuple[NDArray[np.object_], float]]) -> NDArray[np.bool_]:
-    clear = np.ones(len(feet), bool)
-    for shapes, away in kept:
-        clear[shapely.STRtree(shapes).query(feet, predicate="dwithin", distance=max(away, 1e-6))[0]] = False
-    return clear
-
-
 def _apart(chosen: NDArray[np.int64], feet: NDArray[np.object_]) -> NDArray[np.int64]:
     """Of bays that overlap (streets mapped in pieces, or twice), keep the first."""
     first, second = shapely.STRtree(feet[chosen]).query(feet[chosen], predicate="intersects")
@@ -331,7 +317,7 @@ def _car(one: _Candidate, seed: int, height: HeightField) -> dict[str, object] |
     ahead = np.array([math.cos(bay.yaw), math.sin(bay.yaw)])
     spare = min(max(bay.length - size[0] - 0.6, 0.0) / 2, 0.3)
     x, y = np.asarray(bay.centre) + ahead * random.uniform(-spare, spare)
-    turned = math.pi if one.kind != "kerb" and random.random() < 0.35 else 0.0  # who backs into a bay
+    turned = math.pi if one.kind != "kerb" and random.random() < 0.35 else 0.0  # share of cars that back into a bay
     return {
         "id": f"parked.{one.id}",
         "kind": CAR,

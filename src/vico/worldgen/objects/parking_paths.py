@@ -30,24 +30,37 @@ from vico.worldgen.facts.streets import StreetPolygons
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_LENGTH, _WIDTH, _WHEELBASE, _LONGEST_WHEELBASE = 4.7, 1.9, 2.78, 3.1  # m, of the largest car that parks
+_LENGTH = 4.7  # m, of the largest car that parks
+_WIDTH = 1.9  # m
+_WHEELBASE = 2.78  # m
+_LONGEST_WHEELBASE = 3.1  # m
 _AIR = 0.12  # m between a car on its way and anything that stands
 _DISCS = np.array([-1.76, -0.59, 0.59, 1.76])  # m from a car's middle: four discs cover it ...
 _DISC = 1.12  # ... of this radius
 _AXLES = np.array([-_WHEELBASE / 2, _WHEELBASE / 2])
-_CELL, _AROUND = 0.25, 32.0  # m: of the raster, and about a car park's bays
-_STEP, _TURN = 1.5, math.pi / 12  # m and rad from pose to pose: bends of 5.7 m radius
+_CELL = 0.25  # m, of the raster
+_AROUND = 32.0  # m about a car park's bays
+_STEP = 1.5  # m from pose to pose
+_TURN = math.pi / 12  # rad from pose to pose: bends of 5.7 m radius
 _RADIUS = _STEP / _TURN
-_PLACE, _HEADINGS, _LAYERS = 0.75, 24, 64  # lattice: metres, headings; steps of the search
+_PLACE = 0.75  # m, cells of the lattice of poses
+_HEADINGS = 24  # of the lattice, to a full turn
+_LAYERS = 64  # steps of the search at most
 _LEAST_RADIUS = 4.8  # m, where two poses are joined
-_BENDS, _STRAIGHT = (5.2, 6.0), (1.5, 2.2, 3.0, 4.0)  # m: radii into a bay, and straight on before it
+_BENDS = (5.2, 6.0)  # m, radii into a bay
+_STRAIGHT = (1.5, 2.2, 3.0, 4.0)  # m straight on before it
 _BACK = _LONGEST_WHEELBASE + 0.9  # m straight back in the aisle, so that both axles have left the bend
 _LANE_BAND = 1.2  # m to each side of a lane's middle that a way keeps off, but of the lane it begins or ends on
-_FROM_START, _TO_END, _EVERY, _SHORTEST = 14.0, 22.0, 2.0, 40.0  # m of a lane, its beginning and its end
-_NEAR, _NEAR_TURN = 0.7, 0.2  # m and rad between a bend's end and a pose that was reached
+_FROM_START = 14.0  # m from a lane's beginning to the first pose on it
+_TO_END = 22.0  # m from the last pose to its end
+_EVERY = 2.0  # m from pose to pose on a lane
+_SHORTEST = 40.0  # m, of a lane that is used
+_NEAR = 0.7  # m between a bend's end and a pose that was reached
+_NEAR_TURN = 0.2  # rad between the two
 _JOINED = 14  # poses that are joined by one curve, at most
 _TRIES = 10  # ways tried for a spot, in and out
-_STEEPEST, _LEVEL = 0.2, 1.0  # slope of a way; m that a lane may lie above or below the ground
+_STEEPEST = 0.2  # slope of a way
+_LEVEL = 1.0  # m that a lane may lie above or below the ground
 _BESIDE = 7.0  # m beside car parks and drives that are open for a way where the map has none
 
 
@@ -72,7 +85,7 @@ class _Lanes(NamedTuple):
 
 @dataclass(frozen=True)
 class _Raster:
-    """What stands about a car park, and where one may drive; cells of `_CELL` from a corner on."""
+    """Obstacles about a car park, and drivable ground; cells of `_CELL` from a corner on."""
 
     corner: Floats
     clearance: Floats
@@ -183,7 +196,7 @@ def _raster(
     x = corner[0] + (np.arange(shape[0])[:, None] + 0.5) * _CELL + np.zeros(shape)
     y = corner[1] + (np.arange(shape[1])[None, :] + 0.5) * _CELL + np.zeros(shape)
 
-    def covered(shapes: Sequence[BaseGeometry]) -> NDArray[np.bool_]:
+    def cover(shapes: Sequence[BaseGeometry]) -> NDArray[np.bool_]:
         found = np.zeros(shape, bool)
         for area in (overlay.intersection(one, window) for one in shapes):
             if area.is_empty:
@@ -206,10 +219,10 @@ def _raster(
     lane = np.zeros(shape, np.int32)
     for k, line in enumerate(ground.lane_lines):
         if line.intersects(window):
-            inside = covered([overlay.buffer(line, _LANE_BAND, cap_style="flat")])
+            inside = cover([overlay.buffer(line, _LANE_BAND, cap_style="flat")])
             lane[inside] = k + 1
-    clearance = distance_transform_edt(~covered([*ground.near(window), *cars])) * _CELL
-    return _Raster(corner, np.asarray(clearance, np.float64), covered(driven), lane)
+    clearance = distance_transform_edt(~cover([*ground.near(window), *cars])) * _CELL
+    return _Raster(corner, np.asarray(clearance, np.float64), cover(driven), lane)
 
 
 def _lanes_about(ground: _Surroundings, box: tuple[float, float, float, float]) -> _Lanes:
@@ -327,8 +340,8 @@ def _bends(spot: ParkingSpot) -> Iterator[Floats]:
                 yield np.concatenate([[[x, y]], arc])
 
 
-def _outlines(line: Floats) -> NDArray[np.object_]:
-    """Return outlines of a car whose axles follow a line, from the line's start to its end."""
+def _touches(things: shapely.STRtree, line: Floats) -> bool:
+    """Return whether a car whose axles follow a line touches anything."""
     path = shapely.LineString(line)
     back = np.arange(0.0, max(path.length - _WHEELBASE, 0.0) + 0.5, 0.5)
     rear = shapely.get_coordinates(shapely.line_interpolate_point(path, back))
@@ -337,12 +350,7 @@ def _outlines(line: Floats) -> NDArray[np.object_]:
     middle = (front + rear) / 2
     a, b = _LENGTH / 2 + _AIR, _WIDTH / 2 + _AIR
     outlines = [_corners(x, y, h, a, b) for (x, y), h in zip(middle.tolist(), yaw.tolist(), strict=True)]
-    return np.asarray(shapely.polygons(np.array(outlines)), object)
-
-
-def _touches(things: shapely.STRtree, line: Floats) -> bool:
-    """Return whether a car whose axles follow a line touches anything."""
-    return bool(things.query(_outlines(line), predicate="intersects").size)
+    return bool(things.query(np.asarray(shapely.polygons(np.array(outlines)), object), predicate="intersects").size)
 
 
 @dataclass(frozen=True)

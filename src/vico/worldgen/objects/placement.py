@@ -100,11 +100,7 @@ class PreparedArea:
     def edges(self, around: BaseGeometry) -> list[BaseGeometry]:
         """Return the pieces of the outline within a small area, each in one piece."""
         found = self._runs.geometries[np.sort(self._runs.query(around, predicate="intersects"))]
-        return _pieces(overlay.intersection(found, around)) if len(found) else []
-
-
-def _pieces(lines: Sequence[BaseGeometry]) -> list[BaseGeometry]:
-    return list(shapely.get_parts(overlay.union_all(lines)))
+        return list(shapely.get_parts(overlay.union_all(overlay.intersection(found, around)))) if len(found) else []
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is there before things are put up.
+    """Surroundings that are there before objects are placed.
 
     Attributes
     ----------
@@ -311,7 +311,7 @@ def _facing(wish: Placement, site: FreeSpace, random: np.random.Generator) -> fl
         yaw = free
     elif shapely.contains(site.carriageway.shape, point):
         yaw += math.pi
-    # Signals look along the street, against those who drive on their side; lamps reach over it.
+    # Signals face the traffic on their side of the street; lamps reach over it.
     return yaw + math.pi / 2 if name.startswith(standing().facing_along) else yaw
 
 

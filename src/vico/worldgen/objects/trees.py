@@ -40,12 +40,14 @@ _MOWN = {
     "leisure": ("park", "garden", "golf_course", "pitch"),
     "natural": ("grassland", "heath", "scree", "bare_rock", "cliff"),
 }
-# Rise per metre from which nobody mows, and side of the cells it is measured in, metres; square metres that a plant has
-# there, and the share of shrubs.
-_STEEP, _STEEP_CELL, _WILD_ROOM, _SHRUBS = 0.25, 10.0, 55.0, 0.6
+_STEEP = 0.25  # rise per metre from which nothing is mown
+_STEEP_CELL = 10.0  # metres, side of the cells that it is measured in
+_WILD_ROOM = 55.0  # square metres that a plant has there
+_SHRUBS = 0.6  # share of shrubs there
 
-# The same on lawns: side of the cells, metres, the share in which something grows, and of that of shrubs.
-_LAWN_CELL, _LAWN_GROWN, _LAWN_SHRUBS = 11.0, 0.5, 0.25
+_LAWN_CELL = 11.0  # metres, side of the cells of lawns
+_LAWN_GROWN = 0.5  # share of them in which something grows
+_LAWN_SHRUBS = 0.25  # share of shrubs in what grows
 
 
 def climate(frame: LocalFrame, height: HeightField) -> str:
@@ -358,7 +360,7 @@ def _plant_area(
     wild = use in ("wood", "forest", "nature_reserve")
     there = int(shapely.contains(area.polygon, trunks).sum()) if len(trunks) else 0
     if not wild and there > 0.3 * ground.area / room[use]:
-        return found  # somebody mapped them
+        return found  # they are mapped one by one
     for k, xy in enumerate(blue_noise_points(ground, room[use], 260, random)):
         wish = tree_placement(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
         if use == "orchard":

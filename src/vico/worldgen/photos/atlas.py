@@ -19,7 +19,7 @@ from vico.io.compiled import compiled
 from vico.world.mesh import Material, Surface
 
 
-def plane_axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _plane_axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Right and up of planes as seen from outside: up is as near to the zenith as it gets."""
     up = np.array([0.0, 0.0, 1.0]) - normal * normal[:, 2:]
     level = np.linalg.norm(up, axis=1) < 1e-3
@@ -40,7 +40,7 @@ def plane_coordinates(
     return np.einsum("nkc,nc->nk", away, right[patch]), np.einsum("nkc,nc->nk", away, up[patch])
 
 
-def level_turns(
+def _level_turns(
     x: NDArray[np.float64], y: NDArray[np.float64], patch: NDArray[np.int64], plane: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Angles that lay the charts of flat roofs along their longer sides; walls and slopes stand as they are."""
@@ -63,7 +63,7 @@ def level_turns(
     return turn
 
 
-def pack_rectangles(cells: NDArray[np.int64], page: int) -> NDArray[np.int64]:
+def _pack_rectangles(cells: NDArray[np.int64], page: int) -> NDArray[np.int64]:
     """Place rectangles (width, height) on pages: page, x, y of each; the highest first, each as low as it goes."""
     order = np.lexsort((np.arange(len(cells)), -cells[:, 0], -cells[:, 1]))
     return _skyline(cells, order, page) if len(cells) else np.zeros((0, 3), np.int64)
@@ -106,7 +106,8 @@ _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
 _BEND = np.cos(np.radians(14.0))  # neighbouring faces that turn less than this share a chart ...
 _FLAT = 0.10  # ... if they stay this near its plane, metres
 _LEAST_AREA = 1.0  # square metres; smaller pieces are not worth a chart
-_THIN, _SPARSE = 0.4, 0.12  # metres of the shorter side, share of its rectangle: mouldings and rims, no faces
+_THIN = 0.4  # metres of the shorter side up to which a face is a moulding or a rim
+_SPARSE = 0.12  # and the share of its rectangle
 _UNDERSIDE = -0.9  # normals with a smaller z look at the ground
 _WELD = 1e-3  # metres
 
@@ -256,7 +257,7 @@ def unwrap(
     for layer in (False, True):
         mine = np.flatnonzero(roof[index] == layer)
         if len(mine):
-            places[mine] = pack_rectangles(cells[mine] + 2 * _GUTTER, page)
+            places[mine] = _pack_rectangles(cells[mine] + 2 * _GUTTER, page)
             places[mine, 0] += first
             first = int(places[mine, 0].max()) + 1
     charts = []
@@ -397,14 +398,14 @@ def _patches(surfaces: Sequence[Surface], layers: int) -> _Patches:
     # Degenerate slivers join no patch; `-1` indexes the spare last entry of tables by patch.
     n = len(seeds)
     plane = normal[seeds].reshape(-1, 3)
-    right, up = plane_axes(plane)
+    right, up = _plane_axes(plane)
     member = np.flatnonzero(label >= 0)
     patch = label[member]
     by_patch = np.argsort(patch, kind="stable")
     patch, member = patch[by_patch], member[by_patch]
     base = points[seeds, 0].reshape(-1, 3)
     flat_x, flat_y = plane_coordinates(points[member], patch, base, right, up)
-    turn = level_turns(flat_x, flat_y, patch, plane)
+    turn = _level_turns(flat_x, flat_y, patch, plane)
     right, up = (
         np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up,
         -np.sin(turn)[:, None] * right + np.cos(turn)[:, None] * up,

@@ -22,7 +22,7 @@ from vico.io.compiled import compiled
 from vico.threads import in_order
 from vico.world.mesh import Surface
 from vico.worldgen.facts.ray_casting import RayCaster
-from vico.worldgen.photos.atlas import Atlas, Chart, coverage, unwrap
+from vico.worldgen.photos.atlas import Atlas, coverage, unwrap
 
 _AT_ONCE = 1 << 17  # triangles
 
@@ -156,8 +156,10 @@ _BEHIND = 0.9  # metres behind the photographed wall from which the second ray s
 _LOW = 2.6  # metres above a wall's foot up to which what stands off it is a car or a person
 _FOOT = 1.5  # metres above a wall's foot up to which photogrammetry rounds it off into the ground
 _LEANS = 0.3  # how much more it looks up there than the wall does (z of the normals): it shows the ground's colours
-_GREEN, _GREENER = 26.0, 18.0  # excess green (2g - r - b) of leaves, and how much more than the wall's own
-_DARK, _DARKER = 14.0, 0.15  # luminance of holes in the photographs, and their share of the wall's own
+_GREEN = 26.0  # excess green (2g - r - b) of leaves
+_GREENER = 18.0  # how much more it is than the wall's own
+_DARK = 14.0  # luminance of holes in the photographs
+_DARKER = 0.15  # their share of the wall's own
 _FRINGE = 2  # texels around leaves that they still colour
 
 Progress = Callable[[int, int], None]
@@ -166,7 +168,7 @@ _Batch = tuple[int, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What a bake made.
+    """Result of a bake.
 
     Attributes
     ----------
@@ -192,7 +194,7 @@ class BakeResult:
 
 @dataclass(frozen=True)
 class _Expected:
-    """What the coarse bake tells of each chart: offset = a + b i + c j, its colours, and whether it is a wall."""
+    """Estimates of the coarse bake for each chart: offset = a + b i + c j, its colours, and whether it is a wall."""
 
     offset: NDArray[np.float64]
     luminance: NDArray[np.float64]
@@ -266,7 +268,12 @@ def bake(
     shares = coverage(coarse)
     pieces = coarse.pieces
     expected = _expectations(coarse, offsets, cage)
-    by_entity = _entity_coverage(coarse)
+    known: dict[int, int] = {}
+    inside: dict[int, int] = {}
+    for chart in coarse.charts:
+        known[chart.entity] = known.get(chart.entity, 0) + int(np.count_nonzero(coarse.known[chart.page][chart.box]))
+        inside[chart.entity] = inside.get(chart.entity, 0) + int(np.count_nonzero(coarse.inside[chart.page][chart.box]))
+    by_entity = {entity: known[entity] / max(inside[entity], 1) for entity in sorted(known)}
     patches = np.array([chart.patch for chart in coarse.charts], np.int64)
     wanted = np.zeros(pieces, np.bool_)
     wanted[patches[(shares >= least) & (shares > 0)]] = True
@@ -275,16 +282,14 @@ def bake(
     chart_of = np.zeros(pieces, np.int64)
     chart_of[patches] = np.arange(len(patches))
     old = chart_of[[chart.patch for chart in atlas.charts]]
-    scale = np.array([_scale(coarse.charts[o], c) for o, c in zip(old, atlas.charts, strict=True)]).reshape(-1, 3)
+    # An offset's constant stays, its slopes change with the size of a texel.
+    ratios = [
+        np.linalg.norm(c.right) / np.linalg.norm(coarse.charts[o].right) for o, c in zip(old, atlas.charts, strict=True)
+    ]
+    scale = np.array([(1.0, float(ratio), float(ratio)) for ratio in ratios]).reshape(-1, 3)
     fine = _Expected(expected.offset[old] * scale, expected.luminance[old], expected.green[old])
     rays += _paint(atlas, fine, sight, photos, cage, progress=progress)
     return BakeResult(new_walls, new_roofs, atlas, by_entity, pieces, rays)
-
-
-def _scale(coarse: Chart, fine: Chart) -> tuple[float, float, float]:
-    """Factors of an offset's constant and slopes from one chart of a piece to another."""
-    ratio = float(np.linalg.norm(fine.right) / np.linalg.norm(coarse.right))
-    return 1.0, ratio, ratio
 
 
 def _batches(atlas: Atlas) -> Iterator[_Batch]:
@@ -497,12 +502,3 @@ def _expectations(atlas: Atlas, offsets: Sequence[NDArray[np.float32]], cage: fl
         expected.luminance[k] = np.median(0.299 * r + 0.587 * g + 0.114 * b)
         expected.green[k] = np.median(2 * g - r - b)
     return expected
-
-
-def _entity_coverage(atlas: Atlas) -> dict[int, float]:
-    known: dict[int, int] = {}
-    inside: dict[int, int] = {}
-    for chart in atlas.charts:
-        known[chart.entity] = known.get(chart.entity, 0) + int(np.count_nonzero(atlas.known[chart.page][chart.box]))
-        inside[chart.entity] = inside.get(chart.entity, 0) + int(np.count_nonzero(atlas.inside[chart.page][chart.box]))
-    return {entity: known[entity] / max(inside[entity], 1) for entity in sorted(known)}

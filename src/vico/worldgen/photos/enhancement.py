@@ -1,4 +1,4 @@
-"""What is made of an atlas once photos are on it: even light, filled holes, finer texels.
+"""Enhancement of an atlas with photos on it: even light, filled holes, finer texels.
 
 The sun that photos of walls were made in is found by the shadows the buildings cast, and taken out of the photos. A
 wall in the shade is dark in its photo, and a renderer would shade it once more. Which texels of clean buildings any
@@ -90,9 +90,12 @@ def _cut(values: NDArray[np.float32], axis: int, start: int) -> NDArray[np.float
 
 
 _LARGEST_PAGE = 8192
-_NEAR, _TRUSTED = 4, 0.5  # shreds of photo with fewer known texels than this share within a few texels are filled too
-_MOST_THREADS, _MOST_PAGES = 16, 4  # threads that hold a chart and its coarser levels each, or a page
-_TILE, _MARGIN = 1024, 16  # pixels an upscaler sees at a time, and how far they overlap
+_NEAR = 4  # texels around a shred of photo that are looked at
+_TRUSTED = 0.5  # share of known ones among them below which it is filled too
+_MOST_THREADS = 16  # that hold a chart and its coarser levels each
+_MOST_PAGES = 4  # threads that hold a page each
+_TILE = 1024  # pixels, side of what an upscaler sees at a time
+_MARGIN = 16  # pixels by which these overlap
 
 
 class Inpainter(Protocol):
@@ -446,7 +449,7 @@ def find_sun(atlas: Atlas, sight: RayCaster) -> Sun | None:
         for azimuth in np.radians(_AZIMUTHS)
     ]
 
-    def explained(sun: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def fit_brightness(sun: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         shine = _shine(points, normals, sun, sight)
         centred = _within(shine, group)
         spread = float(centred @ centred)
@@ -454,7 +457,7 @@ def find_sun(atlas: Atlas, sight: RayCaster) -> Sun | None:
         return (along * along / spread if spread > 1e-6 and along > 0.0 else 0.0), shine
 
     best: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
-    for sun, (share, shine) in zip(suns, in_order(explained, suns), strict=True):
+    for sun, (share, shine) in zip(suns, in_order(fit_brightness, suns), strict=True):
         if share > (0.0 if best is None else best[0]):
             best = share, sun, shine
     if best is None or not best[0] >= _LEAST_EXPLAINED * max(total, 1e-9):

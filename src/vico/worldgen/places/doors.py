@@ -186,7 +186,7 @@ class DoorFinder:
             if len(taken):
                 away = np.min(np.linalg.norm(doors.at[:, None] - taken[None], axis=2), axis=1)
                 cost = cost + np.maximum(0.0, 12.0 - away)
-        return self._made(at, doors, int(np.argmin(cost)))
+        return self._entrance_at(at, doors, int(np.argmin(cost)))
 
     def _front(self, at: int, part: shapely.Geometry, xy: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where a part of a building has its best door: on the outline it shares, else `xy`."""
@@ -217,7 +217,7 @@ class DoorFinder:
             chosen = chosen or self._entrance(at, xy, math.inf) or doors[0]
             self._through[chosen.id] += 1
             return chosen
-        chosen = free[0] if free else self._spaced(at, xy, taken)
+        chosen = free[0] if free else self._spaced_door(at, xy, taken)
         if chosen is None and doors:
             chosen = doors[0]
         if chosen is None:
@@ -226,7 +226,7 @@ class DoorFinder:
             taken[chosen.id] = chosen.position[:2]
         return chosen
 
-    def _spaced(self, at: int, xy: NDArray[np.float64], taken: dict[str, tuple[float, float]]) -> Entrance | None:
+    def _spaced_door(self, at: int, xy: NDArray[np.float64], taken: dict[str, tuple[float, float]]) -> Entrance | None:
         """Find the wall nearest to a point that is no other shop's; None where it is another street's, or far off."""
         doors = self._candidates(at)
         if not len(doors.at):
@@ -241,7 +241,7 @@ class DoorFinder:
             best = int(np.argmin(away))
             if not np.isfinite(away[best]):
                 return None
-        return self._made(at, doors, best)
+        return self._entrance_at(at, doors, best)
 
     def _entrance(self, at: int, xy: NDArray[np.float64], within: float) -> Entrance | None:
         """Find the door nearest to a point."""
@@ -252,9 +252,9 @@ class DoorFinder:
         best = int(np.argmin(away + 0.35 * doors.cost))
         if away[best] > within:
             return None
-        return self._made(at, doors, best)
+        return self._entrance_at(at, doors, best)
 
-    def _made(self, at: int, doors: _DoorSpots, k: int) -> Entrance:
+    def _entrance_at(self, at: int, doors: _DoorSpots, k: int) -> Entrance:
         """Return the entrance at a candidate, or the one that is there already."""
         building = self.buildings[at]
         for other in self._own[building.id]:

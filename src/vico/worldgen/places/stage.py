@@ -72,7 +72,7 @@ _FORMS = frozenset(_FORM_WORDS.split())
 
 @dataclass(frozen=True)
 class PlaceComparison:
-    """What comparing came to.
+    """Result of comparing places.
 
     Attributes
     ----------
@@ -193,13 +193,22 @@ class StreetAddresses:
     @cached_property
     def addresses(self) -> dict[str, str]:
         """Street and number by building: its own tags, else the address points in it."""
-        return _addresses(self._finder)
+        finder = self._finder
+        found: dict[str, str] = {}
+        for building in finder.buildings:
+            if text := _address(finder.tags_of(building)):
+                found[building.id] = text
+        for node in finder.osm.nodes:
+            text = _address(node.tags)
+            if text and (at := finder.building_at(node.xy, 1.5)) is not None:
+                found.setdefault(finder.buildings[at].id, text)
+        return found
 
     def nearest(self, xy: Sequence[float]) -> str | None:
         """Name of the street nearest to a point, None where no street has one."""
         return self._named[int(self._tree.nearest(shapely.Point(xy)))][0] if self._named else None
 
-    def invented(self, named: NamedPlace) -> NamedPlace:
+    def with_invented_name(self, named: NamedPlace) -> NamedPlace:
         """Give a place a name of our making: what it is, and the address of the building it is in."""
         at = self._finder.building_at(named.xy, MATCH)
         if at is None:
@@ -207,7 +216,7 @@ class StreetAddresses:
         building = self._finder.buildings[at]
         address = self.addresses.get(building.id)
         street = None if address else self.nearest(shapely.Polygon(building.footprint[0]).centroid.coords[0])
-        name = place_names().called(place_names().of(named.kind), where=address, street=street)
+        name = place_names().describe(place_names().of(named.kind), where=address, street=street)
         return replace(named, name=unused_name(name, self._used))
 
 
@@ -219,26 +228,14 @@ def unused_name(name: str, used: set[str]) -> str:
     return chosen
 
 
-def _addresses(finder: DoorFinder) -> dict[str, str]:
-    """Street and number by building: its own tags, else the address points in it."""
-    found: dict[str, str] = {}
-    for building in finder.buildings:
-        if text := _address(finder.tags_of(building)):
-            found[building.id] = text
-    for node in finder.osm.nodes:
-        text = _address(node.tags)
-        if text and (at := finder.building_at(node.xy, 1.5)) is not None:
-            found.setdefault(finder.buildings[at].id, text)
-    return found
-
-
 def _address(tags: Tags) -> str | None:
     street, number = tags.get("addr:street"), tags.get("addr:housenumber")
     return f"{street} {number.split(';')[0].split(',')[0]}" if street and number else None
 
 
 _LARGE_HOUSE = 4000.0  # square metres of floor above which a house has two stairways
-_HOMES_WANTED, _MOST_HOMES = 60, 240
+_HOMES_WANTED = 60  # homes that are enough for a place
+_MOST_HOMES = 240  # houses that are looked at for more homes
 
 
 def places_from_osm(
@@ -310,7 +307,7 @@ def _make_place(
         return named, reason
     named = told.refined.get(named.id, named)
     if not named.name:
-        named = streets.invented(named)
+        named = streets.with_invented_name(named)
     return named, finder.outdoors(named) if finder.is_outdoors(named) else finder.indoors(named)
 
 
@@ -352,7 +349,7 @@ def _homes(finder: DoorFinder, streets: StreetAddresses) -> list[Place]:
                 return
             where = address or tags.get("name")
             street = None if where else streets.nearest(door.position[:2])
-            name = place_names().called(place_names().home, where=where, street=street)
+            name = place_names().describe(place_names().home, where=where, street=street)
             homes.append(
                 Place(
                     id=f"{building.id}.home{k}",

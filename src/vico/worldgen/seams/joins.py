@@ -176,23 +176,20 @@ def blend_heights(fields: Mapping[Tile, HeightField], tile: Tile, grid: TileGrid
     heights = own.heights
     if any(field.heights.size > 4 or float(field.heights[0, 0]) for field in fields.values()):
         n = max(field.heights.shape[0] for field in fields.values())
-        heights = _blend_samples(fields, tile, grid, np.linspace(-own.half, own.half, n))
+        axis = np.linspace(-own.half, own.half, n)
+        total = np.zeros((len(axis), len(axis)))
+        weights = np.zeros_like(total)
+        for one, (wx, wy) in _weights(tile, grid, axis).items():
+            weight = wy[:, None] * wx[None, :]
+            rows, columns = np.nonzero(weight)
+            if not len(rows):
+                continue
+            away = [(a - b) * grid.size for a, b in zip(tile, one, strict=True)]
+            there = np.stack([axis[columns] + away[0], axis[rows] + away[1]], axis=1)
+            total[rows, columns] += weight[rows, columns] * fields[one].smooth(there)
+            weights += weight
+        heights = (total / weights).astype(np.float32)
     return replace(own, heights=heights, steps=_edges(fields, tile, grid))
-
-
-def _blend_samples(fields: Mapping[Tile, HeightField], tile: Tile, grid: TileGrid, axis: Floats) -> NDArray[np.float32]:
-    total = np.zeros((len(axis), len(axis)))
-    weights = np.zeros_like(total)
-    for one, (wx, wy) in _weights(tile, grid, axis).items():
-        weight = wy[:, None] * wx[None, :]
-        rows, columns = np.nonzero(weight)
-        if not len(rows):
-            continue
-        away = [(a - b) * grid.size for a, b in zip(tile, one, strict=True)]
-        there = np.stack([axis[columns] + away[0], axis[rows] + away[1]], axis=1)
-        total[rows, columns] += weight[rows, columns] * fields[one].smooth(there)
-        weights += weight
-    return (total / weights).astype(np.float32)
 
 
 def _weights(tile: Tile, grid: TileGrid, axis: Floats) -> dict[Tile, tuple[Floats, Floats]]:
@@ -258,7 +255,7 @@ KINDS = (
 )  # fmt: skip
 
 
-def join_streets(streets: Mapping[Tile, StreetPolygons], tile: Tile, grid: TileGrid) -> StreetPolygons:
+def _join_streets(streets: Mapping[Tile, StreetPolygons], tile: Tile, grid: TileGrid) -> StreetPolygons:
     """Return a tile's streets; near and beyond its borders they are its neighbours'.
 
     Within `STRIP` metres of a border they are those of the tile that comes first in the grid. So both sides cut the
@@ -292,24 +289,20 @@ def _zones(tile: Tile, grid: TileGrid) -> dict[Tile, BaseGeometry]:
     zones: dict[Tile, BaseGeometry] = {}
     around = grid.around(tile)
     for one in around:
-        claim = _reaching(one, tile, grid)
+        # A tile claims its square with the strip, and beyond the city's edge all that lies before it.
+        west, south, east, north = grid.box(one, wider=STRIP, seen_from=tile).bounds
+        far = 2 * grid.size
+        claim = shapely.box(
+            west - far * (one[0] == grid.first[0]),
+            south - far * (one[1] == grid.first[1]),
+            east + far * (one[0] == grid.last[0]),
+            north + far * (one[1] == grid.last[1]),
+        )
         zones[one] = overlay.intersection(overlay.difference(claim, claimed), window)
         claimed = overlay.union(claimed, claim)
     rest = overlay.difference(window, claimed)
     zones[tile] = overlay.union(zones[tile], rest)
     return {one: zone for one, zone in zones.items() if zone.area > 0}
-
-
-def _reaching(one: Tile, tile: Tile, grid: TileGrid) -> Polygon:
-    """Return a tile's square with the strip, and beyond the city's edge all that lies before it."""
-    west, south, east, north = grid.box(one, wider=STRIP, seen_from=tile).bounds
-    far = 2 * grid.size
-    return shapely.box(
-        west - far * (one[0] == grid.first[0]),
-        south - far * (one[1] == grid.first[1]),
-        east + far * (one[0] == grid.last[0]),
-        north + far * (one[1] == grid.last[1]),
-    )
 
 
 def _join_shapes(
@@ -364,7 +357,7 @@ class TilePlace:
 
 @dataclass(frozen=True)
 class JoinedTile:
-    """What of a tile's plan its neighbours have a say in."""
+    """Parts of a tile's plan that depend on its neighbours."""
 
     streets: StreetPolygons
     height: HeightField
@@ -387,7 +380,7 @@ def join_neighbours(
     around = grid.around(tile)
     height = blend_heights(dict(zip(around, heights, strict=True)), tile, grid)
     return JoinedTile(
-        join_streets(dict(zip(around, streets, strict=True)), tile, grid),
+        _join_streets(dict(zip(around, streets, strict=True)), tile, grid),
         crop_heights(height, half=grid.size / 2 + apron),
     )
 

@@ -1,4 +1,4 @@
-"""What the tiles of a city have, put together or cut to them: ground, streets, walkable map, road network.
+"""Data of a city's tiles, put together or cut to them: ground, streets, walkable map, road network.
 
 There is one field of heights, one set of street polygons and one walkable map of the whole city: the surfaces of its
 tiles, room to walls, and what is joined with what. The road network is cut to whole streets near a tile, in the
@@ -38,7 +38,7 @@ from vico.worldgen.seams.joins import KINDS, Tile, TileGrid, crop_heights
 
 @dataclass(frozen=True)
 class TileShape:
-    """What of a tile its city's streets depend on, in the tile's coordinates.
+    """Parts of a tile that its city's streets depend on, in the tile's coordinates.
 
     Attributes
     ----------
@@ -106,12 +106,16 @@ def write_ground(folder: Path, grid: TileGrid, levels_of: Callable[[Tile], Heigh
     stairs: list[Stairs] = []
     with ExitStack() as files:
 
-        def made(name: str, samples: int, kind: Any, fill: float = 0) -> NDArray[Any]:
+        def array(name: str, samples: int, kind: Any, fill: float = 0) -> NDArray[Any]:
             side = sides * (samples - 1) + 1
             return files.enter_context(new_array(folder / name, (side, side), kind, fill))
 
-        heights = made(SMOOTH, smooth, np.float32)
-        steps = [made(EDGE, stepped, np.int8, 127), made(LOW, stepped, np.int16), made(HIGH, stepped, np.int16)]
+        heights = array(SMOOTH, smooth, np.float32)
+        steps = [
+            array(EDGE, stepped, np.int8, 127),
+            array(LOW, stepped, np.int16),
+            array(HIGH, stepped, np.int16),
+        ]
         for tile in grid:
             levels = levels_of(tile)
             field, (x, y) = crop_heights(levels, half=grid.size / 2), grid.centre(tile)
@@ -143,7 +147,7 @@ def _put(whole: NDArray[Any], part: NDArray[Any], tile: Tile, grid: TileGrid) ->
     whole[j : j + side + 1, i : i + side + 1] = part
 
 
-#: Metres of room to walls that are told apart: more is as good as so much.
+#: Metres of room to walls that are distinguished: more counts as so much.
 MOST_ROOM = 16.0
 
 
@@ -318,17 +322,13 @@ class NetworkCutter:
         found = kept
         while found:
             links = (link for link in self._leaving(found) if link.get("to") in kept and link.get("via"))
-            found = {_edge(str(link.get("via"))) for link in links} - inside
+            found = {str(link.get("via")).rpartition("_")[0] for link in links} - inside
             inside |= found
         return inside | {edge for junction in known for edge in self._walked.get(str(junction), ())}
 
     def _leaving(self, edges: Iterable[Any]) -> list[Element]:
         """Return the connections that leave some edges, in the order of the file."""
         return [self._of("connection")[k] for k in sorted(k for name in edges for k in self._links_from.get(name, ()))]
-
-
-def _edge(lane: str) -> str:
-    return lane.rpartition("_")[0]
 
 
 def _box(edge: Element) -> tuple[float, float, float, float]:
@@ -339,7 +339,7 @@ def _box(edge: Element) -> tuple[float, float, float, float]:
 
 
 def _shift_element(element: Element, east: float, north: float) -> Element:
-    """Return a copy of an element and its children, told from another origin."""
+    """Return a copy of an element and its children with coordinates from another origin."""
     moved = Element(element.tag, dict(element.attrib))
     if "shape" in moved.attrib:
         moved.set(

@@ -26,6 +26,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geometry import arc_lengths, distance, distances, points_along
+from vico.world.opendrive import wrap_angle
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +37,8 @@ _PIECE = math.radians(7.0)  # most that a rounded line turns at one point
 _WOBBLE = 0.12  # metres off a line that are netconvert's, not the map's
 _LEVEL = 0.03  # metres that a point may be off the straight line between those beside it
 _JOINT = math.radians(8.0)  # at which a path through a junction is drawn anew
-_TURNS_BACK, _WIDE = math.radians(110.0), 12.0  # who turns back over more metres than this does so in several bends
+_TURNS_BACK = math.radians(110.0)
+_WIDE = 12.0  # metres: a way that turns back over more does so in several bends
 _SHORTEST = 0.3  # metres between the ends of a path that is worth a curve
 
 _LANE_WITH_LENGTH = re.compile(rb'<lane id="([^"]*)"([^>]*?) length="[^"]*"([^>]*?) shape="[^"]*"')
@@ -84,7 +86,7 @@ def round_corners(line: Floats, radius: float = _RADIUS) -> Floats:
     heading = np.arctan2(step[:, 1], step[:, 0])
     found = [line[:1]]
     for k in range(1, len(line) - 1):
-        turn = abs(_wrap_angle(float(heading[k] - heading[k - 1])))
+        turn = abs(wrap_angle(float(heading[k] - heading[k - 1])))
         if turn < _BEND:
             found.append(line[k : k + 1])
             continue
@@ -104,10 +106,6 @@ def _arc(start: Floats, corner: Floats, end: Floats, turn: float) -> Floats:
     """Return points of the curve from `start` to `end` that touches both sides of a corner."""
     t = np.linspace(0.0, 1.0, max(math.ceil(turn / _PIECE), 2) + 1)[:, None]
     return (1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end
-
-
-def _wrap_angle(angle: float) -> float:
-    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def _path(shape: str, *, inside: bool) -> _Path:
@@ -160,29 +158,21 @@ def _join(chain: list[str], paths: dict[str, _Path]) -> None:
     whole = np.concatenate([inner[0].line, *(path.line[1:] for path in inner[1:])])
     chord = distance(whole[-1], whole[0])
     start, end = _heading(before.line, -1), _heading(after.line, 0)
-    turn = abs(_wrap_angle(end - start))
+    turn = abs(wrap_angle(end - start))
     if chord < _SHORTEST or (turn > _TURNS_BACK and chord > _WIDE):
         return
     headings = [start, *np.arctan2(*np.diff(whole, axis=0)[np.hypot(*np.diff(whole, axis=0).T) > 0.01].T[::-1]), end]
-    if max(abs(_wrap_angle(b - a)) for a, b in pairwise(headings)) < _JOINT:
+    if max(abs(wrap_angle(b - a)) for a, b in pairwise(headings)) < _JOINT:
         return
     # So long are the handles of a curve that is nearly an arc.
     reach = chord * (2 / 3 * math.tan(turn / 4) / math.sin(turn / 2) if turn > 0.01 else 1 / 3)
     handles = whole[0] + reach * _unit(start), whole[-1] - reach * _unit(end)
     across = math.atan2(*(whole[-1] - whole[0])[::-1])
-    bends = abs(_wrap_angle(across - start)) + abs(_wrap_angle(end - across))
+    bends = abs(wrap_angle(across - start)) + abs(wrap_angle(end - across))
     t = np.linspace(0.0, 1.0, math.ceil((1.7 * bends + 0.4) / _PIECE) + 2)[:, None]
     curve = (1 - t) ** 3 * whole[0] + 3 * t * (1 - t) ** 2 * handles[0]
     curve += 3 * t**2 * (1 - t) * handles[1] + t**3 * whole[-1]
-    _share_out(curve, inner)
-
-
-def _unit(heading: float) -> Floats:
-    return np.array([math.cos(heading), math.sin(heading)])
-
-
-def _share_out(curve: Floats, inner: list[_Path]) -> None:
-    """Give the lanes of a way through a junction their parts of a curve, as long as they were."""
+    # Each lane gets its part of the curve, as long as it was.
     sizes = np.array([np.hypot(*np.diff(path.line, axis=0).T).sum() for path in inner])
     along = arc_lengths(curve)
     marks = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum() * along[-1]
@@ -192,14 +182,8 @@ def _share_out(curve: Floats, inner: list[_Path]) -> None:
         path.changed = True
 
 
-def _with_heights(line: Floats, heights: Floats) -> Floats:
-    """Return a line with its heights, and with more points where they would not do to tell them."""
-    size = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    profile = overlay.simplify(shapely.LineString(heights * [size, 1.0]), _LEVEL)
-    own = _shares_of_length(line)
-    at = np.union1d(own, shapely.get_coordinates(profile)[:, 0] / max(size, 1e-9))
-    at = at[np.r_[True, np.diff(at) * size > 0.01]]
-    return np.stack([*(np.interp(at, own, line[:, k]) for k in (0, 1)), np.interp(at, *heights.T)], axis=1)
+def _unit(heading: float) -> Floats:
+    return np.array([math.cos(heading), math.sin(heading)])
 
 
 def _write_lane(found: re.Match[bytes], paths: dict[str, _Path]) -> bytes:
@@ -209,7 +193,13 @@ def _write_lane(found: re.Match[bytes], paths: dict[str, _Path]) -> bytes:
         return found.group(0)
     points = path.line
     if path.heights is not None:
-        points = _with_heights(points, path.heights)
+        # Where the points of the line are too few for its heights, there are more.
+        size = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        profile = overlay.simplify(shapely.LineString(path.heights * [size, 1.0]), _LEVEL)
+        own = _shares_of_length(points)
+        at = np.union1d(own, shapely.get_coordinates(profile)[:, 0] / max(size, 1e-9))
+        at = at[np.r_[True, np.diff(at) * size > 0.01]]
+        points = np.stack([*(np.interp(at, own, points[:, k]) for k in (0, 1)), np.interp(at, *path.heights.T)], axis=1)
     shape = " ".join(",".join(f"{value:.3f}" for value in point) for point in points.tolist())
     length = max(float(np.hypot(*np.diff(path.line, axis=0).T).sum()), 0.1)
     return b'<lane id="%s"%s length="%.3f"%s shape="%s"' % (
@@ -218,11 +208,12 @@ def _write_lane(found: re.Match[bytes], paths: dict[str, _Path]) -> bytes:
 
 
 _BESIDE = 0.75  # metres from the kerb to the line that walkers follow
-_LEAST, _MOST = 0.2, 5.0  # metres that a line lies within the carriageway to be moved; beyond, something else is wrong
+_LEAST = 0.2  # metres that a line lies within the carriageway to be moved
+_MOST = 5.0  # metres beyond which something else is wrong
 _STEP = 4.0
 _WALL = 0.4  # metres from walls; where there is no room for a sidewalk beside the carriageway it stays where it is
 _ACROSS = 15.0  # metres at most from where a sidewalk lies to its place beside the lanes of its street
-_IN_LANES = 0.5  # share of a sidewalk's length in lanes from which on nobody walks there
+_IN_LANES = 0.5  # share of a sidewalk's length in lanes from which on it is closed
 _SAME_LEVEL = 3.0  # metres; farther above or below lie other streets
 
 _LANE_WITH_SHAPE = re.compile(rb'(<lane id="([^"]*)"[^>]*? shape=")([^"]*)(")')
@@ -231,7 +222,7 @@ _ALLOWED = re.compile(rb'(<lane id="([^"]*)"[^>]*? )allow="pedestrian"')
 
 @dataclass(frozen=True)
 class CarriagewayEdges:
-    """What says where sidewalks can be.
+    """Edges that limit where sidewalks can be.
 
     Attributes
     ----------
@@ -350,15 +341,9 @@ def _read(lane: Element) -> tuple[Floats, float]:
 def _shape_text(line: Floats, before: Floats) -> bytes:
     """Return a line as a shape, with heights where the line before had them."""
     if before.shape[1] > 2:
-        z = np.interp(_shares(line), _shares(before[:, :2]), before[:, 2])
+        z = np.interp(_shares_of_length(line), _shares_of_length(before[:, :2]), before[:, 2])
         return " ".join(f"{x:.3f},{y:.3f},{h:.3f}" for (x, y), h in zip(line, z, strict=True)).encode()
     return " ".join(f"{x:.3f},{y:.3f}" for x, y in line).encode()
-
-
-def _shares(line: Floats) -> Floats:
-    """How far along a line its points are, from 0 to 1."""
-    along = arc_lengths(line)
-    return along / max(float(along[-1]), 1e-9)
 
 
 def _offset(line: shapely.LineString, shift: float, out: float, walls: shapely.STRtree) -> shapely.LineString:

@@ -58,7 +58,8 @@ _OPTIONS = {
 }
 # netconvert needs under a second for 800 m of a dense city; this only ends a hang. For each km2 of larger ones:
 _LIMIT_SECONDS = 60
-_ABOVE_ALL, _PROFILE = 1e5, 10.0  # metres; between points of lanes on decks
+_ABOVE_ALL = 1e5  # metres above every surface
+_PROFILE = 10.0  # metres between points of lanes on decks
 # So many streets may be left out because netconvert refuses them.
 _MOST_REFUSED = 3
 
@@ -140,12 +141,12 @@ def road_network(
     binary = netconvert_binary()
     for _ in range(_MOST_REFUSED):
         try:
-            return _converted(binary, site, used, height, kerbs)
+            return _convert(binary, site, used, height, kerbs)
         except NetconvertError as error:
             culprit = _culprit(binary, site, used, height)
             leave_out(f"w{culprit}", f"{FAILED}: {error}")
             used = [street for street in used if street.way != culprit]
-    return _converted(binary, site, used, height, kerbs) if used else empty_network(osm.frame, osm.half)
+    return _convert(binary, site, used, height, kerbs) if used else empty_network(osm.frame, osm.half)
 
 
 def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None) -> int:
@@ -154,14 +155,14 @@ def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], he
     while bad - good > 1:
         middle = (good + bad) // 2
         try:
-            _converted(binary, site, streets[:middle], height)
+            _convert(binary, site, streets[:middle], height)
             good = middle
         except NetconvertError:
             bad = middle
     return streets[bad - 1].way
 
 
-def _converted(
+def _convert(
     binary: Path,
     site: SiteFacts,
     streets: Sequence[NetworkStreet],
@@ -199,10 +200,13 @@ def _converted(
             raise NetconvertError(
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
-        plain = smooth_lanes(_plain_net(net.read_bytes()))
+        # The comment at the head holds the time of generation, the paths and the options: equal roads give equal bytes
+        # without it and with a fixed date.
+        plain = smooth_lanes(_COMMENT.sub(b"", net.read_bytes()))
         if kerbs is not None:
             plain = move_sidewalks(plain, kerbs, left_driving=site.left_driving)
-        roads = repair_opendrive(_plain_xodr(xodr.read_bytes()), height)
+        content = _DATE.sub(rb'\1 date=""', _COMMENT.sub(b"", xodr.read_bytes()), count=1)
+        roads = repair_opendrive(content, height)
         return RoadNetwork(plain if height is None else _lay_lanes(plain, height), roads)
 
 
@@ -238,11 +242,8 @@ east="{half:.3f}" west="{-half:.3f}">
     return RoadNetwork(net.encode(), xodr.encode())
 
 
-def _plain_net(content: bytes) -> bytes:
-    """Without the comment that holds the time of generation, the paths and the options."""
-    return re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
-
-
+_COMMENT = re.compile(rb"<!--.*?-->\s*", re.DOTALL)
+_DATE = re.compile(rb'(<header [^>]*?) date="[^"]*"')
 _SHAPE = re.compile(rb'(<lane [^>]*? shape=")([^"]*)(")')
 
 
@@ -264,12 +265,6 @@ def _lay_lanes(content: bytes, height: HeightField) -> bytes:
     )
     texts = iter([" ".join(next(rows) for _ in shape).encode() for shape in shapes])
     return _SHAPE.sub(lambda found: found.group(1) + next(texts) + found.group(3), content)
-
-
-def _plain_xodr(content: bytes) -> bytes:
-    """Without the comment, and with a fixed date: equal roads give equal bytes."""
-    content = re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
-    return re.sub(rb'(<header [^>]*?) date="[^"]*"', rb'\1 date=""', content, count=1)
 
 
 def _types_xml() -> str:

@@ -31,10 +31,13 @@ SHORTEST = 0.5
 
 _ROOM = 0.3  # metres that a road through a junction has at least
 _TINY = 0.05  # metres of a curve that is left out
-_HOOK, _TURNS_BACK = 0.6, 1.5  # a last piece so short (metres) that turns so far (radians) is no part of a street
-_CORNER, _CUT = 0.02, 2.0  # radians at which two curves meet in a corner, and metres of each that rounding takes
+_HOOK = 0.6  # metres: a last piece so short that turns back is no part of a street
+_TURNS_BACK = 1.5  # radians
+_CORNER = 0.02  # radians at which two curves meet in a corner
+_CUT = 2.0  # metres of each that rounding takes
 _U_TURN = 2.0  # radians: from there on a road through a junction is drawn along its outer side
-_STATION, _LEVEL = 5.0, 0.02  # metres between heights, and that a height may be off the line between others
+_STATION = 5.0  # metres between heights
+_LEVEL = 0.02  # metres that a height may be off the line between others
 
 _End = tuple[str, bool]  # id of a street, and whether its end (else its start) is meant
 
@@ -82,7 +85,11 @@ def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes
     """
     root = fromstring(content, forbid_dtd=True)
     roads = {str(road.get("id")): road for road in root.findall("road")}
-    streets = {name: _street(road) for name, road in roads.items() if road.get("junction") == "-1"}
+    streets = {
+        name: _Street(road, reference_line(road), lane_borders(road, at_end=False))
+        for name, road in roads.items()
+        if road.get("junction") == "-1"
+    }
     turns = [turn for junction in root.findall("junction") for turn in _turns(junction, roads, streets)]
     joined = {end for turn in turns for end in ((turn.before, True), (turn.after, False))}
     for name, street in list(streets.items()):
@@ -103,7 +110,13 @@ def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes
         number = str(next(fresh)) if name in used else name
         used.add(number)
         ways[turn.junction].append(_way(turn, number, streets))
-        connections[turn.junction].append(_connection(turn, number, len(connections[turn.junction])))
+        own = connections[turn.junction]
+        connection = Element(
+            "connection", id=str(len(own)), incomingRoad=turn.before, connectingRoad=number, contactPoint="start"
+        )
+        for at, (one, _, _) in enumerate(turn.lanes):
+            connection.append(Element("laneLink", {"from": str(one), "to": str(-1 - at)}))
+        own.append(connection)
     _write_streets(streets, turns)
     for junction in root.findall("junction"):
         junction[:] = connections[str(junction.get("id"))]
@@ -112,10 +125,6 @@ def repair_opendrive(content: bytes, height: HeightField | None = None) -> bytes
 
 def _length(curves: Iterable[Curve]) -> float:
     return sum(curve.length for curve in curves)
-
-
-def _street(road: Element) -> _Street:
-    return _Street(road, reference_line(road), lane_borders(road, at_end=False))
 
 
 def _turns(junction: Element, roads: Mapping[str, Element], streets: Mapping[str, _Street]) -> Iterator[_Turn]:
@@ -248,7 +257,7 @@ def _lay(streets: Iterable[_Street], height: HeightField | None) -> None:
 
 
 def _simplify_profile(along: Floats, levels: Floats) -> list[int]:
-    """Return the points of a profile between which straight lines tell the others (Douglas and Peucker)."""
+    """Return the points of a profile between which straight lines come near the others (Douglas and Peucker)."""
     kept, open_ = {0, len(along) - 1}, [(0, len(along) - 1)]
     while open_:
         low, high = open_.pop()
@@ -319,13 +328,6 @@ def _blend(start: float, end: float, length: float) -> dict[str, str]:
     """Return the polynomial that goes smoothly from one value to another along a road."""
     c, d = 3 * (end - start) / length**2, -2 * (end - start) / length**3
     return {"a": f"{start:.3f}", "b": "0", "c": f"{c:.12g}", "d": f"{d:.12g}"}
-
-
-def _connection(turn: _Turn, number: str, k: int) -> Element:
-    connection = Element("connection", id=str(k), incomingRoad=turn.before, connectingRoad=number, contactPoint="start")
-    for at, (one, _, _) in enumerate(turn.lanes):
-        connection.append(Element("laneLink", {"from": str(one), "to": str(-1 - at)}))
-    return connection
 
 
 def _plan(plan: Element, curves: Sequence[Curve]) -> None:
@@ -401,19 +403,6 @@ def _write_file(root: Element, streets: Sequence[Element], ways: Sequence[Elemen
         controller.extend(one for one in given if one.get("signalId") in signals - known)
     kept = [*controllers.values(), *root.findall("junction")]
     root[:] = [header, *roads, *(element for element in kept if len(element))]
-    _set_bounds(header, roads)
-    geo = header.find("geoReference")
-    where = "" if geo is None else str(geo.text).strip()
-    if geo is not None:
-        geo.text = None
-    indent(root, "    ")
-    text = tostring(root, encoding="unicode")
-    text = text.replace("<geoReference />", f"<geoReference><![CDATA[{where}]]></geoReference>", 1)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
-
-
-def _set_bounds(header: Element, roads: Iterable[Element]) -> None:
-    """Set the header's bounds to the box around all roads with their lanes."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for road in roads:
         reach = max((abs(t) for pair in lane_borders(road, at_end=False).values() for t in pair), default=0.0)
@@ -423,3 +412,11 @@ def _set_bounds(header: Element, roads: Iterable[Element]) -> None:
     if np.isfinite(low).all():
         for name, value in zip(("west", "south", "east", "north"), (*low, *high), strict=True):
             header.set(name, f"{value:.3f}")
+    geo = header.find("geoReference")
+    where = "" if geo is None else str(geo.text).strip()
+    if geo is not None:
+        geo.text = None
+    indent(root, "    ")
+    text = tostring(root, encoding="unicode")
+    text = text.replace("<geoReference />", f"<geoReference><![CDATA[{where}]]></geoReference>", 1)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -162,24 +162,6 @@ class Strips:
             self.paved.setdefault(paving, []).extend(shapes)
 
 
-def strips_of(site: SiteFacts) -> Strips:
-    """Gather the strips of a map, without what lies under the ground or above a street."""
-    strips = Strips()
-    trams = [
-        LineString(way.line) for way in site.osm.ways if way.tags.get("railway") == "tram" and on_the_ground(way.tags)
-    ]
-    tram_tree = shapely.STRtree(trams)
-    for way in site.osm.ways:
-        if on_the_ground(way.tags) and not (way.closed and means_area(way.tags)) and way.id not in site.levels.above:
-            with drop_on_failure(f"w{way.id}"):
-                strips.add(_strips_of_way(way, tram_tree))
-    for area in site.osm.areas:
-        if on_the_ground(area.tags) and area.tags.get("building", "no") == "no":
-            with drop_on_failure(area.id):
-                strips.add(_strips_of_area(area))
-    return strips
-
-
 def _strips_of_way(way: OsmWay, trams: shapely.STRtree) -> Strips:
     """Return the strips of a way at ground level."""
     strips = Strips()
@@ -348,7 +330,8 @@ _KERB_RADIUS = 2.0
 #: Ground between paved surfaces that is narrower than this is paved, metres: lines that were drawn one by one leave it,
 #: and it would end in knives' points.
 _NARROW = 1.0
-_LEAST_GAP, _LEAST_CORNER = 0.02, 0.05  # square metres
+_LEAST_GAP = 0.02  # square metres
+_LEAST_CORNER = 0.05  # square metres
 _BESIDE = 0.05  # metres from a strip within which an outline is its edge
 #: How its outline is offset: right angles stay, what is more pointed is cut off.
 _BLUNT = {"join_style": "mitre", "mitre_limit": 1.5}
@@ -374,7 +357,20 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> Stre
     reach = site.osm.half + site.osm.margin
     window = shapely.box(-reach, -reach, reach, reach)
     solid = union_named(overlay_named(obstacles, overlay.make_valid), grid=_GRID) if len(obstacles) else MultiPolygon()
-    strips = strips_of(site)
+    # What lies under the ground or above a street has no strips.
+    strips = Strips()
+    trams = [
+        LineString(way.line) for way in site.osm.ways if way.tags.get("railway") == "tram" and on_the_ground(way.tags)
+    ]
+    tram_tree = shapely.STRtree(trams)
+    for way in site.osm.ways:
+        if on_the_ground(way.tags) and not (way.closed and means_area(way.tags)) and way.id not in site.levels.above:
+            with drop_on_failure(f"w{way.id}"):
+                strips.add(_strips_of_way(way, tram_tree))
+    for area in site.osm.areas:
+        if on_the_ground(area.tags) and area.tags.get("building", "no") == "no":
+            with drop_on_failure(area.id):
+                strips.add(_strips_of_area(area))
     driven = union_named(strips.drive, grid=_GRID)
     carriageway = _carriageway(driven, strips.through, solid, window)
     crossings = crossings_of(site.osm, carriageway, strips.streets, strips.crossings)

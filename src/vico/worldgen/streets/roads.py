@@ -44,7 +44,6 @@ SIDEWALK_WIDTH = 2.0
 MAX_LANES_EACH_WAY = 3
 _NO_SIDEWALK = {"motorway", "trunk", "service", "busway"}
 _PRIVATE = {"no", "private", "agricultural", "forestry", "military"}
-_MINOR_SERVICE = {"driveway", "parking_aisle", "drive-through", "emergency_access"}
 
 
 @dataclass(frozen=True)
@@ -356,7 +355,20 @@ def roads_from_osm(site: SiteFacts, streets: Sequence[NetworkStreet]) -> Roads:
         for i in range(1, len(street.nodes)):
             if i < len(street.nodes) - 1 and meeting[street.nodes[i]] < 2:
                 continue
-            road = _road(street, start, i, count)
+            road = Road(
+                id=f"w{street.way}.{street.part}.{count}",
+                osm_id=street.way,
+                name=street.name,
+                kind=street.kind,
+                line=[_point(p) for p in street.line[start : i + 1]],
+                width=street.width,
+                lanes=street.forward + street.backward,
+                oneway=street.drivable and street.backward == 0,
+                sidewalk=street.sidewalk,
+                speed=street.speed,
+                layer=-1 if street.closed == UNDERGROUND and street.layer >= 0 else street.layer,
+                closed=street.closed,
+            )
             roads.append(road)
             for k in (start, i):
                 places[street.nodes[k]] = _point(street.line[k])
@@ -374,23 +386,6 @@ def roads_from_osm(site: SiteFacts, streets: Sequence[NetworkStreet]) -> Roads:
         if len(meet) >= 3
     ]
     return Roads(roads=roads, junctions=junctions, crossings=_crossings(osm, streets))
-
-
-def _road(street: NetworkStreet, start: int, end: int, count: int) -> Road:
-    return Road(
-        id=f"w{street.way}.{street.part}.{count}",
-        osm_id=street.way,
-        name=street.name,
-        kind=street.kind,
-        line=[_point(p) for p in street.line[start : end + 1]],
-        width=street.width,
-        lanes=street.forward + street.backward,
-        oneway=street.drivable and street.backward == 0,
-        sidewalk=street.sidewalk,
-        speed=street.speed,
-        layer=-1 if street.closed == UNDERGROUND and street.layer >= 0 else street.layer,
-        closed=street.closed,
-    )
 
 
 def closed_roads(roads: Roads) -> list[Dropped]:

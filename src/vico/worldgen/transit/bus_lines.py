@@ -238,9 +238,9 @@ class Drive:
 
     def metres_round(self, loop: Sequence[Berth]) -> float:
         """Cost of a closed drive past berths but for turns on the spot, which are as long as they are."""
-        return self.round(loop) - (_U_TURN_COST * self.driven(loop)[1] if len(loop) > 1 else 0.0)
+        return self.round(loop) - (_U_TURN_COST * self.lanes_and_turns(loop)[1] if len(loop) > 1 else 0.0)
 
-    def driven(self, loop: Sequence[Berth]) -> tuple[set[int], int]:
+    def lanes_and_turns(self, loop: Sequence[Berth]) -> tuple[set[int], int]:
         """Lanes of a closed drive, and how often it turns on the spot."""
         lanes = [i for a, b in zip(loop, [*loop[1:], loop[0]], strict=True) for i in self.lanes_between(a, b)]
         return {berth.lane for berth in loop} | set(lanes), int(self.uturn[lanes].sum())
@@ -411,8 +411,9 @@ FIRST_DEPARTURE, LAST_DEPARTURE = 5 * 3600, 23 * 3600
 HEADWAY = (360.0, 600.0)
 
 # Share of a round kept at the first stop to make up for what was lost on the way, and the most seconds of it: longer
-# nobody is held up behind a bus that waits for its time.
-_LAYOVER_SHARE, _MOST_LAYOVER = 0.1, 60.0
+# no vehicle is held up behind a bus that waits for its time.
+_LAYOVER_SHARE = 0.1  # of a round, waited at its end
+_MOST_LAYOVER = 60.0  # seconds
 _BUSY = 1.17  # times as long a round takes with 60 cars in central Helsinki: so much time our own plans give it
 _JUNCTION_SECONDS = 6.0
 _SIGNAL_SECONDS = 12.0  # that a junction with signals costs

@@ -289,13 +289,14 @@ _RAILS = ("tram", "light_rail", "rail")
 _LEAST_TRACK = 90.0  # metres of track through the window worth a line
 _MOST_LINES = 3  # lines of a district, both ways each: with more, streets stand full of trams
 _STOP_REACH = 6.0  # metres between a track and a pole or platform of its own
-_FEED_REACH = 30.0
+FEED_REACH = 30.0  # metres from a stop of a timetable, whose places are rougher, to its track or lane
 _STOPS_APART = 60.0
 _SAME_TRACK = 4.0
 _EDGE = 3.0  # metres from the window's edge within which tracks lead out of it
 _FIRST, _LAST, _HEADWAY = 5 * 3600, 23 * 3600 + 1800, 600
 _STAGGER = 130  # seconds between the first trams of two lines
-_RUN_SHARE, _RUN_MORE = 1.15, 4.0  # what streets cost, a share and seconds a stretch
+_RUN_SHARE = 1.15  # what streets cost, a share
+_RUN_MORE = 4.0  # and seconds a stretch
 _COLOURS = {"tram": "#00985f", "light_rail": "#0098a1", "rail": "#8c4799"}
 _GAP = 1.0  # metres between where a tram's door is and where one waits
 _HEX = re.compile(r"#[0-9a-fA-F]{6}")
@@ -529,7 +530,7 @@ def _find_stops(route: _RailRoute, osm: OsmData, feeds: Sequence[Feed]) -> None:
     if not spots:
         poles = {s.id: s for feed in feeds for s in feed.stops}
         called = {s for pattern in _patterns(route, feeds) for s in pattern.stops}
-        spots = [(f"gtfs:{s}", poles[s].name, np.array(poles[s].xy), _FEED_REACH) for s in sorted(called)]
+        spots = [(f"gtfs:{s}", poles[s].name, np.array(poles[s].xy), FEED_REACH) for s in sorted(called)]
     found = []
     for key, name, xy, reach in spots:
         point = shapely.Point(xy)
@@ -562,7 +563,7 @@ def _tram_departures(route: _RailRoute, feeds: Sequence[Feed], travel: Sequence[
     track = shapely.LineString(route.line)
     for pattern in _patterns(route, feeds):
         near = [
-            (k, poles[s]) for k, s in enumerate(pattern.stops) if track.distance(shapely.Point(poles[s])) <= _FEED_REACH
+            (k, poles[s]) for k, s in enumerate(pattern.stops) if track.distance(shapely.Point(poles[s])) <= FEED_REACH
         ]
         along = [float(track.project(shapely.Point(xy))) for _, xy in near]
         if len(near) < 2 or not all(a < b for a, b in pairwise(along)):

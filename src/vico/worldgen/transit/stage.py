@@ -52,7 +52,15 @@ from vico.worldgen.transit.bus_lines import (
     timing,
     width_in_districts,
 )
-from vico.worldgen.transit.routes import NOT_ON_THE_MAP, Pole, Route, routes_from_gtfs, routes_from_osm, trams_from_osm
+from vico.worldgen.transit.routes import (
+    FEED_REACH,
+    NOT_ON_THE_MAP,
+    Pole,
+    Route,
+    routes_from_gtfs,
+    routes_from_osm,
+    trams_from_osm,
+)
 
 __all__ = [
     "BUS_LENGTH",
@@ -70,7 +78,8 @@ FIRST_STATION = 95_000
 
 _CAPACITY = 12
 _EACH = 40_000.0  # square metres of window for each planned station
-_FEWEST, _MOST = 2, 6
+_FEWEST = 2  # stations of shared bicycles
+_MOST = 6
 _APART = 80.0
 _INSIDE = 5.0  # metres from the window's edge
 _ASIDE = 2.2  # metres from the middle of a footway
@@ -169,7 +178,6 @@ def _off_the_lanes(lanes: LaneGraph, xy: NDArray[np.float64]) -> NDArray[np.floa
 
 
 _REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
-_FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
 _ILL = 6.0  # metres of drive that a metre off the pole is worth
 # Lines of a district; with more the buses of central Helsinki bring its cars to a stand. A city has as many an area.
 _MOST_LINES = 3
@@ -181,7 +189,7 @@ _LONG_WAIT = 75.0  # seconds for their time that buses may stand where others dr
 
 @dataclass(frozen=True)
 class _DrivenLine:
-    """A line that is driven: its names, its loop, who drives it, the sources' routes it stands for, and its delay.
+    """A line that is driven: its names, its loop, its drive, the sources' routes it stands for, and its delay.
 
     `later` is how many seconds after others its first bus leaves, where nobody says when it does.
     """
@@ -207,7 +215,7 @@ class _DrivenLine:
         )
 
     @property
-    def timed(self) -> bool:
+    def has_timetable(self) -> bool:
         """Whether the sources say when its buses leave the first stop."""
         return bool(self.departures) or (self.route is not None and self.route.interval is not None)
 
@@ -259,7 +267,7 @@ def transit_from_osm(
     if timed and any(line.route is not None and line.route.origin == "gtfs" for line in chosen):
         names = "osm and gtfs" if mapped else "gtfs"
     if all(len(line.loop) < MIN_STOPS for line in chosen):
-        # Routes that only cut a corner of the window take nobody anywhere: a round is planned beside them.
+        # Routes that only cut a corner of the window are of no use: a round is planned beside them.
         planned, source = _plan_round(site, kerbs, mapped, seed, least=MIN_STOPS if chosen else 2)
         if planned is not None:
             chosen = [planned, *chosen]
@@ -291,7 +299,8 @@ def transit_from_osm(
             leave_out(line.ids[0] if line.ids else name, f"{FAILED}: its stop {lost[0]} can't")
             continue
         with drop_on_failure(line.ids[0] if line.ids else name):
-            lines.append(_record(k, line, stops))
+            colour = line.route.colour if line.route else ""
+            lines.append(line_record(k, name, line.timing, line.drive, stops, colour))
     stations, racks = bike_stations(site, lanes, walks, height, seed)
     tram_stops, tram_lines, off_rails = trams_from_osm(
         site, height, solids=solids or [], feeds=feeds, first_entity=FIRST_STOP + len(kept)
@@ -340,11 +349,6 @@ def _stagger(chosen: Sequence[_DrivenLine]) -> list[_DrivenLine]:
     return [replace(line, later=_STAGGER * count) for line, count in zip(chosen, shared, strict=True)]
 
 
-def _record(number: int, line: _DrivenLine, stops: dict[Berth, Stop]) -> Line:
-    colour = line.route.colour if line.route else ""
-    return line_record(number, "/".join(line.names), line.timing, line.drive, stops, colour)
-
-
 def _mapped_berths(osm: OsmData, kerbs: Kerbs, left_out: list[Dropped]) -> list[Berth]:
     """Berths of the mapped bus stops; two poles that share a berth give one. Says which have no room to wait."""
     places = [(f"n{node.id}", node.xy, node.tags) for node in osm.nodes]
@@ -387,7 +391,7 @@ def _choose_driven_lines(
             if isinstance(fit, str):
                 left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
             else:
-                ways.append(fit[1].driven(fit[0]))
+                ways.append(fit[1].lanes_and_turns(fit[0]))
                 fits.append((route, *fit))
 
     def rank(k: int) -> tuple[bool, bool, bool, float, int]:
@@ -413,7 +417,7 @@ def _choose_driven_lines(
             names, ids = (*line.names, route.name), (*line.ids, route.id)
             chosen[twin] = replace(line, names=names, departures=tuple(times), ids=ids)
         elif ways[k][1] and (streets & ways[k][0] or _gap(route) < _round_seconds(kerbs.lanes, ways[k][0], loop)):
-            # Who turns on the spot reaches into the lane of who comes the other way: both would wait for ever.
+            # A bus that turns on the spot reaches into the opposite lane: two would wait for each other for ever.
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: has to turn where others drive"))
         elif (
             len(chosen) < most
@@ -440,7 +444,7 @@ def _goes_along(route: Route, loop: tuple[Berth, ...], line: _DrivenLine) -> boo
     """Whether a route can be driven as one with a chosen line: the same round, or without timetables a part of it."""
     if len(line.names) >= _MOST_NAMES or bool(route.departures) != bool(line.departures):
         return False
-    return line.loop == loop or (not line.timed and route.interval is None and set(loop) <= set(line.loop))
+    return line.loop == loop or (not line.has_timetable and route.interval is None and set(loop) <= set(line.loop))
 
 
 def _waiting_apart(chosen: Sequence[_DrivenLine], left_out: list[Dropped]) -> list[_DrivenLine]:
@@ -451,18 +455,18 @@ def _waiting_apart(chosen: Sequence[_DrivenLine], left_out: list[Dropped]) -> li
     no long wait (see `times`), and go anywhere.
     """
     brief = [line.timing.idle <= _LONG_WAIT for line in chosen]
-    ways = [line.drive.driven(line.loop)[0] for line in chosen]
+    ways = [line.drive.lanes_and_turns(line.loop)[0] for line in chosen]
 
     def start(k: int, kept: Sequence[int]) -> int:
         """Choose line k's stop in a lane of its own among these, best with a lane beside it; -1 if it has none."""
         others = {lane for i in kept if i != k for lane in ways[i]}
-        loop = chosen[k].loop[:1] if chosen[k].timed else chosen[k].loop
+        loop = chosen[k].loop[:1] if chosen[k].has_timetable else chosen[k].loop
         own = [n for n, berth in enumerate(loop) if brief[k] or berth.lane not in others]
         # Cars get past where they may change lanes.
         return min(own, key=lambda n: chosen[k].drive.lanes.left[loop[n].lane] < 0, default=-1)
 
     kept: list[int] = []
-    for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].timed, k)):
+    for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].has_timetable, k)):
         if all(start(i, [*kept, k]) >= 0 for i in [*kept, k]):
             kept.append(k)
             continue
@@ -488,7 +492,7 @@ def _fit_route(
 ) -> tuple[tuple[Berth, ...], Drive, float] | str:
     """Find a closed drive past a route's stops, there and back, else there and round; say why not if there is none."""
     drive = Drive(kerbs.lanes, route.way)
-    reach = _FEED_REACH if route.origin == "gtfs" else _REACH
+    reach = FEED_REACH if route.origin == "gtfs" else _REACH
     by_key = {berth.key: berth for berth in known}
 
     def choices(poles: Sequence[Pole]) -> list[list[tuple[float, Berth]]]:
@@ -514,7 +518,7 @@ def _fit_route(
         cost = drive.round(loop)
         if cost < best[0] and drive.metres_round(loop) < longest:
             best = (cost, loop)
-            if not drive.driven(loop)[1]:
+            if not drive.lanes_and_turns(loop)[1]:
                 break
     if not best[1]:
         return f"no closed drive of {longest / 1000:g} km past its stops"

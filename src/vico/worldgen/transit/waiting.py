@@ -30,7 +30,8 @@ _FROM_EDGE = (0.7, 0.35)
 # A waiting place is so near to the front door, metres: in bends a bus does not stand quite along its lane.
 _REACH = BUS_DOOR_REACH - 0.5
 # And so far from the bus's side and from walls.
-_FROM_BUS, _FROM_WALL = 0.8, 0.4
+_FROM_BUS = 0.8  # metres from a bus to those that wait
+_FROM_WALL = 0.4  # metres from walls to them
 # Buses stop where so much room is left there, square metres in one piece: for a few people.
 _LEAST_ROOM = 1.5
 # So far from the middle of a track.

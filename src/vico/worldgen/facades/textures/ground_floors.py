@@ -173,7 +173,7 @@ def _shelves(
 
 
 def _shops(random: np.random.Generator) -> Picture:
-    """Recent shop fronts: panes between slim piers, lights above a transom: who trades there, nobody says."""
+    """Recent shop fronts: panes between slim piers, lights above a transom; no trade is recognisable."""
     canvas = blocks(_PX, _W, random, 32, 64, (158, 155, 150))
     paints = ((58, 62, 66), (78, 52, 46), (50, 66, 60), (62, 58, 72), (104, 94, 76), (46, 56, 74), (70, 70, 68))
     for i in range(BAYS):
@@ -230,7 +230,7 @@ def _cafes(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _rusticated(random: np.random.Generator) -> Picture:
+def _rustication(random: np.random.Generator) -> Picture:
     """Grooved blocks over a plinth, windows in surrounds with keystones."""
     canvas = blocks(_PX, _W, random, 32, 128, (226, 223, 217))
     canvas.rect(0, 0, _W, 34, (158, 154, 150))
@@ -265,7 +265,7 @@ def _plain(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _shuttered(random: np.random.Generator) -> Picture:
+def _shutter(random: np.random.Generator) -> Picture:
     """Render with shuttered windows, stone frames and an iron grille now and then."""
     canvas = plaster(_PX, _W, random, (214, 210, 202))
     canvas.rect(0, 0, _W, 44, (188, 180, 168))
@@ -459,9 +459,9 @@ def _shed(random: np.random.Generator) -> Picture:
 GROUNDS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "ground_shops": _shops,
     "ground_cafes": _cafes,
-    "ground_rusticated": _rusticated,
+    "ground_rusticated": _rustication,
     "ground_plain": _plain,
-    "ground_shuttered": _shuttered,
+    "ground_shuttered": _shutter,
     "ground_stucco": _stucco,
     "ground_granite": _granite,
     "ground_brick": _brick_ground,
@@ -528,7 +528,10 @@ def paint_doors(random: np.random.Generator) -> NDArray[np.uint8]:
     _portal(canvas)
     _gate(canvas)
     for k in range(8):
-        _vitrine(canvas, k)
+        x, y = _corner(f"vitrine_{k}")
+        canvas.rect(x, y, x + 256, y + 256, (52, 50, 48))
+        show_window(canvas, x + 6, y + 6, x + 250, y + 250, kind=k % 4, lamp=0.95)
+        canvas.rect(x + 126, y + 6, x + 130, y + 250, (52, 50, 48))
     _plain_cells(canvas)
     return canvas.texture()
 
@@ -604,13 +607,6 @@ def _gate(canvas: Canvas) -> None:
         canvas.shade(x, y + k * 25.6, x + 256, y + k * 25.6 + 3, 0.7)
     canvas.shade(x, y + 246, x + 256, y + 256, 0.5)
     _handle(canvas, x + 126, y + 36, 6)
-
-
-def _vitrine(canvas: Canvas, k: int) -> None:
-    x, y = _corner(f"vitrine_{k}")
-    canvas.rect(x, y, x + 256, y + 256, (52, 50, 48))
-    show_window(canvas, x + 6, y + 6, x + 250, y + 250, kind=k % 4, lamp=0.95)
-    canvas.rect(x + 126, y + 6, x + 130, y + 250, (52, 50, 48))
 
 
 def _plain_cells(canvas: Canvas) -> None:

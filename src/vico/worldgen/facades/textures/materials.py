@@ -227,7 +227,7 @@ def _tiles(random: np.random.Generator) -> NDArray[np.uint8]:
     return canvas.texture()
 
 
-def _seamed(random: np.random.Generator) -> NDArray[np.uint8]:
+def _seams(random: np.random.Generator) -> NDArray[np.uint8]:
     size = 256
     canvas = Canvas(size, size, (214, 216, 216), random)
     canvas.noise(5, 5)
@@ -311,9 +311,9 @@ PAINTERS: dict[str, Callable[[np.random.Generator], NDArray[np.uint8]]] = {
     "blank_stone": lambda random: blocks(256, 256, random, 64, 128).texture(),
     "blank_boards": _blank_boards,
     "roof_tiles": _tiles,
-    "roof_metal": _seamed,
-    "roof_sheet": _seamed,
-    "roof_zinc": _seamed,
+    "roof_metal": _seams,
+    "roof_sheet": _seams,
+    "roof_zinc": _seams,
     "roof_slate": _slates,
     "roof_gravel": _gravel,
     "doors": paint_doors,

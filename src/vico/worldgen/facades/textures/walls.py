@@ -110,7 +110,7 @@ def _stone(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _arched(random: np.random.Generator) -> Picture:
+def _arches(random: np.random.Generator) -> Picture:
     """Sandstone with round-headed windows in mouldings and balustrades below them."""
     canvas = blocks(_H, _W, random, 16, 64, (218, 206, 188))
     trim = (232, 221, 204)
@@ -142,7 +142,7 @@ def _french(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _shuttered(random: np.random.Generator) -> Picture:
+def _shutters(random: np.random.Generator) -> Picture:
     """Southern or old-town plaster with louvred shutters and a little iron here and there."""
     canvas = plaster(_H, _W, random, (214, 211, 204))
     greens = ((96, 116, 96), (120, 108, 86), (104, 120, 132), (132, 96, 78))
@@ -180,7 +180,7 @@ def _alpine(random: np.random.Generator) -> Picture:
     return canvas.texture()
 
 
-def _timbered(random: np.random.Generator) -> Picture:
+def _timber_frame(random: np.random.Generator) -> Picture:
     """Half-timber: posts, rails and braces over white panels, small casements between."""
     canvas = plaster(_H, _W, random, (226, 220, 206))
     wood = np.array((88, 56, 40), np.float32)
@@ -474,11 +474,11 @@ WALLS: dict[str, Callable[[np.random.Generator], Picture]] = {
     "wall_tenement": _tenement,
     "wall_tenement_buff": lambda random: _tenement(random, (172, 146, 112), (206, 194, 172)),
     "wall_stone": _stone,
-    "wall_arched": _arched,
+    "wall_arched": _arches,
     "wall_french": _french,
-    "wall_shuttered": _shuttered,
+    "wall_shuttered": _shutters,
     "wall_alpine": _alpine,
-    "wall_timbered": _timbered,
+    "wall_timbered": _timber_frame,
     "wall_boards": _boards,
     "wall_ribbon": _ribbon,
     "wall_glass": _curtain,

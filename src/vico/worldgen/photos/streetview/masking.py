@@ -14,8 +14,10 @@ from vico.errors import MissingExtraError, MissingFileError
 from vico.worldgen.photos.streetview.matching import opencv
 
 _TALLEST = 3.4  # metres: a bus
-_PERSON, _VEHICLE = 2.0, 2.4  # metres: how high each reaches, at most
-_LEAST_TALL, _LEAST_WIDE = 0.5, 0.2  # metres: what is smaller is no person and no vehicle
+_PERSON = 2.0  # metres, height of people at most
+_VEHICLE = 2.4  # metres, height of vehicles at most
+_LEAST_TALL = 0.5  # metres: what is lower is no person and no vehicle
+_LEAST_WIDE = 0.2  # metres: nor what is narrower
 _CONTACT = 0.5  # metres: it stands on the ground, so its foot hides what is lower than this
 _FARTHEST = 45.0  # metres: beyond, a person is a few pixels
 _SHIFTS = ((0, 0), (0, 3), (0, -3), (3, 0), (-3, 0))  # pixels that the two pictures may be out of step by
@@ -182,7 +184,7 @@ def _cut_out(
     label[reach & (ratio > 0.5)] = cv2.GC_PR_FGD
     label[core] = cv2.GC_PR_FGD
     label[sure] = cv2.GC_FGD
-    # Only what is near a thing tells how its surroundings look.
+    # Only pixels near a thing show how its surroundings look.
     rows, columns = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
     box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
     label = np.ascontiguousarray(label[box])
@@ -228,7 +230,8 @@ class LanguageGroundedMovers:
         torch, kit = _transformers()
         height, width = view.photo.shape[:2]
         look, find = (
-            self._loaded(kit, name, self.detector) for name in ("AutoProcessor", "GroundingDinoForObjectDetection")
+            self._load_weights(kit, name, self.detector)
+            for name in ("AutoProcessor", "GroundingDinoForObjectDetection")
         )
         inputs = look(images=view.photo, text=self.words, return_tensors="pt").to(self.device)
         find = find.to(self.device).eval()
@@ -240,7 +243,7 @@ class LanguageGroundedMovers:
         mask = np.zeros((height, width), np.bool_)
         if not len(boxes):
             return mask
-        cut, model = (self._loaded(kit, name, self.segmenter) for name in ("SamProcessor", "SamModel"))
+        cut, model = (self._load_weights(kit, name, self.segmenter) for name in ("SamProcessor", "SamModel"))
         prompt = cut(view.photo, input_boxes=[boxes.tolist()], return_tensors="pt")
         sizes = prompt["original_sizes"].tolist(), prompt["reshaped_input_sizes"].tolist()
         model = model.to(self.device).eval()
@@ -251,7 +254,7 @@ class LanguageGroundedMovers:
         return mask
 
     @staticmethod
-    def _loaded(kit: Any, name: str, weights: str) -> Any:
+    def _load_weights(kit: Any, name: str, weights: str) -> Any:
         try:
             return getattr(kit, name).from_pretrained(weights, local_files_only=True)
         except (OSError, ValueError) as error:
@@ -347,7 +350,7 @@ class ColourCurve:
     gain: NDArray[np.float64]
     shift: NDArray[np.float64]
 
-    def applied(self, lab: NDArray[np.float32]) -> NDArray[np.float32]:
+    def apply(self, lab: NDArray[np.float32]) -> NDArray[np.float32]:
         """Lab colours of shape ``(..., 3)`` brought in line."""
         light = np.interp(lab[..., 0], self.source, self.target)
         tints = lab[..., 1:] * self.gain + self.shift

@@ -41,7 +41,7 @@ class Matches:
     def __len__(self) -> int:
         return len(self.score)
 
-    def taken(self, which: NDArray[Any]) -> Matches:
+    def select(self, which: NDArray[Any]) -> Matches:
         """Return some of the pairs."""
         return Matches(self.render[which], self.photo[which], self.score[which])
 
@@ -50,7 +50,7 @@ class Matches:
         height, width = reach.shape
         column = np.clip(self.render[:, 0].astype(np.int64), 0, width - 1)
         row = np.clip(self.render[:, 1].astype(np.int64), 0, height - 1)
-        return self.taken(np.linalg.norm(self.photo - self.render, axis=1) <= reach[row, column])
+        return self.select(np.linalg.norm(self.photo - self.render, axis=1) <= reach[row, column])
 
 
 class Matcher(Protocol):
@@ -146,7 +146,7 @@ class _Features:
 
 
 class _Limits(Protocol):
-    """What a pair of features must keep to."""
+    """Limits that a pair of features must keep to."""
 
     @property
     def ratio(self) -> float: ...
@@ -189,7 +189,12 @@ def _match_within_reach(a: _Features, b: _Features, reach: NDArray[np.float32], 
         quality[mine[good]] = 1.0 - near[good] / np.minimum(next_[good], 1.4)
     paired = np.flatnonzero(partner >= 0)
     mutual = paired[back_of[partner[paired]] == paired]
-    return _distinct(Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual]))
+    # One pair for each pixel of the render: features with several orientations would vote several times.
+    matches = Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual])
+    order = np.lexsort((np.arange(len(matches)), -matches.score))
+    cells = np.floor(matches.render[order]).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    return matches.select(order[np.sort(first)])
 
 
 def _descriptor_distances(alike: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -263,7 +268,7 @@ class LoftrMatcher:
         score = found["confidence"].cpu().numpy().astype(np.float64)
         points = [found[f"keypoints{k}"].cpu().numpy().astype(np.float64) + 0.5 for k in range(2)]
         sure = score >= self.confidence
-        return Matches(points[0], points[1], score).taken(sure).within(reach)
+        return Matches(points[0], points[1], score).select(sure).within(reach)
 
     def _model(self, torch: Any, kornia: Any) -> Any:
         if not self.weights.is_file():
@@ -343,11 +348,3 @@ def _kornia(what: str) -> tuple[Any, Any]:
 
 def _no_matches() -> Matches:
     return Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
-
-
-def _distinct(matches: Matches) -> Matches:
-    """One pair for each pixel of the render: features with several orientations would vote several times."""
-    order = np.lexsort((np.arange(len(matches)), -matches.score))
-    cells = np.floor(matches.render[order]).astype(np.int64)
-    _, first = np.unique(cells, axis=0, return_index=True)
-    return matches.taken(order[np.sort(first)])

@@ -61,7 +61,7 @@ class Shot:
             levels.append(cv2.pyrDown(levels[-1]))
         return levels
 
-    def hidden(self, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def is_hidden(self, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Where the photo was painted over, at pixels `xy`; shape ``(n,)``."""
         height, width = self.masked.shape
         column = np.clip(xy[:, 0].astype(np.int64), 0, width - 1)
@@ -90,7 +90,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class VisiblePoints:
-    """What a camera sees of some points.
+    """Points that a camera sees.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ def visible_points(
         inside = ((xy > low) & (xy < np.array([width, height]) - low)).all(axis=1)
     index = np.flatnonzero(inside & (distance < farthest) & (distance > 0.5) & (cosine > np.cos(steepest)))
     xy, distance, cosine = xy[index], distance[index], cosine[index]
-    z = shot.pose.seen(points[index])[:, 2]
+    z = shot.pose.to_camera(points[index])[:, 2]
     small_h, small_w = shot.depth.shape
     column = np.clip((xy[:, 0] * small_w / width).astype(np.int64), 0, small_w - 1)
     row = np.clip((xy[:, 1] * small_h / height).astype(np.int64), 0, small_h - 1)
@@ -171,7 +171,7 @@ def visible_points(
         index, xy, distance, cosine = index[open_], xy[open_], distance[open_], cosine[open_]
     pixels = shot.intrinsics[0, 0] * texel / np.maximum(distance, 1e-9)
     sharp = np.minimum(pixels * cosine, 1.0) * np.sqrt(cosine)
-    return VisiblePoints(index, xy, pixels * np.sqrt(cosine), sharp, shot.hidden(xy))
+    return VisiblePoints(index, xy, pixels * np.sqrt(cosine), sharp, shot.is_hidden(xy))
 
 
 @dataclass(frozen=True)
@@ -250,7 +250,7 @@ def in_frustum(samples: Samples, shot: Shot, farthest: float) -> NDArray[np.int6
     )
     sides = np.cross(corners, np.roll(corners, -1, axis=0))  # normals of the view's four planes, pointing inwards
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)
-    centre = shot.pose.seen(samples.centre)
+    centre = shot.pose.to_camera(samples.centre)
     meets = (centre @ sides.T > -samples.radius[:, None]).all(axis=1)
     return np.flatnonzero(meets & (np.linalg.norm(centre, axis=1) - samples.radius < farthest))
 
@@ -293,10 +293,8 @@ def choose_cameras(
 
 
 _BAND = 1 << 19  # texels at a time
-_LEAST_FIT, _LEAST_SHARE = (
-    0.4,
-    0.7,
-)  # correlation with the wall, and share of the best photo's, under which none is used
+_LEAST_FIT = 0.4  # correlation with the wall under which no photo is used
+_LEAST_SHARE = 0.7  # share of the best photo's under which none is used
 _LEAST_AGREED = 0.5  # what agrees less with the wall's own texels shows something else
 _WORSE = 0.75  # a camera gives way where another of the chart is better by this
 
@@ -395,13 +393,13 @@ def paint_chart(
             if moved.offset.any():
                 xy = project(points + moved.offset, layer.shot.pose, layer.shot.intrinsics)
                 found[k].reshape(-1, 3)[place] = layer.shot.colours(xy, pixels)
-                hidden = layer.shot.hidden(xy)
+                hidden = layer.shot.is_hidden(xy)
             else:
-                hidden = layer.shot.hidden(project(points, layer.shot.pose, layer.shot.intrinsics))
+                hidden = layer.shot.is_hidden(project(points, layer.shot.pose, layer.shot.intrinsics))
             # What was painted over is a guess: better than nothing, and worse than what is known.
             flat = quality[k].reshape(-1)
             flat[place] *= np.where(hidden, np.where(before[1].reshape(-1)[place], 0.0, PAINTED), 1.0)
-        labs.append(layer.curve.applied(lab_of(found[k])) + layer.shade.astype(np.float32))
+        labs.append(layer.curve.apply(lab_of(found[k])) + layer.shade.astype(np.float32))
         if own is not None:
             agreed = agreement(labs[k], quality[k] > 0, own, before[1] & inside, atlas.texel)
             quality[k] *= np.where(agreed > _LEAST_AGREED, agreed, 0.0)

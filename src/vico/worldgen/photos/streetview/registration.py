@@ -22,9 +22,16 @@ from vico.worldgen.photos.atlas import Chart
 from vico.worldgen.photos.streetview.matching import Matches, opencv
 
 _NORM_METRES = 20.0
-_ABOVE, _LEFT, _HERE, _RIGHT, _BELOW = 1, 3, 4, 5, 7  # of a pixel and its eight neighbours, row by row
+# Of a pixel and its eight neighbours, row by row
+_ABOVE = 1
+_LEFT = 3
+_HERE = 4
+_RIGHT = 5
+_BELOW = 7
 _ENOUGH = 12  # points that agree on a pose
-_PRIOR_METRES, _PRIOR_RADIANS = 3.0, 0.07  # what is expected of the metadata: a weak pull where points say little
+# Expected errors of the metadata: a weak pull where points say little.
+_PRIOR_METRES = 3.0
+_PRIOR_RADIANS = 0.07
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Pose:
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
 
-    def seen(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World points in the camera's axes, shape ``(n, 3)``."""
         return np.asarray((points - self.position) @ self.rotation.T)
 
@@ -62,7 +69,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class PoseFit:
-    """What the matches say about the pose.
+    """Pose that fits the matches.
 
     Attributes
     ----------
@@ -136,7 +143,7 @@ def fit_pose(
     none = PoseFit(None, None, np.zeros(len(matches), np.bool_), float("nan"), float("inf"))
     if solid.sum() < 8:
         return none
-    used = matches.taken(solid)
+    used = matches.select(solid)
     world = points[solid]
     best: tuple[Pose, NDArray[np.bool_], float] | None = None
     start = _pose_from_points(used, world, intrinsics, pixels)
@@ -144,7 +151,7 @@ def fit_pose(
         best = _refine_pose(start, used, world, prior, intrinsics, pixels)
     # A consensus search among what agrees already is a matter of a few tries; among all, of thousands.
     agreed = np.ones(len(used), np.bool_) if best is None or best[1].sum() < _ENOUGH else best[1]
-    five_point = _five_point(used.taken(agreed), world[agreed], prior, intrinsics, pixels)
+    five_point = _five_point(used.select(agreed), world[agreed], prior, intrinsics, pixels)
     if five_point is not None:
         other = _refine_pose(five_point, used, world, prior, intrinsics, pixels)
         if best is None or other[1].sum() > best[1].sum():
@@ -182,7 +189,7 @@ def unproject(
 
 def project(points: NDArray[np.float64], pose: Pose, intrinsics: NDArray[np.float64]) -> NDArray[np.float64]:
     """Pixels of world points, shape ``(n, 2)``; NaN behind the camera."""
-    seen = pose.seen(points)
+    seen = pose.to_camera(points)
     ahead = np.where(seen[:, 2:] > 1e-6, seen[:, 2:], np.nan)
     return np.asarray((seen[:, :2] / ahead) * np.diag(intrinsics)[:2] + intrinsics[:2, 2])
 
@@ -198,7 +205,7 @@ def _five_point(
     # Photo ray x, render point X: x is parallel to turn @ X + s * direction, which gives s for each point.
     ray = np.column_stack([matches.photo, np.ones(len(matches))]) @ np.linalg.inv(intrinsics).T
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    moved = prior.seen(world) @ turn.T
+    moved = prior.to_camera(world) @ turn.T
     along, across = np.cross(ray, np.broadcast_to(direction, ray.shape)), np.cross(ray, moved)
     parallax = (along * along).sum(axis=1)
     steps = -(along * across).sum(axis=1) / np.maximum(parallax, 1e-12)
@@ -270,7 +277,7 @@ def _refine_pose(
     hessian = np.eye(6)
     focal = intrinsics[0, 0]
     for _ in range(12):
-        seen = pose.seen(world)
+        seen = pose.to_camera(world)
         ahead = seen[:, 2] > 0.1
         xy = project(world, pose, intrinsics)
         gap = np.where(ahead[:, None], xy - matches.photo, 0.0)
@@ -327,16 +334,19 @@ def _rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
 FARTHEST_NUDGE = 0.7
 """Metres that a photo is moved at most."""
 
-_FINE, _COARSE = 0.12, 0.9  # metres: what is finer is noise or lost in one of the two, what is broader is light
+_FINE = 0.12  # metres: what is finer is noise or lost in one of the two
+_COARSE = 0.9  # metres: what is broader is light
 _BLOCK = 5.0  # metres: parts of a wall that are compared each by itself
-_LEAST_SIDE = 2.0  # metres of a part that tell something
+_LEAST_SIDE = 2.0  # metres of a part that is worth matching
 _LEAST = 0.25  # correlation that two parts must have
 _LEAST_CONTRAST = 2.5  # levels of luminance: a wall with less has nothing to be recognised by
 _AROUND = 1.2  # metres around a place that photo and wall are compared in
-_UNLIKE, _ALIKE = 0.05, 0.35  # agreement at which a photo counts nothing, and from which it counts fully
+_UNLIKE = 0.05  # agreement at which a photo counts nothing
+_ALIKE = 0.35  # and from which it counts fully
 _PLAIN = 0.15  # spread of normalised detail that counts as none
 _FAR_COLOUR = 16.0  # Lab: beyond twice this, something else stands before the wall, or the sky is seen over it
-_SHIFT, _STAND = 0.3, 0.25  # metres expected, and what the wall's plane may be off
+_SHIFT = 0.3  # metres of shift expected
+_STAND = 0.25  # metres that the wall's plane may be off
 _NOISE = 0.06  # metres that a part's own shift may be wrong
 
 

@@ -133,7 +133,7 @@ class StreetviewConfig:
 
 @dataclass(frozen=True)
 class PhotoOutcome:
-    """What became of one photo.
+    """Result for one photo.
 
     Attributes
     ----------
@@ -181,15 +181,7 @@ def flat_ground(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.zeros(np.asarray(xy).shape[:-1])
 
 
-def pose_on_terrain(image: StreetImage, ground: Ground) -> Pose:
-    """Return the pose a photo's metadata give, lifted on the terrain where its height is known above ground only."""
-    position = np.asarray(image.position, np.float64).copy()
-    if image.eye is not None:
-        position[2] = float(np.asarray(ground(position[None, :2])).ravel()[0]) + image.eye
-    return Pose(position, np.asarray(image.rotation, np.float64))
-
-
-def prepare_photo(
+def _prepare_photo(
     image: StreetImage, photograph: Photographer, config: StreetviewConfig, ground: Ground
 ) -> tuple[PhotoOutcome, Shot | None]:
     """Mend a photo's pose and paint over what moves; None if it can't be used, with the reason."""
@@ -201,7 +193,11 @@ def prepare_photo(
     lens = image.intrinsics.copy()
     lens[0] *= size[0] / width
     lens[1] *= size[1] / height
-    metadata = pose_on_terrain(image, ground)
+    # Where metadata give the height above ground only, the pose is lifted on the terrain.
+    position = np.asarray(image.position, np.float64).copy()
+    if image.eye is not None:
+        position[2] = float(np.asarray(ground(position[None, :2])).ravel()[0]) + image.eye
+    metadata = Pose(position, np.asarray(image.rotation, np.float64))
     outcome = PhotoOutcome(image.id, image.source, image.attribution, used=False)
     pose = seen_from = metadata
     fit: PoseFit | None = None
@@ -295,12 +291,14 @@ def photographer_of(world: World) -> Photographer:
 
 _FEWEST_KNOWN = 300  # samples that a photo's colours are compared with, before it is compared with the other photos
 _FEWEST_ON_CHART = 8
-_MOST_LIGHTER, _MOST_TINTED = 25.0, 12.0  # Lab: what light and shade on one wall may amount to
+# Lab: what light and shade on one wall may amount to.
+_MOST_LIGHTER = 25.0
+_MOST_TINTED = 12.0
 
 
 @dataclass(frozen=True)
 class StreetviewReport:
-    """What became of all photos, in the order they came.
+    """Results for all photos, in the order they came.
 
     Attributes
     ----------
@@ -386,7 +384,7 @@ def reproject(
     views: list[VisiblePoints] = []
     for image in images:
         with drop_on_failure(f"{image.source} {image.id}"):
-            outcome, shot = prepare_photo(image, photograph, config, ground or flat_ground)
+            outcome, shot = _prepare_photo(image, photograph, config, ground or flat_ground)
             if shot is not None:
                 seen = _visible_samples(samples, shot, atlas, sight, config)
                 if len(seen.index):
@@ -469,7 +467,7 @@ def _shade_on_chart(
     mine = (samples.chart[seen.index] == number) & samples.known[seen.index]
     if not config.unshade > 0 or mine.sum() < _FEWEST_ON_CHART:
         return np.zeros(3)
-    gap = samples.lab[seen.index[mine]] - curve.applied(lab[mine])
+    gap = samples.lab[seen.index[mine]] - curve.apply(lab[mine])
     limit = np.array([_MOST_LIGHTER, _MOST_TINTED, _MOST_TINTED])
     return np.asarray(np.clip(np.median(gap, axis=0), -limit, limit), np.float64)
 
