@@ -193,7 +193,8 @@ class GenesisIndex:
         self.mode = np.zeros(count, np.int32)
         self.gain, self.bias = np.zeros(count), np.zeros((count, 3))
         self.limit = np.tile([-np.inf, np.inf], (count, 1))
-        follows = dict(zip(model.driven, _servos(model), strict=True))
+        servos = dict(zip(model.motors, model.servos, strict=True))
+        follows: dict[str, str] = {name: servos[name] for name in model.driven}
         modes = {"position": POSITION, "velocity": VELOCITY, "force": FORCE}
         for k in range(count):
             mine = np.flatnonzero(self._motor_of[:, k])
@@ -247,12 +248,6 @@ def _gripping(spec: Any, entity: Any) -> NDArray[np.int64]:
         touching = [k for k in range(first, first + count) if spec.geom_contype[k] or spec.geom_conaffinity[k]]
         found += [geom.idx for geom, k in zip(link.geoms, touching, strict=True) if spec.geom_priority[k] > 0]
     return np.array(found, np.int64)
-
-
-def _servos(model: RobotModel) -> list[str]:
-    """Return what each driven motor follows."""
-    of = dict(zip(model.motors, model.servos, strict=True))
-    return [of[name] for name in model.driven]
 
 
 def _transmission(spec: Any, actuator: int) -> list[tuple[int, float]]:
@@ -448,15 +443,11 @@ class _Solids:
 
 
 def _mover(gs: Any, index: int, on_foot: bool) -> Any:
-    parked: Mapping[str, Any] = {"pos": parked_mover(index), "fixed": True, "visualization": False, **_BITS}
+    place = PARKED_APART * index, 0.0, PARKED
+    parked: Mapping[str, Any] = {"pos": place, "fixed": True, "visualization": False, **_BITS}
     if on_foot:
         return gs.morphs.Cylinder(radius=0.5, height=1.0, **parked)
     return gs.morphs.Box(size=(1.0, 1.0, 1.0), **parked)
-
-
-def parked_mover(index: int) -> tuple[float, float, float]:
-    """Where a kinematic body waits that stands for nobody."""
-    return PARKED_APART * index, 0.0, PARKED
 
 
 def _add_object(gs: Any, scene: Any, index: int) -> Any:

@@ -60,12 +60,6 @@ def _keep_warning(message: str) -> None:
         _WARNINGS.append(message)
 
 
-def collect_warnings() -> None:
-    """Have MuJoCo say here what it would append to a file in the folder people happen to be in."""
-    if mujoco.get_mju_user_warning() is None:
-        mujoco.set_mju_user_warning(_keep_warning)
-
-
 def step_solver(model: Any, data: Any, steps: int) -> None:
     """Have MuJoCo take some steps.
 
@@ -88,21 +82,6 @@ def take_warnings() -> list[str]:
     return said
 
 
-def report_warnings(said: Sequence[str], seconds: float, *, finite: bool) -> None:
-    """Warn of what MuJoCo has said.
-
-    Raises
-    ------
-    PhysicsError
-        If not all speeds are `finite`.
-    """
-    if not finite:
-        why = f" ({said[0]})" if said else ""
-        raise PhysicsError(f"physics: the robots' motion diverged at {seconds:.2f} s{why}; report it with the snapshot")
-    for message in said:
-        warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=4)
-
-
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
 _GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -122,7 +101,9 @@ class MujocoEngine:
     """
 
     def __init__(self, scene: CompiledScene, places: NDArray[np.float64]) -> None:
-        collect_warnings()
+        # MuJoCo would append its warnings to a file in the working directory.
+        if mujoco.get_mju_user_warning() is None:
+            mujoco.set_mju_user_warning(_keep_warning)
         places = np.asarray(places, np.float64)
         if places.shape != (len(scene.models), 3):
             raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
@@ -506,7 +487,13 @@ class MujocoEngine:
         """Raise or warn if MuJoCo said something."""
         said, finite = take_warnings(), math.isfinite(float(np.add.reduce(self._qvel)))
         if said or not finite:
-            report_warnings(said, self._data.time, finite=finite)
+            if not finite:
+                why = f" ({said[0]})" if said else ""
+                raise PhysicsError(
+                    f"physics: the robots' motion diverged at {self._data.time:.2f} s{why}; report it with the snapshot"
+                )
+            for message in said:
+                warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=4)
 
     def _last_contacts(self) -> NDArray[np.float64]:
         """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them.

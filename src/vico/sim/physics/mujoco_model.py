@@ -184,7 +184,11 @@ def _add_ground(spec: Any, scene: StaticScene) -> None:
         return
     for west, south in scene.squares.tolist():
         half = scene.side / 2
-        _add_field(spec, ground, (west + half, south + half), square_grid(scene, west, south), half)
+        # Neighbouring squares have the same heights along their common edge.
+        count = max(round(scene.side / _KERB_CELL), 1) + 1
+        x, y = (np.linspace(first, first + scene.side, count) for first in (west, south))
+        xx, yy = np.meshgrid(x, y)
+        _add_field(spec, ground, (west + half, south + half), scene.height(np.stack([xx, yy], axis=-1)), half)
 
 
 def _add_field(spec: Any, body: Any, middle: tuple[float, float], heights: NDArray[np.float64], half: float) -> None:
@@ -199,14 +203,6 @@ def _add_field(spec: Any, body: Any, middle: tuple[float, float], heights: NDArr
         userdata=((heights - low) / rise).astype(np.float32).ravel().tolist(),
     )
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*middle, low], **_SOLID)
-
-
-def square_grid(scene: StaticScene, west: float, south: float) -> NDArray[np.float64]:
-    """Heights of the ground in one of a scene's squares, metres, shape ``(n, n)``; neighbours have the same edge."""
-    count = max(round(scene.side / _KERB_CELL), 1) + 1
-    x, y = (np.linspace(first, first + scene.side, count) for first in (west, south))
-    xx, yy = np.meshgrid(x, y)
-    return scene.height(np.stack([xx, yy], axis=-1))
 
 
 def ground_grid(scene: StaticScene, *, kerbs: bool = True) -> tuple[NDArray[np.float64], float]:

@@ -237,7 +237,11 @@ class CompiledScene:
         self._link_bits = np.array(m.body_contype[self._links])
         self._mover_bits = np.array(m.body_contype[self.mover_body]), np.array(m.body_conaffinity[self.mover_body])
         owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
-        self.link_parts = owner, self._links, _radii(m, self._links), np.asarray(m.body_rootid[self._links], np.int64)
+        radii = np.zeros(len(self._links))  # metres from a body's origin within which its shapes are
+        sizes = np.linalg.norm(m.geom_pos, axis=1) + m.geom_rbound
+        for k, body in enumerate(self._links.tolist()):
+            radii[k] = sizes[m.geom_bodyid == body].max(initial=0.0)
+        self.link_parts = owner, self._links, radii, np.asarray(m.body_rootid[self._links], np.int64)
         pristine = mujoco.MjData(m)
         m.opt.enableflags &= ~SLEEP
         mujoco.mj_kinematics(m, pristine)
@@ -398,15 +402,6 @@ def _reach(model: Any, bodies: NDArray[np.int64]) -> float:
             size = float(np.linalg.norm(model.geom_pos[geom])) + float(model.geom_rbound[geom])
             whole = max(whole, away[body] + size)
     return whole
-
-
-def _radii(model: Any, bodies: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Metres from each body's origin within which its shapes are."""
-    found = np.zeros(len(bodies))
-    sizes = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
-    for k, body in enumerate(bodies.tolist()):
-        found[k] = sizes[model.geom_bodyid == body].max(initial=0.0)
-    return found
 
 
 def _slide(model: Any, joint: int) -> float:

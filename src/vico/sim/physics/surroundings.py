@@ -108,20 +108,17 @@ def static_scene_of(world: PhysicsGround, *, flying: bool = False) -> StaticScen
             flat = np.ptp(points, axis=0).min() < 1e-3
             if not flat and points[:, 2].min() < float(height(points[:, :2]).max()) + reach:
                 hulls.append(points)
-    boxes, pillars = _objects(world.objects, height, reach)
-    return StaticScene(height, tuple(hulls), boxes, pillars)
-
-
-def _objects(objects: Objects, height: HeightField, reach: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    objects = world.objects
     chosen = objects.where(objects.solid & objects.outdoors & (objects.size_z > _FLAT))
     stem = np.array([_STEMS.get(str(kind), 0.0) for kind in chosen.kind])
     ground = height(chosen.position) if len(chosen) else np.zeros(0)
     # Only what robots can reach matters, and from a little below ground, for the ground is not level.
     low = np.minimum(chosen.z, ground) - 0.3
     half = (np.minimum(chosen.z + chosen.size_z, chosen.z + reach) - low) / 2
-    boxes = np.column_stack([chosen.x, chosen.y, low + half, chosen.yaw, chosen.size_x / 2, chosen.size_y / 2, half])
-    pillars = np.column_stack([chosen.x, chosen.y, low + half, stem, half])
-    return boxes[stem == 0.0], pillars[stem > 0.0]
+    z = low + half
+    boxes = np.column_stack([chosen.x, chosen.y, z, chosen.yaw, chosen.size_x / 2, chosen.size_y / 2, half])
+    pillars = np.column_stack([chosen.x, chosen.y, z, stem, half])
+    return StaticScene(height, tuple(hulls), boxes[stem == 0.0], pillars[stem > 0.0])
 
 
 #: About the side of a chunk, metres: a whole number of them is as long as a tile.

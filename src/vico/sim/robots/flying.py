@@ -378,17 +378,12 @@ def _steer(run: RobotRun, flight: Flight, row: int, robot: int, dt: float) -> Ro
         a.leg[row] = leg = leg + 1
         a.held[row] = [0.0, math.inf]
         away = float(np.linalg.norm(way[leg] - base.position))
-    _note_progress(a.held[row], away, dt)
+    if away < a.held[row, 1] - 0.5:
+        a.held[row] = 0.0, away
+    else:  # it has come no nearer
+        a.held[row, 0] += dt
     _aim(flight, row, base.position, way, leg)
     return RobotStatus.BLOCKED if a.held[row, 0] > _PATIENCE else RobotStatus.MOVING
-
-
-def _note_progress(held: Array, away: float, dt: float) -> None:
-    """Count how long it has come no nearer."""
-    if away < held[1] - 0.5:
-        held[:] = 0.0, away
-    else:
-        held[0] += dt
 
 
 def _aim(flight: Flight, row: int, position: Array, way: Array, leg: int) -> None:

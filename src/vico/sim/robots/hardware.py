@@ -45,42 +45,6 @@ def follow_setpoints(run: RobotRun, flight: Flight, group: RobotGroup) -> bool:
     return not (told | (flight.arrays.phase == _LANDED)).any()
 
 
-def command_rotors(
-    run: RobotRun,
-    flight: Flight,
-    group: RobotGroup,
-    memory: np.ndarray,
-    seconds: float,
-    *,
-    all_follow: bool = False,
-) -> None:
-    """Tell the rotors of a kind of robots what speeds to have for some seconds; all that are in the air in one call.
-
-    Parameters
-    ----------
-    memory
-        What the group's controller remembers, shape ``(k, controller.memory)``; updated in place.
-    all_follow
-        As `follow_setpoints` has it.
-    """
-    arrays, robots, a = run.arrays, group.robots, flight.arrays
-    if all_follow:
-        a.wanted[:] = group.controller.rotor_speeds(run.engine.motion(robots), a.setpoint, memory, seconds)
-        return
-    fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
-    led = ~fallen & ~motors & (a.phase != _LANDED)
-    rows = led.nonzero()[0]
-    if len(rows):
-        setpoint, mine = a.setpoint[rows], memory[rows]
-        a.wanted[rows] = group.controller.rotor_speeds(run.engine.motion(robots[rows]), setpoint, mine, seconds)
-        a.setpoint[rows], memory[rows] = setpoint, mine
-    memory[~led] = 0.0
-    a.wanted[~led] = 0.0
-    told = motors & ~fallen
-    a.wanted[told] = arrays.command[robots[told], : len(group.model.motors)]
-    arrays.lying[robots[fallen]] += seconds
-
-
 class AllRotors:
     """The rotors of all robots that fly, within a sub-step: who follows setpoints is decided between sub-steps.
 
@@ -118,7 +82,23 @@ class AllRotors:
     def _actuate(self, since: float, step: float) -> None:
         """Let rotors follow their commands and push for a step that begins so many seconds into the frame."""
         for flight, group, memory, all_follow in self._flown:
-            command_rotors(self._run, flight, group, memory, step, all_follow=all_follow)
+            arrays, robots, a = self._run.arrays, group.robots, flight.arrays
+            motion = self._run.engine.motion
+            if all_follow:
+                a.wanted[:] = group.controller.rotor_speeds(motion(robots), a.setpoint, memory, step)
+            else:
+                fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
+                led = ~fallen & ~motors & (a.phase != _LANDED)
+                rows = led.nonzero()[0]
+                if len(rows):
+                    setpoint, mine = a.setpoint[rows], memory[rows]
+                    a.wanted[rows] = group.controller.rotor_speeds(motion(robots[rows]), setpoint, mine, step)
+                    a.setpoint[rows], memory[rows] = setpoint, mine
+                memory[~led] = 0.0
+                a.wanted[~led] = 0.0
+                told = motors & ~fallen
+                a.wanted[told] = arrays.command[robots[told], : len(group.model.motors)]
+                arrays.lying[robots[fallen]] += step
             flight.push(self._run.engine, step, self._began + since)
 
 
@@ -247,20 +227,15 @@ def _power(run: RobotRun, robot: int, model: RobotModel, battery: BatteryModel) 
     for motor, unit, force in zip(model.motors, model.motor_units, forces, strict=True):
         speed = speeds.get(motor)
         if speed is None:
-            speed = _base_speed(run, robot, unit)
+            # A motor without a joint of its own turns the base, or drives it ahead.
+            base = run.engine.base(robot)
+            turns = unit == "rad/s"
+            speed = float(base.angular_velocity_body[2] if turns else dot(base.rotation[:, 0], base.velocity))
         else:
             heat += force * force
         # Motors that are pushed back feed nothing into the battery.
         work += max(force * speed, 0.0)
     return battery.idle_power + work / battery.efficiency + battery.holding * heat
-
-
-def _base_speed(run: RobotRun, robot: int, unit: str) -> float:
-    """Return how fast the base goes ahead, m/s, or turns, rad/s: what motors do that drive no joint of their own."""
-    base = run.engine.base(robot)
-    if unit == "rad/s":
-        return float(base.angular_velocity_body[2])
-    return float(dot(base.rotation[:, 0], base.velocity))
 
 
 class Reading(NamedTuple):

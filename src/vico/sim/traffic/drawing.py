@@ -75,7 +75,11 @@ class TrafficDrawing:
         parts.append(self._lamps.draw(lights, elapsed, vehicles))
         if len(pedals):
             ridden = slice(len(transforms) - len(pedals), len(transforms))
-            turned = _crank_transforms(transforms[ridden], pedals)
+            c, s = np.cos(2 * np.pi * pedals), np.sin(2 * np.pi * pedals)  # turns of the cranks
+            cranks = np.tile(np.eye(4), (len(pedals), 1, 1))
+            cranks[:, 0, 0], cranks[:, 0, 2], cranks[:, 2, 0], cranks[:, 2, 2] = c, s, -s, c
+            cranks[:, :3, 3] = CRANK_AXLE
+            turned = product(transforms[ridden].astype(np.float64), cranks).astype(np.float32)
             parts.append(Drawn(["cranks"], np.zeros(len(pedals), np.int32), turned, self._entities[ridden]))
         if self._heads is not None:
             parts.append(self._heads.draw(*shown))
@@ -92,15 +96,6 @@ class TrafficDrawing:
         if self._heads is not None:
             models = models | self._heads.prototypes()
         return models | {"bus": [mirror(part) for part in models["bus"]]} if lefthand else models
-
-
-def _crank_transforms(bicycles: NDArray[np.float32], turns: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return model to world of cranks that have made so many turns, in bicycles at `bicycles`, shape ``(n, 4, 4)``."""
-    c, s = np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)
-    cranks = np.tile(np.eye(4), (len(turns), 1, 1))
-    cranks[:, 0, 0], cranks[:, 0, 2], cranks[:, 2, 0], cranks[:, 2, 2] = c, s, -s, c
-    cranks[:, :3, 3] = CRANK_AXLE
-    return product(bicycles.astype(np.float64), cranks).astype(np.float32)
 
 
 Floats = NDArray[np.float64]

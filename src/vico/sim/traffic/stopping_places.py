@@ -59,7 +59,8 @@ def places_in_car_parks(
         if any(lane is None or network.lanes["closed"][lane] for lane in ends):
             continue
         first, last = int(ends[0] or 0), int(ends[1] or 0)
-        if any(len(tree.query(shapely.LineString(line), predicate="intersects")) for line in _lines_of(spot)):
+        driven = [shapely.LineString(line) for line in (ways.into.line, ways.back, ways.out.line)]
+        if any(len(tree.query(line, predicate="intersects")) for line in driven):
             continue
         lead = lanes.at(first, ways.into.offset - np.arange(WAY_LEAD, 0.0, -0.5))[:, :2]
         after = lanes.at(last, ways.out.offset + np.arange(0.5, _BEYOND, 0.5))[:, :2]
@@ -90,10 +91,6 @@ def places_in_car_parks(
         for name, value in row.items():
             places[name][k] = value
     return places, np.concatenate(points) if points else np.zeros(0, PATH_POINT)
-
-
-def _lines_of(spot: ParkingSpot) -> list[list[tuple[float, float]]]:
-    return [] if spot.ways is None else [spot.ways.into.line, spot.ways.back, spot.ways.out.line]
 
 
 def _inwards(line: Sequence[tuple[float, float]]) -> Floats:
@@ -210,7 +207,8 @@ def _parking(world: World, network: LaneNetwork, lanes: LaneGraph, tree: shapely
         lane = lanes.index.get(spot.lane) if spot.lane is not None else None
         if spot.car is not None or spot.kind != "kerb" or lane is None or network.lanes["closed"][lane]:
             continue
-        place = _Place(lane, spot.offset, spot.side, spot.length - _SPARE, _taper(spot.side), True, False)
+        taper = max(_LEAST_TAPER, float(np.sqrt(6.0 * abs(spot.side) * _RADIUS)))
+        place = _Place(lane, spot.offset, spot.side, spot.length - _SPARE, taper, True, False)
         if not _fits_lane(place, _CAR, lanes):
             continue
         ways = [_swept(place, _CAR, lanes, ahead=ahead) for ahead in (True, False)]
@@ -245,10 +243,6 @@ def _deliveries(
             near = any(len(shapes.query(way, predicate="dwithin", distance=away)) for shapes, away in kept)
             if not near and not len(tree.query(way, predicate="intersects")):
                 yield place
-
-
-def _taper(side: float) -> float:
-    return max(_LEAST_TAPER, float(np.sqrt(6.0 * abs(side) * _RADIUS)))
 
 
 def _fits_lane(place: _Place, size: tuple[float, float, float, float], lanes: LaneGraph) -> bool:
@@ -426,31 +420,20 @@ def with_spots(
     _add_windows(site, world)
     _add_pairs(site)
     spots = np.array(site.rows, SPOT) if site.rows else np.zeros(0, SPOT)
-    return network._replace(spots=_sort_spots(spots), spot_first=_first(spots, len(walks)))
-
-
-def _sort_spots(spots: Records) -> Records:
-    """Return spots by walkway, with their partners' new numbers."""
+    # They are sorted by walkway, so partners get new numbers.
     order = np.argsort(spots["walkway"], kind="stable")
     place = np.empty(len(order), np.int32)
     place[order] = np.arange(len(order))
-    found = spots[order]
-    paired = found["partner"] != NONE
-    found["partner"][paired] = place[found["partner"][paired]]
-    return found
-
-
-def _first(spots: Records, walkways: int) -> NDArray[np.int32]:
-    first = np.zeros(walkways + 1, np.int32)
-    first[1:] = np.cumsum(np.bincount(spots["walkway"], minlength=walkways))
-    return first
+    spots = spots[order]
+    paired = spots["partner"] != NONE
+    spots["partner"][paired] = place[spots["partner"][paired]]
+    first = np.zeros(len(walks) + 1, np.int32)
+    first[1:] = np.cumsum(np.bincount(spots["walkway"], minlength=len(walks)))
+    return network._replace(spots=spots, spot_first=first)
 
 
 def _add_stops(site: _Site, world: World) -> None:
-    """Add spots on free ground around where passengers wait for buses and trams, the nearest first, facing them.
-
-    Stops are numbered as those of buses, then those of trams.
-    """
+    """Add spots on free ground around where passengers wait for buses and trams, the nearest first, facing them."""
     transit, lanes = world.transit, world.lanes
     served = {stop for line in transit.lines for stop in line.stops}
     tracks = [shapely.LineString(line.track) for line in transit.tram_lines]
