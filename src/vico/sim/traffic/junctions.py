@@ -227,16 +227,6 @@ def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _note_lane_waits(net, junctions, vehicle):  # type: ignore[no-untyped-def]
-    """Note how long a vehicle has waited for the lanes that it wants to take through the junction it queues for."""
-    wait, queued, waits = counted_wait(junctions, vehicle), vehicle.queued_junction, junctions.claims.longest_lane_wait
-    for k in range(vehicle.granted_count, vehicle.planned_count):
-        lane = vehicle.planned_lanes[k]
-        if net.lanes[lane].junction == queued:
-            waits[lane] = max(waits[lane], wait)
-
-
-@compiled
 def note_claims(net, fleet, junctions):  # type: ignore[no-untyped-def]
     """Note who is where in shared junctions, and how long the first in each queue has waited.
 
@@ -253,20 +243,24 @@ def note_claims(net, fleet, junctions):  # type: ignore[no-untyped-def]
     for vehicle in fleet:
         if claims.any_shared:
             _note_taken(net, junctions, vehicle)
-        lane, queued, wait = vehicle.queued_exit, vehicle.queued_junction, counted_wait(junctions, vehicle)
-        if lane >= 0:
-            junctions.longest_exit_wait[lane] = max(junctions.longest_exit_wait[lane], wait)
+        queued_exit, queued, wait = vehicle.queued_exit, vehicle.queued_junction, counted_wait(junctions, vehicle)
+        if queued_exit >= 0:
+            junctions.longest_exit_wait[queued_exit] = max(junctions.longest_exit_wait[queued_exit], wait)
         if queued < 0:
             continue
         if claims.exclusive[queued] or vehicle.length > _LONG:
             junctions.longest_wait[queued] = max(junctions.longest_wait[queued], wait)
-        else:
-            _note_lane_waits(net, junctions, vehicle)
+            continue
+        for k in range(vehicle.granted_count, vehicle.planned_count):
+            lane = vehicle.planned_lanes[k]
+            if net.lanes[lane].junction == queued:
+                claims.longest_lane_wait[lane] = max(claims.longest_lane_wait[lane], wait)
 
 
 _BEFORE = 0.6  # m kept before tracks where a vehicle waits
 _ON_TRACK = 0.3  # m before tracks from which on a vehicle is taken to be on them
-_BEYOND = 1.0  # m kept behind tracks
+#: Metres kept behind tracks.
+BEYOND_TRACKS = 1.0
 _CREEPS = 1.0  # m/s: who is slower may come to stand
 #: Metres beyond its sight that a vehicle looks for room behind tracks, beside its own length.
 FARTHER = 15.0
@@ -308,24 +302,12 @@ def track_ahead(net, vehicle, look):  # type: ignore[no-untyped-def]
             to_track = ahead + net.tracks[c].start - _BEFORE
             if distance >= NEVER and _ON_TRACK - _BEFORE < to_track < look:
                 distance = max(to_track, 0.0)
-                beyond = ahead + net.tracks[c].end + vehicle.length + _BEYOND
+                beyond = ahead + net.tracks[c].end + vehicle.length + BEYOND_TRACKS
                 called = net.tracks[c].called
         ahead += lane.length
         if ahead > look and ahead > beyond + FARTHER:
             break
     return TrackAhead(distance, beyond, NEVER, called)
-
-
-@compiled
-def look_over(track):  # type: ignore[no-untyped-def]
-    """Return how far a vehicle looks to see whether there is room behind tracks, metres; 0 without any."""
-    return track.beyond + _BEYOND if track.distance < NEVER else 0.0
-
-
-@compiled
-def waits_for_tram(track, distance):  # type: ignore[no-untyped-def]
-    """Return whether a tram comes on tracks that lie before a place so many metres ahead."""
-    return track.called and track.distance < distance
 
 
 @compiled

@@ -378,7 +378,8 @@ _LEAD, _LEAD_WHEN_HINDERED = 0.7, 2.0  # how far ahead the point runs, m: past a
 _HINDERED_AFTER = 3.0  # who has got nowhere for so long looks that far ahead, s
 _CARS_FIRST_AFTER, _CARS_FIRST_UNTIL = 10.0, 12.0  # s waited by a car that goes first then, and by the pedestrian
 _LEFT_BEHIND = 15.0  # s after which a companion whose leader has crossed crosses, too
-_GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
+_GIVE_UP_CROSSING = 20.0  # s waited for a crossing before turning round ...
+_GIVE_UP_SPREAD = 10.0  # ... and s more by `lateral_share`
 _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
 
 
@@ -495,13 +496,6 @@ def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ig
 
 
 @compiled
-def _gives_up_crossing(walker):  # type: ignore[no-untyped-def]
-    """Return whether a walker has waited so long for a crossing that it turns round; who is led does not."""
-    longest, spread = _GIVE_UP_CROSSING
-    return walker.leader == NONE and walker.crossing_wait > longest + spread * walker.lateral_share
-
-
-@compiled
 def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
     """Move the followed point on until it is far enough ahead; return whether there is something to wait for.
 
@@ -531,7 +525,8 @@ def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt): 
             walker.offset = min(max(offset, 0.0), paths.walkways[walkway].length)
             continue
         if not _may_go_onto(paths, walker, junctions, is_asked, following, dt):
-            if _gives_up_crossing(walker):
+            longest = _GIVE_UP_CROSSING + _GIVE_UP_SPREAD * walker.lateral_share
+            if walker.leader == NONE and walker.crossing_wait > longest:
                 turn_round(paths, walker, x, y)
             return True
         _enter_walkway(paths, walker, junctions, following, node)

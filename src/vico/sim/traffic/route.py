@@ -84,13 +84,6 @@ def _goal_after(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _pass_goal(net, vehicle):  # type: ignore[no-untyped-def]
-    """Note that a car that leaves its lane has been at its goal, if that is there."""
-    while vehicle.goal != NONE and net.goal_edge[vehicle.goal] == net.lanes[vehicle.lane].edge:
-        vehicle.goal = vehicle.goal + 1 if vehicle.goal + 1 < vehicle.goal_end else NONE
-
-
-@compiled
 def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untyped-def]
     """Return the lane a car takes after `lane`: towards the street with fewer vehicles; `NONE` at the map's end."""
     best, best_cost = NONE, 1e18
@@ -192,7 +185,8 @@ def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
     """Step on to the planned lanes that a vehicle's front has reached."""
     while vehicle.offset > net.lanes[vehicle.lane].length and vehicle.planned_count > 0:
         vehicle.offset -= net.lanes[vehicle.lane].length
-        _pass_goal(net, vehicle)
+        while vehicle.goal != NONE and net.goal_edge[vehicle.goal] == net.lanes[vehicle.lane].edge:
+            vehicle.goal = vehicle.goal + 1 if vehicle.goal + 1 < vehicle.goal_end else NONE
         for k in range(PREVIOUS_LANES - 1, 0, -1):
             vehicle.previous_lanes[k] = vehicle.previous_lanes[k - 1]
         vehicle.previous_lanes[0] = vehicle.lane
