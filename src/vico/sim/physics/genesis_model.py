@@ -193,8 +193,7 @@ class GenesisIndex:
         self.mode = np.zeros(count, np.int32)
         self.gain, self.bias = np.zeros(count), np.zeros((count, 3))
         self.limit = np.tile([-np.inf, np.inf], (count, 1))
-        servos = dict(zip(model.motors, model.servos, strict=True))
-        follows: dict[str, str] = {name: servos[name] for name in model.driven}
+        follows = dict(zip(model.motors, model.servos, strict=True))
         modes = {"position": POSITION, "velocity": VELOCITY, "force": FORCE}
         for k in range(count):
             mine = np.flatnonzero(self._motor_of[:, k])

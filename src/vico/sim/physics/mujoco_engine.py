@@ -22,6 +22,7 @@ from vico.sim.physics.engine import Actuate
 from vico.sim.physics.mujoco_model import (
     FRICTION,
     SOLID_GROUPS,
+    LinkState,
     base_motion,
     begin_frame,
     motion_of,
@@ -34,6 +35,9 @@ from vico.sim.physics.mujoco_model import (
 from vico.sim.physics.mujoco_scene import CompiledScene, EngineParameters, SharedModel
 from vico.sim.physics.records import (
     COARSE,
+    CONTACT_FORCE,
+    CONTACT_NORMAL,
+    CONTACT_POSITION,
     FINE,
     SOLVER_STEPS,
     Base,
@@ -455,7 +459,7 @@ class MujocoEngine:
         told = (
             (self._qpos, self._qvel, s.first, self._velocity_before),
             (s.solids.cells, s.solids.reaches, self._near_solids),
-            (*s.link_parts, *self._link_motion, self._links_meet),
+            LinkState(*s.link_parts, *self._link_motion, self._links_meet),
             (movers.entity, movers.start, movers.end, movers.time),
             (s.mover_mocap, self._mocap_pos, self._mocap_quat),
         )
@@ -513,7 +517,8 @@ class MujocoEngine:
         party, owner = s.geom_party[geoms], s.geom_owner[geoms]
         movers = party == Party.BODY
         owner = np.where(movers, self._movers.entity[np.where(movers, owner, 0)], owner).astype(np.int32)
-        return Contacts(party, owner, s.geom_link[geoms], *(kept[:, a].copy() for a in (slice(2, 5), slice(5, 8), 8)))
+        columns = (kept[:, column].copy() for column in (CONTACT_POSITION, CONTACT_NORMAL, CONTACT_FORCE))
+        return Contacts(party, owner, s.geom_link[geoms], *columns)
 
     # State.
 

@@ -509,7 +509,7 @@ class EngineParameters:
 
     def _write_parts(self, model: Any) -> None:
         s, parts = self._scene, PartRows(self.object_parts)
-        geoms, used = s.object_geoms, parts.used
+        geoms, used = s.object_geoms, parts.is_used
         model.geom_size[geoms], model.geom_rbound[geoms] = parts.sizes, parts.radii
         model.geom_aabb[geoms, 3:] = parts.half
         model.geom_pos[geoms], model.geom_quat[geoms] = parts.position, parts.quaternion

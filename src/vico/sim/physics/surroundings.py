@@ -184,7 +184,8 @@ class CityChunks:
         if known is None:
             solids = static_scene_of(self._city.part([place]), flying=self._flying)
             corners = [(points[:, :2].min(axis=0), points[:, :2].max(axis=0)) for points in solids.hulls]
-            around = np.hypot(solids.boxes[:, 4], solids.boxes[:, 5])
+            *_, half_length, half_width, _ = solids.boxes.T
+            around = np.hypot(half_length, half_width)
             known = _Tile(
                 solids,
                 np.array(corners).reshape(-1, 4),

@@ -17,7 +17,7 @@ from vico.geometry import distance, distances
 from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots.path_following import RobotStatus
 from vico.sim.robots.path_planning import BESIDE, CEILING, HOVER
-from vico.sim.robots.quadrotor import HEADING, POSITION, TURNING, VELOCITY, Flight, FlightPhase
+from vico.sim.robots.quadrotor import HEADING, POSITION, TURNING, VELOCITY, VELOCITY_UP, Flight, FlightPhase
 from vico.sim.robots.state import RobotMode, RobotRun
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def keep_apart(run: RobotRun, flight: Flight, row: int, around: FlightNeighbours
     velocity = setpoint[VELOCITY].copy()
     floor, roof = around.floor(velocity), around.roof(velocity)
     if bottom - 0.5 < floor:
-        setpoint[5] = max(setpoint[5], 0.0)
+        setpoint[VELOCITY_UP] = max(setpoint[VELOCITY_UP], 0.0)
         setpoint[2] = max(setpoint[2], floor + flight.model.stand)
     if bottom < floor:
         setpoint[VELOCITY] = 0.0, 0.0, _CLIMB
@@ -120,7 +120,7 @@ def keep_apart(run: RobotRun, flight: Flight, row: int, around: FlightNeighbours
     elif bottom + flight.model.height > roof - 0.5:
         is_free = bottom > run.scene.airspace.top(around.position) + _LOW
         sinks = commanded and is_free and bottom + flight.model.height > roof
-        setpoint[5] = min(setpoint[5], -_GIVE_WAY if sinks else 0.0)
+        setpoint[VELOCITY_UP] = min(setpoint[VELOCITY_UP], -_GIVE_WAY if sinks else 0.0)
         setpoint[2] = min(setpoint[2], around.position[2])
     _keep_inside(run, setpoint, around.position)
 
@@ -432,12 +432,12 @@ def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Flig
     if above > 0.3 and base.position[2] - flight.model.stand - 0.3 < floor:
         run.arrays.status[robot] = RobotStatus.WAITING
         a.setpoint[row, 2] = floor + flight.model.stand
-        a.setpoint[row, 5] = 0.0
+        a.setpoint[row, VELOCITY_UP] = 0.0
         return
     run.arrays.status[robot] = RobotStatus.MOVING
-    a.setpoint[row, 5] = -_SINK if above > _NEAR else -_TOUCH
+    a.setpoint[row, VELOCITY_UP] = -_SINK if above > _NEAR else -_TOUCH
     if _TOUCH < above < _NEAR and float(np.hypot(*(base.position - spot)[:2])) > _ON_SPOT:
-        a.setpoint[row, 5] = 0.0
+        a.setpoint[row, VELOCITY_UP] = 0.0
     still = above < 1.0 and abs(float(base.velocity[2])) < _STILL
     a.calm[row] = a.calm[row] + dt if still else 0.0
     if a.calm[row] > _CALM:

@@ -275,14 +275,15 @@ class RobotRooms:
         things = np.column_stack([np.asarray(column[chosen], np.float64) for column in columns]).reshape(-1, 7)
         table = np.vstack([np.array(rows), things])
         n = len(table)
+        yaw, half_length, half_width, height = (column.copy() for column in table[:, 3:].T)
         return Bodies(
             np.arange(-1, -n - 1, -1).astype(np.int32),
             np.full(n, FIXTURE, np.int8),
             table[:, :3].copy(),
-            table[:, 3].copy(),
-            table[:, 4].copy(),
-            table[:, 5].copy(),
-            table[:, 6].copy(),
+            yaw,
+            half_length,
+            half_width,
+            height,
             np.zeros((n, 2)),
         )
 

@@ -64,8 +64,8 @@ class SignalsShown(NamedTuple):
                 "position": np.round(self.position[k], 3).tolist(),
             }
             if one["for"] == "pedestrians":
-                ends = np.round(self.crossing[k], 3).tolist()
-                one |= {"crossing": [ends[:2], ends[2:4]], "width": ends[4]}
+                *ends, width = np.round(self.crossing[k], 3).tolist()
+                one |= {"crossing": [ends[:2], ends[2:]], "width": width}
             found.append(one)
         return found
 
