@@ -508,9 +508,9 @@ class GenesisShapes:
             rows = slice(int(self._start[geom]), int(self._end[geom]))
             self._vertices[rows] = self._unit[rows] * size
         for link in np.unique(self._link[geoms]).tolist():
-            self._bound(link)
+            self._set_bounds(link)
 
-    def _bound(self, link: int) -> None:
+    def _set_bounds(self, link: int) -> None:
         """Fit the box around a link's shapes, in its frame."""
         mine = range(int(self._first[link]), int(self._last[link]))
         points = np.concatenate(

@@ -229,7 +229,7 @@ class BuiltScene:
         not zero.
         """
         saved = {name: array.copy() for name, array in self.state.items() if name not in _SPARSE}
-        rows = self._touched()
+        rows = self._touched_slots()
         saved["contact_rows"] = rows
         for name in _SPARSE:
             if name in self.state:
@@ -238,7 +238,7 @@ class BuiltScene:
 
     def load(self, saved: dict[str, NDArray[Any]]) -> None:
         """Write back what `save` returned."""
-        touched = self._touched()
+        touched = self._touched_slots()
         for name, array in self.state.items():
             if name in _SPARSE:
                 array[touched] = 0.0
@@ -246,7 +246,7 @@ class BuiltScene:
             else:
                 array[...] = saved[name]
 
-    def _touched(self) -> NDArray[np.int64]:
+    def _touched_slots(self) -> NDArray[np.int64]:
         if _SPARSE[1] not in self.state:
             return np.zeros(0, np.int64)
         depth, direction = self.state[_SPARSE[1]][:, 0], self.state[_SPARSE[0]][:, 0]

@@ -272,7 +272,7 @@ class MujocoEngine:
         if gains is not None and gains != self._gains_of[robot]:
             mine = self.compiled.servos_of[robot]
             self._parameters.stiffness[mine], self._parameters.damping[mine] = gains
-            self._parameters.changed()
+            self._parameters.mark_changed()
             self._gains_of[robot] = gains
 
     def thrust(
@@ -317,7 +317,7 @@ class MujocoEngine:
         mine = self.compiled.servos_of[robot]
         self._parameters.stiffness[mine] = self.compiled.stiffness[mine]
         self._parameters.damping[mine] = self.compiled.damping[mine]
-        self._parameters.changed()
+        self._parameters.mark_changed()
         self._gains_of[robot] = None
         self._forget()
 
@@ -340,7 +340,7 @@ class MujocoEngine:
         self._movers.set(obstacles, dt, self._qpos[self.compiled.base_position][~self._parked])
         if not np.array_equal(self._parameters.mover_half, self._movers.half):
             self._parameters.mover_half[:] = self._movers.half
-            self._parameters.changed()
+            self._parameters.mark_changed()
         self._move_movers()
 
     @property
@@ -352,7 +352,7 @@ class MujocoEngine:
         """Have people and vehicles be where those of another engine are."""
         self._movers.restore(movers.arrays())
         self._parameters.mover_half[:] = movers.half
-        self._parameters.changed()
+        self._parameters.mark_changed()
         self._move_movers()
         self._forget()
 
@@ -365,7 +365,7 @@ class MujocoEngine:
         """Have ground, tyres and feet grip with this share of their friction on dry ground."""
         if self._parameters.grip[0] != share:
             self._parameters.grip[0] = share
-            self._parameters.changed()
+            self._parameters.mark_changed()
 
     # Free rigid objects.
 

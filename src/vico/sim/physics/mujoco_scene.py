@@ -363,10 +363,10 @@ class ChunkedScenes:
         with self._lock:
             known = next((one for one in reversed(self._known.values()) if needed <= one.chunks), None)
             if known is None:
-                known = self._compiled(self._near(places, _AHEAD))
+                known = self._compiled_scene(self._near(places, _AHEAD))
         return known.full if scene.slots else known
 
-    def _compiled(self, chunks: frozenset[Chunk]) -> CompiledScene:
+    def _compiled_scene(self, chunks: frozenset[Chunk]) -> CompiledScene:
         while len(self._known) >= _SCENES:
             self._known.pop(next(iter(self._known)))
         # From the south-west: the order of solids decides the order of contacts.
@@ -469,7 +469,7 @@ class EngineParameters:
         self.object_inertia[:] = cube.inertia(OBJECT_MASS)
         self.token = object()
 
-    def changed(self) -> None:
+    def mark_changed(self) -> None:
         """Note that some of the numbers were written."""
         self.token = object()
 
@@ -477,7 +477,7 @@ class EngineParameters:
         """Say what an object is made of, and weighs, kilograms."""
         self.object_parts[slot], self.object_mass[slot] = parts.rows, mass
         self.object_inertia[slot] = parts.inertia(mass)
-        self.changed()
+        self.mark_changed()
 
     def hold(self, model: SharedModel) -> None:
         """Have a model say what these say."""
@@ -538,11 +538,11 @@ class EngineParameters:
         """Take over what another engine of the same scene, with objects or without, says of all but objects."""
         self.stiffness[:], self.damping[:] = other.stiffness, other.damping
         self.mover_half[:], self.grip[:] = other.mover_half, other.grip
-        self.changed()
+        self.mark_changed()
 
     def restore(self, numbers: NDArray[np.float64]) -> None:
         """Go back to what `numbers` was."""
         if numbers.shape != self.numbers.shape:
             raise SchemaError("physics: the saved state belongs to other robots or surroundings")
         self.numbers[:] = numbers
-        self.changed()
+        self.mark_changed()

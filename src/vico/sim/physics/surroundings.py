@@ -408,7 +408,7 @@ class LooseObjects:
         points = np.column_stack([x + c * u - s * v, y + s * u + c * v, np.full(len(u), z + height)])
         return self._engine.clearance_below(points) - height
 
-    def _moved(self, k: int) -> bool:
+    def _has_moved(self, k: int) -> bool:
         """Return whether somebody else has written a thing's pose since it was last seen or written."""
         objects = self._objects
         stays = np.array_equal(objects.position[k], self._position[k])
@@ -430,7 +430,7 @@ class LooseObjects:
         motion, objects = self._engine.objects(), self._objects
         for slot in taken:
             k = objects.index(int(self.entity[slot]))
-            if self._moved(k):
+            if self._has_moved(k):
                 continue  # by somebody else, within a sub-step: `update` takes it from there
             up = rotation_matrix(motion.quaternion[slot])[:, 2]
             objects.position[k] = motion.position[slot] - up * objects.size[k, 2] / 2

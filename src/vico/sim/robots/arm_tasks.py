@@ -134,21 +134,6 @@ def begin_task(run: RobotRun, robot: int, kind: TaskKind, target: Array, entity:
         run.followers[robot].begin(path)
 
 
-def begin_pick(run: RobotRun, robot: int, entity: int) -> None:
-    """Begin to pick a thing up.
-
-    Raises
-    ------
-    InputError
-        If the robot has no arm, or there is no such thing.
-    """
-    found = _object(run, entity)
-    if found is None:
-        raise InputError(f"pick: there is no thing {entity}")
-    objects, k = found
-    begin_task(run, robot, TaskKind.PICK, objects.position[k].copy(), entity)
-
-
 def begin_offer(run: RobotRun, robot: int, person: Array) -> None:
     """Begin to hold out what is held to a person who stands at a point.
 
@@ -160,20 +145,6 @@ def begin_offer(run: RobotRun, robot: int, person: Array) -> None:
     away = run.position(robot)[:2] - person[:2]
     away = away / max(float(np.hypot(*away)), 1e-6)
     begin_task(run, robot, TaskKind.OFFER, person + np.array([*(away * _ARM_LENGTH), _HELD_OUT]))
-
-
-def begin_place_on(run: RobotRun, robot: int, entity: int) -> None:
-    """Begin to put what is held on a robot's deck.
-
-    Raises
-    ------
-    InputError
-        If the robot has no arm, or nobody has such a deck.
-    """
-    spot = deck_spot(run, robot, entity)
-    if spot is None:
-        raise InputError(f"place: {entity} has no deck")
-    begin_task(run, robot, TaskKind.PLACE, spot, entity)
 
 
 def abandon_task(run: RobotRun, robot: int) -> None:
@@ -277,7 +248,10 @@ def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool
     elif stage == TaskStage.GRIP and a.kind[row] == TaskKind.OFFER:
         _wait_for_taker(run, work, row, memory)
     elif stage == TaskStage.GRIP:
-        _grip(work, row, memory)
+        # Close past the thing, against the fingers' largest force, or open; then lift.
+        memory[ARM_GOAL][7:] = 0.0 if a.kind[row] == TaskKind.PICK else work.opening
+        if a.timer[row] > _GRIP_TIME:
+            _next(work, row, TaskStage.LIFT)
     else:
         _move(run, robot, work, row, memory)
     return False
@@ -438,14 +412,6 @@ def _move(run: RobotRun, robot: int, work: ArmTasks, row: int, memory: Array) ->
         _after_lift(run, robot, work, row, memory, kind)
     else:
         _finish(run, robot, work, row, _DONE[kind])
-
-
-def _grip(work: ArmTasks, row: int, memory: Array) -> None:
-    """Close past the thing, against the fingers' largest force, or open; then lift."""
-    a = work.arrays
-    memory[ARM_GOAL][7:] = 0.0 if a.kind[row] == TaskKind.PICK else work.opening
-    if a.timer[row] > _GRIP_TIME:
-        _next(work, row, TaskStage.LIFT)
 
 
 def _wait_for_taker(run: RobotRun, work: ArmTasks, row: int, memory: Array) -> None:

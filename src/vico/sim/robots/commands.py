@@ -62,23 +62,6 @@ def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> No
     run.set_mode(robot, RobotMode.MOTORS if chosen.drives == "motors" else RobotMode.VELOCITY)
 
 
-def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
-    """Follow a velocity (vx, vy, wz): metres a second in the base's frame, radians a second to the left.
-
-    Robots that fly take (vx, vy, vz, wz).
-
-    Raises
-    ------
-    InputError
-        If the robot follows no velocities, or these are not so many finite numbers.
-    """
-    model = run.scene.models[robot]
-    spaces = [name for name, space in model.action_spaces.items() if space.drives == "velocity"]
-    if not spaces:
-        raise InputError(f"drive: {model.title} follows no velocities; command its motors")
-    command(run, robot, velocity, spaces[0])
-
-
 def stop(run: RobotRun, robot: int) -> None:
     """Stand still, or hover."""
     flying.hold_position(run, robot)
@@ -334,7 +317,7 @@ def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> Ro
     follower, base = run.followers[robot], run.engine.base(robot)
     run.arrays.velocity[robot] = follower.steer(base, others, dt, slope_ahead(run, robot, base))
     if follower.wants_detour:
-        follower.detoured(path_around(run, robot, follower.path[-1], follower.closed(base, others)))
+        follower.take_detour(path_around(run, robot, follower.path[-1], follower.standing_discs(base, others)))
     return follower.status
 
 

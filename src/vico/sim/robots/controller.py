@@ -60,7 +60,7 @@ class MotorController:
         """
         return np.tile(self.model.stance, (len(motion), 1))
 
-    def commanded(self, motion: Motion, command: Array, memory: Array) -> Array:
+    def command_targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Return what servos follow that are commanded one by one, shape ``(k, motors)``; arguments as above."""
         memory[:] = 0.0
         return command

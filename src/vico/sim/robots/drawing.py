@@ -69,11 +69,6 @@ def cameras(run: RobotRun) -> NDArray[np.float64]:
     return found
 
 
-def camera_heights(run: RobotRun) -> NDArray[np.float64]:
-    """Height of each robot's camera above its body's bottom, metres; of the base's where there is no camera."""
-    return np.asarray(cameras(run)[:, 2] - run.bodies().position[:, 2])
-
-
 def deck_of(run: RobotRun, entity: int) -> DeckPose | None:
     """Return the deck of the robot with an entity; None if it has none."""
     for i in np.flatnonzero(run.entities == entity):

@@ -122,7 +122,11 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
     fallen = arrays.status[robots] == _FALLEN
     led = ~fallen & (arrays.mode[robots] != _MOTORS)
     if led.any():
-        _follow_velocities(run, group, memory, led.nonzero()[0])
+        rows = led.nonzero()[0]
+        who, mine = robots[rows], memory[rows]
+        targets = group.controller.targets(run.engine.motion(who), arrays.velocity[who], mine)
+        run.engine.command_all(who, _as_held(run, who, targets), group.controller.gains(mine))
+        memory[rows] = mine
     for row in (~led).nonzero()[0].tolist():
         robot = int(robots[row])
         if arrays.mode[robot] != _MOTORS or fallen[row]:
@@ -138,7 +142,7 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
             run.engine.command(robot, *lying)
         elif arrays.mode[robot] == _MOTORS:
             who, told = robots[row : row + 1], arrays.command[robot : robot + 1, : len(group.model.motors)]
-            targets = group.controller.commanded(run.engine.motion(who), told, memory[row : row + 1])
+            targets = group.controller.command_targets(run.engine.motion(who), told, memory[row : row + 1])
             run.engine.command(robot, _as_held(run, who, targets)[0], group.controller.command_gains)
         else:
             run.engine.command(robot, group.model.stance)
@@ -147,16 +151,6 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
 def _as_held(run: RobotRun, robots: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """Return targets with fingers kept where they touch what is held by oracle."""
     return targets if run.oracle is None else run.oracle.spread(robots, targets)
-
-
-def _follow_velocities(run: RobotRun, group: RobotGroup, memory: np.ndarray, rows: np.ndarray) -> None:
-    """Have some of a kind's robots follow their velocities, all in one call."""
-    robots, mine = group.robots[rows], memory[rows]
-    targets = _as_held(
-        run, robots, group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)
-    )
-    run.engine.command_all(robots, targets, group.controller.gains(mine))
-    memory[rows] = mine
 
 
 #: Seconds that a robot stands with a low or empty battery until somebody, who is not shown, has put in a full one.
@@ -289,7 +283,13 @@ def proprioception(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
     }
     flown = flight_of(run, robot)
     if s.joints:
-        angles, speeds = run.engine.joints(robot) if flown is None else _rotors(*flown)
+        if flown is None:
+            angles, speeds = run.engine.joints(robot)
+        else:  # those of its rotors, positive to the left seen from above
+            flight, row = flown
+            assert flight.model.rotors is not None
+            turns = flight.model.rotors.turns
+            angles, speeds = flight.arrays.turned[row] * turns, flight.arrays.speed[row] * turns
         found["joint_position"], found["joint_velocity"] = np.array(angles), np.array(speeds)
     if s.imu:
         imu = run.engine.imu(robot)
@@ -307,10 +307,3 @@ def proprioception(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
         forces = run.engine.contacts().link_forces(robot, len(links))
         found["contacts"] = forces[[links.index(link) for link in s.contacts]]
     return found
-
-
-def _rotors(flight: Flight, row: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return angles and speeds of a robot's rotors, rad and rad/s, positive to the left seen from above."""
-    rotors = flight.model.rotors
-    assert rotors is not None
-    return flight.arrays.turned[row] * rotors.turns, flight.arrays.speed[row] * rotors.turns

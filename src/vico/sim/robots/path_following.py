@@ -453,7 +453,7 @@ class PathFollower:
         x, y = base.position[:2]
         return free_ahead(x, y, base.yaw, _BACK_SPEED, (m.half_length, m.half_width), _NO_PATH, 0.0, others)
 
-    def closed(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
+    def standing_discs(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
         """Discs (x, y, radius) a detour keeps out of: those who stand still near, and what is right ahead."""
         still = np.flatnonzero(_stand_still(others))
         discs = [disc for one in others[still] for disc in _discs(one, self._model.half_width + 0.35)]
@@ -462,7 +462,7 @@ class PathFollower:
             discs.append((float(ahead[0]), float(ahead[1]), 0.5))
         return np.array(discs).reshape(-1, 3)
 
-    def detoured(self, path: NDArray[np.float64] | None) -> None:
+    def take_detour(self, path: NDArray[np.float64] | None) -> None:
         """Take a new way; without one, or after too many, give up or keep waiting."""
         self.wants_detour = False
         self.detours += 1
@@ -525,7 +525,7 @@ class WaypointFollowers:
         """Row of a robot in the arrays."""
         return int(np.flatnonzero(self.robots == robot)[0])
 
-    def saved(self) -> dict[str, NDArray[Any]]:
+    def state_arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, copied."""
         found = {name: value.copy() for name, value in vars(self.arrays).items()}
         return found | {
@@ -534,7 +534,7 @@ class WaypointFollowers:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `saved` returned."""
+        """Go back to what `state_arrays` returned."""
         for name, value in vars(self.arrays).items():
             value[...] = arrays[name]
         starts = np.concatenate([[0], arrays["way_ends"]]).astype(int)

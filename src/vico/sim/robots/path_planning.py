@@ -189,7 +189,7 @@ class RobotRooms:
         while cells[-1] != first:
             cells.append(int(before[cells[-1]]))
         points = np.vstack([here, grid.points[chosen[cells[::-1]]]])
-        return self._straightened(points, room, radius, closed)
+        return self._straighten(points, room, radius, closed)
 
     def spot(self, room: int, near: Array, radius: float, closed: Array, within: float) -> Array | None:
         """Return the nearest point to a point where a robot has room, clear of discs, shape ``(2,)``; None for none."""
@@ -199,7 +199,7 @@ class RobotRooms:
             return None
         return np.array(grid.points[k])
 
-    def _straightened(self, points: Array, room: int, radius: float, closed: Array) -> Array:
+    def _straighten(self, points: Array, room: int, radius: float, closed: Array) -> Array:
         """Leave out points of a way between which one can go straight."""
         kept, at = [0], 0
         while at < len(points) - 1:

@@ -171,7 +171,7 @@ class FlightArrays:
     wind: NDArray[np.float64]
 
     @classmethod
-    def landed(cls, count: int, rotors: int) -> FlightArrays:
+    def on_ground(cls, count: int, rotors: int) -> FlightArrays:
         """Robots on the ground with full batteries."""
         return cls(
             speed=np.zeros((count, rotors)),
@@ -216,7 +216,7 @@ class Flight(WaypointFollowers):
     arrays: FlightArrays = field(init=False)
 
     def __post_init__(self) -> None:
-        self.arrays = FlightArrays.landed(len(self.robots), len(self.model.motors))
+        self.arrays = FlightArrays.on_ground(len(self.robots), len(self.model.motors))
         self.ways = [self.no_way()] * len(self.robots)
         r = self.model.rotors
         assert r is not None

@@ -104,11 +104,6 @@ class JamLog:
         ]
 
 
-def entity_before(blocker: int, entities: NDArray[np.int32]) -> int:
-    """Return the entity of the body a vehicle stands behind, 0 for nobody; `entities` of all bodies of the step."""
-    return int(entities[blocker]) if NONE < blocker < len(entities) else 0
-
-
 _BACK_UP_AFTER = 3.0  # s that both have stood
 _ALIKE = 0.85  # cosine of the angle between two headings that count as the same
 _QUEUE = 6  # vehicles behind one another that make room

@@ -22,7 +22,7 @@ from vico.sim.traffic.car_following import (
 )
 from vico.sim.traffic.drawing import TrafficDrawing, TrafficView
 from vico.sim.traffic.gatherings import Gatherings
-from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
+from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog
 from vico.sim.traffic.junctions import crossed_tracks
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrian_routes import PEDESTRIAN_RADIUS, mark_busy_crossings
@@ -34,6 +34,7 @@ from vico.sim.traffic.signals import Circles, SignalClock, SignalHeads, SignalsS
 from vico.sim.traffic.state import (
     AWAY,
     COMING,
+    NONE,
     PEDESTRIAN_RECORD,
     TOP_SPEED,
     VEHICLE_STATE,
@@ -282,7 +283,7 @@ class Traffic(TrafficView):
 
     def signals_shown(self) -> SignalsShown | None:
         """Return what all signals show now; None where they are not obeyed."""
-        return None if self.signals is None else self.signals.shown(self._net, self.paths)
+        return None if self.signals is None else self.signals.signals_shown(self._net, self.paths)
 
     @property
     def lane_lights(self) -> NDArray[np.uint8]:
@@ -402,7 +403,9 @@ class Traffic(TrafficView):
             come_back(self._net, self._vehicles, v, everybody)
 
     def _before(self, v: int) -> int:
-        return entity_before(int(self.fleet.blocker[v]), self._entities)
+        """Return the entity of the body that a vehicle stands behind, 0 for nobody."""
+        blocker = int(self.fleet.blocker[v])
+        return int(self._entities[blocker]) if NONE < blocker < len(self._entities) else 0
 
     @property
     def reentered(self) -> int:

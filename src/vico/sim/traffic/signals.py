@@ -172,7 +172,7 @@ class SignalClock:
         x, y = self.position[program].tolist()
         return SignalDay(np.roll(column, -int(self._offset[program])), (x, y))
 
-    def shown(self, net: LaneNetwork, paths: WalkwayNetwork) -> SignalsShown:
+    def signals_shown(self, net: LaneNetwork, paths: WalkwayNetwork) -> SignalsShown:
         """Return what all of them show now, as `show` has written it."""
         light = np.concatenate([net.lanes["light"][self.lane], paths.walkways["light"][self.walkway]])
         return SignalsShown(self._place, light, self._ends)

@@ -128,7 +128,7 @@ class Trams:
             for track in self.tracks
         ]
         self._zones, count = self.network.zones
-        self._crossings = TramCrossings(self.tracks, traffic, self.network.crossed)
+        self._crossings = TramCrossings(self.tracks, traffic, self.network.crossings)
         self.called = self._crossings.called
         obeys = traffic.signals is not None
         self._signals: list[list[TramSignal]] = self.network.signals if obeys else [[] for _ in lines]
@@ -382,13 +382,13 @@ class Trams:
             self._bodies = self._bodies_now()
         return self._bodies
 
-    def _shown(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def _sections_in_city(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Tram, section and x, y, yaw of every section that reaches into the city."""
         trams, section = np.nonzero(self._inside)
         return trams, section, self._poses[trams, section]
 
     def _bodies_now(self) -> Bodies:
-        trams, section, pose = self._shown()
+        trams, section, pose = self._sections_in_city()
         n = len(trams)
         if not n:
             return Bodies.none()
@@ -416,7 +416,7 @@ class Trams:
 
     def draw(self) -> Drawn:
         """Return the sections and the leaves of their doors."""
-        trams, section, pose = self._shown()
+        trams, section, pose = self._sections_in_city()
         n = len(trams)
         names = sorted(self.prototypes())
         made_of = [SHAPES_OF[self.lines[line].kind] for line in self.line_of[trams].tolist()]
