@@ -271,7 +271,9 @@ def _joint_name(spec: Any, name: str, *, driven: bool) -> str:
 
 #: Genesis takes the larger of two frictions, and 0.01 at least. Tyres and feet, which go before the ground in MuJoCo,
 #: have more than the ground here; solids and people have none of their own.
-GROUND_FRICTION, SMOOTH, OBJECT_FRICTION = 0.6, 0.01, 0.6
+GROUND_FRICTION = 0.6
+SMOOTH = 0.01
+OBJECT_FRICTION = 0.6
 #: Side of the squares whose solids are one link, metres: boxes around links are compared first.
 _TILE = 120.0
 #: Collisions that are looked at in a step at most.

@@ -254,8 +254,10 @@ ENTER, LEAVE = 2.5, 3.5
 #: What is higher than this above what is below it falls; what reaches deeper into ground or kerb is lifted out of it
 #: when it enters, but not by more than the second: then it lies in something that physics takes for solid, metres.
 _IN_THE_AIR, _TOO_DEEP = 0.03, 0.15
-#: Kilograms a cubic metre of a thing's box, and bounds of its mass, kg, where no entry says what it weighs.
-_DENSITY, _LIGHTEST, _HEAVIEST = 150.0, 0.05, 60.0
+# Of a thing's box, and bounds of its mass, where no entry says what it weighs.
+_DENSITY = 150.0  # kg/m^3
+_LIGHTEST = 0.05  # kg
+_HEAVIEST = 60.0  # kg
 # Where it is asked what lies below a thing: its middle and near its corners, shares of its half extents.
 _PROBES = np.array([[0.0, 0.0], [0.9, 0.9], [0.9, -0.9], [-0.9, 0.9], [-0.9, -0.9]])
 

@@ -79,12 +79,17 @@ STANDOFFS, _EXACT = (0.60, 0.54, 0.66), 0.03
 LIFT, ROOM = 0.16, 0.02
 # Tilts of the hand that are tried, rad.
 _TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
-_NEAR, _NEAR_ENOUGH, _STRAIGHT, _TURN = 1.1, 2.2, 0.25, 0.9
+_NEAR = 1.1  # m from the base's middle at which a target is near enough to align with it
+_NEAR_ENOUGH = 2.2  # m of the same for who has to wait for others
+_STRAIGHT = 0.25  # m/s at most while it aligns
+_TURN = 0.9  # rad/s at most while it aligns
 _DONE = {TaskKind.PICK: "picked", TaskKind.PLACE: "placed", TaskKind.OFFER: "handed_over"}
 # Metres before a person, and above the ground there, that things are held out to them.
 _ARM_LENGTH, _HELD_OUT = 0.45, 0.95
 _LOW = 0.05  # metres below where things are carried that make a hand low
-_GRIP_TIME, _STALE, _SETTLED = 1.2, 25.0, 0.02
+_GRIP_TIME = 1.2  # s that fingers take to close or open
+_STALE = 25.0  # s in one stage after which a task has failed
+_SETTLED = 0.02  # rad from the end of the arm's way at which it is there
 # Metres from the base's middle in which what is in the hand can be, and that the hand may be out of its box.
 _REACH, _ABOUT = 1.5, 0.05
 _PEOPLE = 0.9  # metres ahead of the base in which nobody may be

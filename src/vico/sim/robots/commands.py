@@ -165,8 +165,9 @@ def _need_velocities(run: RobotRun, robot: int, what: str) -> None:
 
 #: Metres over which a slope counts: a robot brakes on the whole of it.
 _REACH = 1.2
-#: Metres ahead between two points that are looked at for walls, how many, and m/s at which a robot may touch one.
-_STEP, _POINTS, _TOUCH = 0.25, 8, 0.3
+_STEP = 0.25  # m ahead between two points that are looked at for walls
+_POINTS = 8  # how many of them
+_TOUCH = 0.3  # m/s at which a robot may touch a wall
 
 
 def slope_ahead(run: RobotRun, robot: int, base: Base) -> float:

@@ -27,13 +27,17 @@ FLIGHT_BRAKING = 1.5
 
 # Metres above and beside others that it keeps to.
 _ABOVE, _ASIDE = 1.5, 1.5
-# Seconds that the motion of people and vehicles is foreseen, and of others that fly, who come faster; metres within
-# which they are looked for.
-_FORESIGHT, _FLIGHT_FORESIGHT, _NEIGHBOUR_REACH, _FLIGHT_NEAR = 1.5, 2.5, 20.0, 45.0
+# Of people and vehicles, and of others that fly, who come faster.
+_FORESIGHT = 1.5  # s that their motion is foreseen
+_FLIGHT_FORESIGHT = 2.5
+_NEIGHBOUR_REACH = 20.0  # m within which they are looked for
+_FLIGHT_NEAR = 45.0
 # Metres that somebody's feet are above it from which on it is not they who are below.
 _OVERHEAD = 1.0
-# Metres a second it climbs and sinks with to let others pass, and metres above everything below which it does not sink.
-_CLIMB, _GIVE_WAY, _LOW = 2.0, 1.0, 3.0
+# To let others pass it climbs and sinks.
+_CLIMB = 2.0  # m/s
+_GIVE_WAY = 1.0  # m/s
+_LOW = 3.0  # m above everything below which it does not sink
 
 
 @dataclass(frozen=True)
@@ -150,12 +154,14 @@ _CORNER = 0.6
 # Metres beside its way up to which it flies on as fast as it can, and from which on it only comes back: wind would blow
 # it on into what its way leads round.
 _ON_WAY, _OFF_WAY = 0.5, 2.0
-# Metres a second it comes down with, far above what is below and near it; metres that is.
-_SINK, _TOUCH, _NEAR = 1.5, 0.4, 3.0
+_SINK = 1.5  # m/s it comes down with far above what is below
+_TOUCH = 0.4  # m/s it comes down with near it
+_NEAR = 3.0  # m above it that are near
 # Seconds without sinking, slower than so many metres a second, after which it has landed.
 _CALM, _STILL = 0.5, 0.08
-# Metres behind and above whom it follows, how far that one has to go for another way to be found.
-_BEHIND, _HIGHER, _DRIFT = 4.0, 5.0, 3.0
+_BEHIND = 4.0  # m behind whom it follows
+_HIGHER = 5.0  # m above whom it follows
+_DRIFT = 3.0  # m that one has to go for another way to be found
 # Seconds without getting nearer after which a way counts as blocked; share of its battery at which it lands.
 _PATIENCE, LOW_BATTERY = 30.0, 0.1
 _ERRAND_REST, _ERRAND_HEIGHT = 5.0, 15.0

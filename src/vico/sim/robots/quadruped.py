@@ -431,8 +431,9 @@ FOLDED = np.array([0.0, 1.4, -2.65])
 # search in simulation over both models and seven ways to lie, the score being how soon all of them are up.
 _ON_BACK = np.array([[0.98, 3.3, -1.9], [-0.71, 2.81, -1.8]])
 _ON_SIDE = np.array([[-0.83, 3.32, -1.89], [0.0, 1.41, -1.56]])
-#: Seconds an attempt to get up lasts, and when in it the legs begin and cease to push.
-_TRY, _PUSH, _PULL = 3.0, 0.5, 2.06
+_TRY = 3.0  # s that an attempt to get up lasts
+_PUSH = 0.5  # s from its beginning at which the legs begin to push ...
+_PULL = 2.06  # ... and cease to
 
 
 def get_up_targets(lying: float, base: Base, rest: Array) -> Array | None:

@@ -24,7 +24,7 @@ from vico.sim.traffic.route import NEVER, STANDING_ROOM, clear_of_tracks, is_lan
 from vico.sim.traffic.state import DRIVING, HELD_JUNCTIONS, NONE, PRESENT, PREVIOUS_LANES, SEVERAL
 
 #: What stands against entering a junction: nothing, one who cannot leave it before, others.
-FREE, LETS_OUT, TAKEN = 0, 1, 2
+FREE, LETS_OUT, TAKEN = range(3)
 
 _LONG = 6.0  # m from which on a vehicle needs a junction to itself
 _LONG_COUNTS = 4.0  # times as much does its wait count where others share: an empty junction is rare

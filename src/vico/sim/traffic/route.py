@@ -16,7 +16,11 @@ from vico.sim.traffic.state import (
 
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
-_DEAD_END, _JUNCTION_AGAIN, _BEEN_THERE, _TURN_BACK = 4.0, 2.0, 50.0, 1e6  # costs, in vehicles on a street
+# Costs of lanes, in vehicles on a street.
+_DEAD_END = 4.0
+_JUNCTION_AGAIN = 2.0
+_BEEN_THERE = 50.0
+_TURN_BACK = 1e6
 _SHUT = 1e8  # only where there is no other way, turning back among them
 _LESS_PICKY = 5.0  # s of waiting that count like a vehicle on a street
 

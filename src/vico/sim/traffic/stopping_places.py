@@ -30,7 +30,9 @@ from vico.world.world import World
 _BEYOND = 10.0  # m of lane after a way out that belong to it
 _PAST_MIDDLE = 4.0  # m straight on beyond a spot's middle
 _SPOT_END = 0.3  # m of a spot that a car leaves free
-_OFF_LANE, _OFF_WALKWAY, _NEAR_STREET = 0.8, 0.6, 14.0  # m kept from lane and sidewalk by who waits; of way before it
+_OFF_LANE = 0.8  # m kept from the lane by who waits
+_OFF_WALKWAY = 0.6  # m kept from the sidewalk by who waits
+_NEAR_STREET = 14.0  # m of the way out before its end in which that place lies
 
 Floats = NDArray[np.float64]
 
@@ -144,9 +146,13 @@ _RADIUS, _LEAST_TAPER = 6.0, 8.0  # m, of the bend into a place, and of lane it 
 _AIR = 0.12  # m between a car on its way into a place and anything that stands
 _BEFORE, _AFTER = 6.0, 7.0  # m of lane before that way and after it, where others wait for a junction
 _STEP = 0.5  # m between outlines of the way
-_DELIVERY_ENDS, _DELIVERY_EVERY, _DELIVERY_LANE = 35.0, 20.0, 80.0  # m to a lane's ends, between places, of lane
+_DELIVERY_ENDS = 35.0  # m from a lane's ends to the first place
+_DELIVERY_EVERY = 20.0  # m between places
+_DELIVERY_LANE = 80.0  # m of lane, at least
 _EDGE, _INWARDS = 0.15, 0.5  # m that a van keeps to its lane's edge; how far it leaves the middle
-_CROSSING, _STOP, _RAILS = 10.0, 25.0, 4.0  # m kept to crossings, stops and rails
+_CROSSING = 10.0  # m kept to crossings
+_STOP = 25.0  # m kept to stops
+_RAILS = 4.0  # m kept to rails
 
 
 class _Place(NamedTuple):
@@ -282,15 +288,18 @@ _LANE_LEFT = 0.65  # m that the middles of others can be apart who pass beside s
 _FROM_WALL = 0.65  # m from a window to who looks in
 _BESIDE_DOOR = (1.7, 2.6)  # m along the wall from a door to a window
 _WALL_WITHIN = (0.35, 0.9)  # m to the wall of who looks in
-# Metres around doors, around where passengers wait and around bicycle stations that stay free.
-_DOOR_FREE, _STOP_FREE, _STATION_FREE = 1.0, 1.1, 2.5
+_DOOR_FREE = 1.0  # m around doors that stay free
+_STOP_FREE = 1.1  # m around where passengers wait
+_STATION_FREE = 2.5  # m around bicycle stations
 _APART = 2 * _BODY + 0.1  # m between two who stand, at least
 _SPOT_CELL = 2.5  # m along a cell by which round places are found: none is wider to a side
 _REACH = 6.0  # m from a walkway to a spot beside it
 _OTHER_WALKWAYS = 0.9  # m to them
 _PAIR_EVERY, _PAIR_APART = 30.0, 0.72  # m along a sidewalk between pairs, and between the two of a pair
 _BEND = 0.05  # m by which that may differ
-_AT_STOP, _STOP_GRID, _PER_STOP = 5.0, 0.5, 6  # m around where passengers wait, m between places tried, and people
+_AT_STOP = 5.0  # m around where passengers wait
+_STOP_GRID = 0.5  # m between places that are tried there
+_PER_STOP = 6  # people at most
 _STOP_ROOM, _FROM_LANE = 0.35, 1.9  # m around who waits, and from there to the middle of the lane or track
 _STOP_REACH = 9.0  # m from a walkway to who waits
 _WAY = 1.5  # m along the walkway that the way to a spot takes
