@@ -163,7 +163,7 @@ class SolidCells:
         finite = reaches[np.isfinite(reaches)]
         if len(finite):
             whole = float(finite.max()) + SLACK + _HALF_DIAGONAL
-            solids = _outlines(scene), _tops(scene)
+            solids = _outlines_and_tops(scene)
             for k, (west, south) in enumerate(corners.tolist()):
                 _measure((self.away[k], self.tops[k]), (west, south), solids, _DIRECTIONS, whole)
         if len(finite) < len(reaches):  # something of it may be anywhere
@@ -179,15 +179,8 @@ class SolidCells:
         self.away[:], self.tops[:] = 0.0, np.inf
 
 
-def _tops(scene: StaticScene) -> NDArray[np.float64]:
-    """Height of each solid's top, metres, in the order of `_outlines`."""
-    hulls = [float(points[:, 2].max()) for points in scene.hulls]
-    boxes, pillars = (solids[:, 2] + solids[:, -1] for solids in (scene.boxes, scene.pillars))  # middle and half height
-    return np.concatenate([np.array(hulls), boxes, pillars]) + _ROUNDING
-
-
-def _outlines(scene: StaticScene) -> NDArray[np.float64]:
-    """How far each solid goes in each direction, metres, shape ``(n, 16)``."""
+def _outlines_and_tops(scene: StaticScene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far each solid goes in each direction, metres, shape ``(n, 16)``, and the height of its top."""
     found: list[NDArray[Any]] = [apply_matrix(points[:, :2], _DIRECTIONS).max(axis=0)[None] for points in scene.hulls]
     x, y, _, yaw, a, b, _ = scene.boxes.T
     middle = apply_matrix(np.stack([x, y], axis=1), _DIRECTIONS)
@@ -196,7 +189,10 @@ def _outlines(scene: StaticScene) -> NDArray[np.float64]:
     sideways = apply_matrix(np.stack([-s, c], axis=1), _DIRECTIONS)
     found.append(middle + np.abs(forward) * a[:, None] + np.abs(sideways) * b[:, None])
     found.append(apply_matrix(scene.pillars[:, :2], _DIRECTIONS) + scene.pillars[:, 3:4])
-    return np.concatenate([np.zeros((0, len(_DIRECTIONS))), *found])
+    hulls = [float(points[:, 2].max()) for points in scene.hulls]
+    boxes, pillars = (solids[:, 2] + solids[:, -1] for solids in (scene.boxes, scene.pillars))  # middle and half height
+    tops = np.concatenate([np.array(hulls), boxes, pillars]) + _ROUNDING
+    return np.concatenate([np.zeros((0, len(_DIRECTIONS))), *found]), tops
 
 
 #: Bodies within this distance of a robot can be met, metres.

@@ -165,7 +165,9 @@ class GenesisIndex:
         self.shown = np.array([of[name] for name in model.shapes], np.int64)
         self._dof = {joint.name: int(joint.dofs_idx[0]) for joint in entity.joints if joint.n_dofs == 1}
         self._q = {joint.name: int(joint.qs_idx[0]) for joint in entity.joints if joint.n_dofs == 1}
-        measured = [_joint_name(spec, name, driven=name in model.driven) for name in model.joints]
+        # Joints by their own names, but those of motors by the motors'.
+        moved = {name: spec.joint(int(spec.actuator_trnid[spec.actuator(name).id, 0])).name for name in model.driven}
+        measured = [str(moved.get(name, name)) for name in model.joints]
         self.angle = np.array([self._q[name] for name in measured], np.int64)
         self.rate = np.array([self._dof[name] for name in measured], np.int64)
         self._index_motors(model, spec)
@@ -262,11 +264,6 @@ def _transmission(spec: Any, actuator: int) -> list[tuple[int, float]]:
             return [(int(spec.wrap_objid[k]), gear * float(spec.wrap_prm[k])) for k in rows]
     name = spec.actuator(actuator).name
     raise InputError(f"physics: motor {name!r} drives no joints, which Genesis' motors do; take --physics mujoco")
-
-
-def _joint_name(spec: Any, name: str, *, driven: bool) -> str:
-    """Return the name of a joint: of the one an actuator drives, or the one that has the name itself."""
-    return str(spec.joint(int(spec.actuator_trnid[spec.actuator(name).id, 0])).name if driven else name)
 
 
 #: Genesis takes the larger of two frictions, and 0.01 at least. Tyres and feet, which go before the ground in MuJoCo,

@@ -50,7 +50,12 @@ class RobotIndex:
     def __init__(self, model: Any, index: int, robot: RobotModel) -> None:
         prefix = f"r{index}/"
         motors = np.array([model.actuator(prefix + motor).id for motor in robot.driven], np.int64)
-        joints = [_joint_of(model, prefix + joint, driven=joint in robot.driven) for joint in robot.joints]
+        # A motor's name stands for the joint that it drives.
+        joints = [
+            int(model.actuator_trnid[model.actuator(prefix + name).id, 0] if name in robot.driven
+                else model.joint(prefix + name).id)
+            for name in robot.joints
+        ]  # fmt: skip
         base = model.body(prefix + "base")
         self.motor = motors
         self.servo = motors[[servo == "position" for servo in robot.servos]] if robot.driven else motors
@@ -411,11 +416,6 @@ def _slide(model: Any, joint: int) -> float:
         return float(np.abs(model.jnt_range[joint]).max()) if model.jnt_limited[joint] else np.inf
     # A hinge or ball away from its body's origin swings that around itself.
     return 0.0 if kind == mujoco.mjtJoint.mjJNT_FREE else 2.0 * float(np.linalg.norm(model.jnt_pos[joint]))
-
-
-def _joint_of(model: Any, name: str, *, driven: bool) -> int:
-    """Return a joint: the one an actuator drives, or the one that has the name itself."""
-    return int(model.actuator_trnid[model.actuator(name).id, 0]) if driven else int(model.joint(name).id)
 
 
 def _run_of(indices: NDArray[Any]) -> slice | NDArray[Any]:

@@ -85,15 +85,6 @@ def is_mirrored(memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _swap_action(memory):  # type: ignore[no-untyped-def]
-    """Exchange left and right of the last action: the other leg begins to swing."""
-    for k in range(LEG):
-        sign = -1.0 if k < 2 else 1.0
-        a, b = memory[ACTION + k], memory[ACTION + LEG + k]
-        memory[ACTION + k], memory[ACTION + LEG + k] = sign * b, sign * a
-
-
-@compiled
 def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-def]
     """Let the stride of a robot go on, begin or end.
 
@@ -122,8 +113,11 @@ def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-de
             memory[STEPPING] = 0.0
         swapped = is_mirrored(memory)
         memory[PHASE] = after - math.floor(after + 1e-9)
-        if swapped != is_mirrored(memory):
-            _swap_action(memory)
+        if swapped != is_mirrored(memory):  # the other leg begins to swing: left and right of the last action change
+            for k in range(LEG):
+                sign = -1.0 if k < 2 else 1.0
+                a, b = memory[ACTION + k], memory[ACTION + LEG + k]
+                memory[ACTION + k], memory[ACTION + LEG + k] = sign * b, sign * a
 
 
 @compiled

@@ -247,7 +247,10 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
         elif mode == _FOLLOW:
             _keep_near(run, robot, others, dt, around.bodies)
         elif mode == _TASK and decide_task(run, robot, around.bodies, dt):
-            _drive_to_work(run, robot, others, dt)
+            # It is on its way to where the arm has something to do; where it can't be gone, that has to do.
+            arrays.status[robot] = status = _steer(run, robot, others, dt)
+            if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+                run.followers[robot].end()
 
 
 def _rest(run: RobotRun, robot: int, dt: float) -> None:
@@ -320,14 +323,6 @@ def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> Ro
     if follower.wants_detour:
         follower.take_detour(path_around(run, robot, follower.path[-1], follower.standing_discs(base, others)))
     return follower.status
-
-
-def _drive_to_work(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> None:
-    """Follow the way to where an arm has something to do; where it can't be gone, that has to do."""
-    status = _steer(run, robot, others, dt)
-    run.arrays.status[robot] = status
-    if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
-        run.followers[robot].end()
 
 
 def _keep_near(run: RobotRun, robot: int, others: NDArray[np.void], dt: float, everyone: Bodies) -> None:

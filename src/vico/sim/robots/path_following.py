@@ -325,11 +325,6 @@ def footprint_discs(
     return [(x + c * shift, y + s * shift, width + room) for shift in shifts]
 
 
-def _discs(one: np.void, room: float) -> list[tuple[float, float, float]]:
-    pose = float(one["x"]), float(one["y"]), float(one["yaw"])
-    return footprint_discs(pose, float(one["half_length"]), float(one["half_width"]), room)
-
-
 def _stand_still(others: NDArray[np.void]) -> NDArray[np.bool_]:
     still: NDArray[np.bool_] = np.hypot(others["vx"], others["vy"]) < STILL
     return still
@@ -456,7 +451,11 @@ class PathFollower:
     def standing_discs(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
         """Discs (x, y, radius) a detour keeps out of: those who stand still near, and what is right ahead."""
         still = np.flatnonzero(_stand_still(others))
-        discs = [disc for one in others[still] for disc in _discs(one, self._model.half_width + 0.35)]
+        discs: list[tuple[float, float, float]] = []
+        for one in others[still]:
+            pose = float(one["x"]), float(one["y"]), float(one["yaw"])
+            half_length, half_width = float(one["half_length"]), float(one["half_width"])
+            discs += footprint_discs(pose, half_length, half_width, self._model.half_width + 0.35)
         ahead = base.position[:2] + base.rotation[:2, 0] * (self._model.half_length + GAP)
         if not len(still):
             discs.append((float(ahead[0]), float(ahead[1]), 0.5))

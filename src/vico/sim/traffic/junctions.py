@@ -521,7 +521,7 @@ def _who_is_at_exit(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-
 
 
 @compiled
-def _waits_outside(net, vehicle):  # type: ignore[no-untyped-def]
+def waits_outside(net, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a vehicle waits for a junction before it: for ever, if who has waited longer cannot pass it."""
     return vehicle.junction_wait > 0.0 and vehicle.granted_count == 0 and net.lanes[vehicle.lane].junction < 0
 
@@ -570,7 +570,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
     if lane >= 0 and is_overtaken(junctions.longest_exit_wait[lane], counted_wait(junctions, vehicle)):
         return False
     other = _who_is_at_exit(vehicle, leave, view, len(fleet))
-    if 0 <= other < len(fleet) and _waits_outside(net, fleet[other]):
+    if 0 <= other < len(fleet) and waits_outside(net, fleet[other]):
         vehicle.kept_out_from = fleet[other].lane  # that one goes first, and who comes behind it stays back
         return False
     if other >= 0:

@@ -46,18 +46,13 @@ def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_dead_end(net, street):  # type: ignore[no-untyped-def]
-    """Return whether a street only leads back."""
-    onward = net.lanes[street].first_next
-    return net.lanes[street].end_next == onward + 1 and net.lanes[net.next[onward]].u_turn
-
-
-@compiled
 def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-untyped-def]
     """Return what speaks against taking lane `option` to `street`: vehicles there, and ways that lead nowhere new."""
     # The longer it has waited to go its way, the less it minds where another one leads.
     cost = street_load[net.lanes[street].edge] + next_random(vehicle) * (1.0 + vehicle.junction_wait / _LESS_PICKY)
-    if _is_dead_end(net, street):
+    # A dead end: a street that only leads back.
+    onward = net.lanes[street].first_next
+    if net.lanes[street].end_next == onward + 1 and net.lanes[net.next[onward]].u_turn:
         cost += _DEAD_END  # only when everywhere else is busy
     # Out of a junction, not round and round in it, and not back to where the car waits.
     if net.lanes[street].junction >= 0:

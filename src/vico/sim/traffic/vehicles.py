@@ -146,8 +146,13 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             and not at_signal
             and not request_junctions(net, fleet, junctions, vehicle, request, view)
         )
-        keeps_wait = at_signal or vehicle.gives_way_to != NONE
-        vehicle.junction_wait = _junction_wait(vehicle, is_refused, keeps_wait, dt)
+        # At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each. So
+        # does who makes room for another one.
+        keeps_wait = is_refused or at_signal or vehicle.gives_way_to != NONE
+        if vehicle.speed >= _CREEP or not keeps_wait:
+            vehicle.junction_wait = 0.0
+        elif is_refused:
+            vehicle.junction_wait += dt
 
         # The speed that it drives at on an empty lane.
         wanted = min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed)
@@ -175,7 +180,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         else:
             shapes.vx[v] = shapes.vy[v] = 0.0
 
-        is_standing = vehicle.speed < _standing_speed(vehicle, dt)
+        # On snow and ice one that has just set off is so slow that it would be taken for one that does not get going.
+        is_standing = vehicle.speed < min(STANDING, _STARTED * vehicle.acceleration * dt)
         vehicle.blocker = leader if gap < _BLOCKER_GAP and is_standing else NONE
         release_junctions(net, junctions, vehicle)
         vehicle.lights = shown_lights(net, vehicle, speed, dt)
@@ -264,27 +270,6 @@ def _keeps_others_out(vehicle, junctions):  # type: ignore[no-untyped-def]
     """
     is_patient = not junctions.claims.any_shared or vehicle.junction_wait < _KEEPS_OUT_FOR
     return vehicle.junction_wait > 0.0 and is_patient
-
-
-@compiled
-def _junction_wait(vehicle, is_refused, keeps_wait, dt):  # type: ignore[no-untyped-def]
-    """Return how long a vehicle has waited for a junction, s.
-
-    At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each. So does
-    who makes room for another one.
-    """
-    if vehicle.speed >= _CREEP or not (is_refused or keeps_wait):
-        return 0.0
-    return vehicle.junction_wait + (dt if is_refused else 0.0)
-
-
-@compiled
-def _standing_speed(vehicle, dt):  # type: ignore[no-untyped-def]
-    """Return the speed below which a vehicle stands, m/s.
-
-    On snow and ice one that has just set off is so slow that it would be taken for one that does not get going.
-    """
-    return min(STANDING, _STARTED * vehicle.acceleration * dt)
 
 
 @inlined

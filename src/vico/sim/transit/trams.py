@@ -420,7 +420,10 @@ class Trams:
         n = len(trams)
         names = sorted(self.prototypes())
         made_of = [SHAPES_OF[self.lines[line].kind] for line in self.line_of[trams].tolist()]
-        bases = _transforms(pose, self._traffic.height(pose[:, :2]) if n else np.zeros(0))
+        bases = np.tile(np.eye(4), (n, 1, 1))
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        bases[:, 0, 0], bases[:, 0, 1], bases[:, 1, 0], bases[:, 1, 1] = c, -s, s, c
+        bases[:, :2, 3], bases[:, 2, 3] = pose[:, :2], self._traffic.height(pose[:, :2]) if n else np.zeros(0)
         index = [
             np.array(
                 [names.index(f"{what}_{_PART[k]}") for what, k in zip(made_of, section.tolist(), strict=True)], np.int32
@@ -507,12 +510,3 @@ def _departure(line: TramLine, number: int) -> int:
 def _first_after(line: TramLine, second: float) -> int:
     days, of_the_day = divmod(second, DAY)
     return int(np.searchsorted(line.departures, of_the_day)) + len(line.departures) * int(days)
-
-
-def _transforms(pose: NDArray[np.float64], ground: NDArray[np.float64]) -> NDArray[np.float64]:
-    n = len(pose)
-    found = np.tile(np.eye(4), (n, 1, 1))
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1] = c, -s, s, c
-    found[:, :2, 3], found[:, 2, 3] = pose[:, :2], ground
-    return found
