@@ -19,12 +19,14 @@ from vico.sim.bodies.arrays import Bodies, Drawn, concatenate_drawn
 from vico.sim.traffic.car_following import VEHICLE_MODELS
 from vico.sim.traffic.jams import JamLog
 from vico.sim.traffic.lights import LampDrawing
+from vico.sim.traffic.route import is_taken
 from vico.sim.traffic.shapes import Shapes, TrafficLevels
 from vico.sim.traffic.signals import SignalHeads
 from vico.sim.traffic.state import GAIT_TIME, NONE, PRESENT, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
+from vico.world.walkways import Walkways
 
 
 class TrafficDrawing:
@@ -209,6 +211,7 @@ class TrafficView:
     cyclists: int
     pedestrians: int
     lanes: LaneGraph
+    walks: Walkways
     height: HeightField
     paths: WalkwayNetwork
     fleet: Any
@@ -226,6 +229,7 @@ class TrafficView:
     _riding_speed: NDArray[np.float64]
     _levels: TrafficLevels
     _drawing: TrafficDrawing
+    _shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None]  # lanes and walkways
     _bodies: Bodies | None  # as they stand since they last moved; asked for by everybody
 
     def bodies(self) -> Bodies:
@@ -236,6 +240,24 @@ class TrafficView:
             out = np.concatenate([np.ones(len(found) - self.pedestrians, np.bool_), ~riding])
             self._bodies = found.where(out) if riding.any() else found
         return self._bodies
+
+    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
+        """Return whether a car is on some lanes (a mask), or on its way there."""
+        return bool(is_taken(self._net, self._vehicles, lanes))
+
+    @property
+    def shut_lanes(self) -> NDArray[np.bool_] | None:
+        """Which lanes events keep cars off, without those that lead nowhere else; None for none."""
+        return self._shut[0]
+
+    @property
+    def shut_walkways(self) -> NDArray[np.bool_] | None:
+        """Which walkways nobody is to walk on; None for none."""
+        return self._shut[1]
+
+    def is_shut_street_taken(self) -> bool:
+        """Return whether a car is where an event keeps cars off."""
+        return self._shut[0] is not None and self.is_taken(self._shut[0])
 
     def _everybody(self) -> Bodies:
         """Return vehicles and all pedestrians, who ride in buses far away."""

@@ -28,7 +28,7 @@ from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrian_routes import PEDESTRIAN_RADIUS, mark_busy_crossings
 from vico.sim.traffic.pedestrians import advance_pedestrians, stand_at_start
 from vico.sim.traffic.placement import HandPlaced, Starting, TrafficSetup
-from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
+from vico.sim.traffic.route import count_per_street, drop_shut_plans, widen_shut
 from vico.sim.traffic.shapes import Shapes, TrafficLevels, shapes_of
 from vico.sim.traffic.signals import Circles, SignalClock, SignalHeads, SignalsShown
 from vico.sim.traffic.state import (
@@ -294,15 +294,6 @@ class Traffic(TrafficView):
         """Have cars plan anew that were about to drive where it is shut since."""
         drop_shut_plans(self._net, self._vehicles)
 
-    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
-        """Return whether a car is on some lanes (a mask), or on its way there."""
-        return bool(is_taken(self._net, self._vehicles, lanes))
-
-    @property
-    def shut_lanes(self) -> NDArray[np.bool_] | None:
-        """Which lanes events keep cars off, without those that lead nowhere else; None for none."""
-        return self._shut[0]
-
     def set_rounds(self, rounds: Sequence[Sequence[int]]) -> None:
         """Have buses drive by other rounds: lane numbers of each; `fleet.route` are their numbers."""
         first = np.zeros(len(rounds) + 1, np.int32)
@@ -333,15 +324,6 @@ class Traffic(TrafficView):
     def crossed_tracks(self) -> NDArray[np.bool_]:
         """Return on which of these crossings vehicles are or will not stop before, bool, shape ``(crossings,)``."""
         return np.asarray(crossed_tracks(self._net, self._vehicles), np.bool_)
-
-    @property
-    def shut_walkways(self) -> NDArray[np.bool_] | None:
-        """Which walkways nobody is to walk on; None for none."""
-        return self._shut[1]
-
-    def is_shut_street_taken(self) -> bool:
-        """Return whether a car is where an event keeps cars off."""
-        return self._shut[0] is not None and self.is_taken(self._shut[0])
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
