@@ -29,7 +29,7 @@ def thing(*parts: RigidPart, at: tuple[float, float, float], quaternion: np.ndar
 
 def test_a_box_is_one_part() -> None:
     rows = box_parts(np.array([0.1, 0.2, 0.3]))
-    assert rows.used.sum() == 1
+    assert rows.is_used.sum() == 1
     assert rows.inertia(3.0) == pytest.approx([0.13, 0.1, 0.05])
     middle, reach = rows._replace(rows=rows.rows[None]).bounds()
     assert middle[0] == pytest.approx([0, 0, 0])

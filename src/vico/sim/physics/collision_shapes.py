@@ -26,6 +26,8 @@ from vico.sim.physics.records import BALL, BOX, CYLINDER, PARTS, Capacity, Rigid
 _CELL = 0.5
 #: Directions in which the outline of a solid is measured: what lies between them counts to it.
 _DIRECTIONS = np.stack([np.cos(np.arange(16) * np.pi / 8), np.sin(np.arange(16) * np.pi / 8)], axis=1)
+# Which of the directions are these.
+_EAST, _NORTH, _WEST, _SOUTH = range(0, 16, 4)
 
 
 #: Metres a robot, or a link of one, may move before it is asked again.
@@ -46,11 +48,10 @@ def _measure(cells, corner, outlines, directions, reach):  # type: ignore[no-unt
     west, south = corner
     for k in range(len(outlines[0])):
         outline, top = outlines[0][k], outlines[1][k]
-        # The first, fifth, ninth and thirteenth direction are east, north, west and south.
-        first_column = max(int((-outline[8] - reach - west) / _CELL), 0)
-        last_column = min(int((outline[0] + reach - west) / _CELL), count - 1)
-        first_row = max(int((-outline[12] - reach - south) / _CELL), 0)
-        last_row = min(int((outline[4] + reach - south) / _CELL), count - 1)
+        first_column = max(int((-outline[_WEST] - reach - west) / _CELL), 0)
+        last_column = min(int((outline[_EAST] + reach - west) / _CELL), count - 1)
+        first_row = max(int((-outline[_SOUTH] - reach - south) / _CELL), 0)
+        last_row = min(int((outline[_NORTH] + reach - south) / _CELL), count - 1)
         for row in range(first_row, last_row + 1):
             y = (row + 0.5) * _CELL + south
             for column in range(first_column, last_column + 1):
@@ -65,23 +66,33 @@ def _measure(cells, corner, outlines, directions, reach):  # type: ignore[no-unt
                     tops[row, column] = max(tops[row, column], top)
 
 
+class CellArrays(NamedTuple):
+    """Squares of `SolidCells` as compiled code takes them; its attributes say what each is."""
+
+    number: NDArray[np.int32]
+    away: NDArray[np.float32]
+    tops: NDArray[np.float32]
+    half: float
+    side: float
+
+
 @compiled
 def is_clear(cells, point, radius):  # type: ignore[no-untyped-def]
     """Return whether nothing solid is within some metres of a point, `radius` no more than the cells are made for.
 
     Of points that no square holds it is not known: False.
     """
-    number, away, tops, half, side = cells
-    east, north = point[0] + half, point[1] + half
+    side = cells.side
+    east, north = point[0] + cells.half, point[1] + cells.half
     across, up = math.floor(east / side), math.floor(north / side)
-    if not (0 <= up < len(number) and 0 <= across < len(number)):
+    if not (0 <= up < len(cells.number) and 0 <= across < len(cells.number)):
         return False
-    k = number[int(up), int(across)]
+    k = cells.number[int(up), int(across)]
     if k < 0:
         return False
-    last = away.shape[1] - 1
+    last = cells.away.shape[1] - 1
     r, c = min(int((north - up * side) / _CELL), last), min(int((east - across * side) / _CELL), last)
-    return away[k, r, c] > radius + _HALF_DIAGONAL + _ROUNDING or point[2] - radius > tops[k, r, c]
+    return cells.away[k, r, c] > radius + _HALF_DIAGONAL + _ROUNDING or point[2] - radius > cells.tops[k, r, c]
 
 
 @compiled
@@ -152,31 +163,24 @@ class SolidCells:
         finite = reaches[np.isfinite(reaches)]
         if len(finite):
             whole = float(finite.max()) + SLACK + _HALF_DIAGONAL
-            solids = _outlines(scene), _tops(scene)
+            solids = _outlines_and_tops(scene)
             for k, (west, south) in enumerate(corners.tolist()):
                 _measure((self.away[k], self.tops[k]), (west, south), solids, _DIRECTIONS, whole)
         if len(finite) < len(reaches):  # something of it may be anywhere
             self.mark_all()
 
     @property
-    def cells(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32], float, float]:
+    def cells(self) -> CellArrays:
         """The squares as compiled code takes them."""
-        return self.number, self.away, self.tops, self.half, self.side
+        return CellArrays(self.number, self.away, self.tops, self.half, self.side)
 
     def mark_all(self) -> None:
         """Have something solid be near everywhere."""
         self.away[:], self.tops[:] = 0.0, np.inf
 
 
-def _tops(scene: StaticScene) -> NDArray[np.float64]:
-    """Height of each solid's top, metres, in the order of `_outlines`."""
-    hulls = [float(points[:, 2].max()) for points in scene.hulls]
-    boxes, pillars = scene.boxes[:, 2] + scene.boxes[:, 6], scene.pillars[:, 2] + scene.pillars[:, 4]
-    return np.concatenate([np.array(hulls), boxes, pillars]) + _ROUNDING
-
-
-def _outlines(scene: StaticScene) -> NDArray[np.float64]:
-    """How far each solid goes in each direction, metres, shape ``(n, 16)``."""
+def _outlines_and_tops(scene: StaticScene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far each solid goes in each direction, metres, shape ``(n, 16)``, and the height of its top."""
     found: list[NDArray[Any]] = [apply_matrix(points[:, :2], _DIRECTIONS).max(axis=0)[None] for points in scene.hulls]
     x, y, _, yaw, a, b, _ = scene.boxes.T
     middle = apply_matrix(np.stack([x, y], axis=1), _DIRECTIONS)
@@ -185,7 +189,10 @@ def _outlines(scene: StaticScene) -> NDArray[np.float64]:
     sideways = apply_matrix(np.stack([-s, c], axis=1), _DIRECTIONS)
     found.append(middle + np.abs(forward) * a[:, None] + np.abs(sideways) * b[:, None])
     found.append(apply_matrix(scene.pillars[:, :2], _DIRECTIONS) + scene.pillars[:, 3:4])
-    return np.concatenate([np.zeros((0, len(_DIRECTIONS))), *found])
+    hulls = [float(points[:, 2].max()) for points in scene.hulls]
+    boxes, pillars = (solids[:, 2] + solids[:, -1] for solids in (scene.boxes, scene.pillars))  # middle and half height
+    tops = np.concatenate([np.array(hulls), boxes, pillars]) + _ROUNDING
+    return np.concatenate([np.zeros((0, len(_DIRECTIONS))), *found]), tops
 
 
 #: Bodies within this distance of a robot can be met, metres.
@@ -340,14 +347,14 @@ class PartRows(NamedTuple):
     rows: Array
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def is_used(self) -> NDArray[np.bool_]:
         """Which are in use, shape ``(..., parts)``."""
         return np.asarray(self.rows[..., 0] > 0.0)
 
     @property
     def half(self) -> Array:
         """Half extents, metres, next to nothing of those that are not in use, shape ``(..., parts, 3)``."""
-        return np.where(self.used[..., None], self.rows[..., :3], _NOTHING)
+        return np.where(self.is_used[..., None], self.rows[..., :3], _NOTHING)
 
     @property
     def position(self) -> Array:
@@ -357,7 +364,7 @@ class PartRows(NamedTuple):
     @property
     def quaternion(self) -> Array:
         """Turns in the object's frame, shape ``(..., parts, 4)``."""
-        return np.where(self.used[..., None], self.rows[..., 6:], _IDENTITY)
+        return np.where(self.is_used[..., None], self.rows[..., 6:], _IDENTITY)
 
     @property
     def sizes(self) -> Array:
@@ -379,15 +386,15 @@ class PartRows(NamedTuple):
     def bounds(self) -> tuple[Array, Array]:
         """Middles of the boxes round whole objects, and half their extents, metres, shape ``(n, 3)`` each."""
         reach = np.einsum("...ij,...j->...i", np.abs(rotation_matrix(self.quaternion)), self.half)
-        low = np.where(self.used[..., None], self.position - reach, np.inf).min(axis=-2)
-        high = np.where(self.used[..., None], self.position + reach, -np.inf).max(axis=-2)
+        low = np.where(self.is_used[..., None], self.position - reach, np.inf).min(axis=-2)
+        high = np.where(self.is_used[..., None], self.position + reach, -np.inf).max(axis=-2)
         return (low + high) / 2, (high - low) / 2
 
     def inertia(self, mass: float) -> Array:
         """Moments of one object about its axes, kg m2, shape ``(3,)``, its mass spread evenly over its parts."""
-        shares = np.where(self.used, np.prod(self.half, axis=-1), 0.0) * [_FILLS[shape] for shape in PARTS]
+        shares = np.where(self.is_used, np.prod(self.half, axis=-1), 0.0) * [_FILLS[shape] for shape in PARTS]
         found = np.zeros(3)
-        for k in np.flatnonzero(self.used).tolist():
+        for k in np.flatnonzero(self.is_used).tolist():
             part, squares = mass * float(shares[k] / shares.sum()), self.half[k] ** 2
             own = part * _moments(PARTS[k], squares)
             turn, away = rotation_matrix(self.quaternion[k]), self.position[k] ** 2

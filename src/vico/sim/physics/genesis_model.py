@@ -165,7 +165,9 @@ class GenesisIndex:
         self.shown = np.array([of[name] for name in model.shapes], np.int64)
         self._dof = {joint.name: int(joint.dofs_idx[0]) for joint in entity.joints if joint.n_dofs == 1}
         self._q = {joint.name: int(joint.qs_idx[0]) for joint in entity.joints if joint.n_dofs == 1}
-        measured = [_joint_name(spec, name, driven=name in model.driven) for name in model.joints]
+        # Joints by their own names, but those of motors by the motors'.
+        moved = {name: spec.joint(int(spec.actuator_trnid[spec.actuator(name).id, 0])).name for name in model.driven}
+        measured = [str(moved.get(name, name)) for name in model.joints]
         self.angle = np.array([self._q[name] for name in measured], np.int64)
         self.rate = np.array([self._dof[name] for name in measured], np.int64)
         self._index_motors(model, spec)
@@ -193,7 +195,7 @@ class GenesisIndex:
         self.mode = np.zeros(count, np.int32)
         self.gain, self.bias = np.zeros(count), np.zeros((count, 3))
         self.limit = np.tile([-np.inf, np.inf], (count, 1))
-        follows = dict(zip(model.driven, _servos(model), strict=True))
+        follows = dict(zip(model.motors, model.servos, strict=True))
         modes = {"position": POSITION, "velocity": VELOCITY, "force": FORCE}
         for k in range(count):
             mine = np.flatnonzero(self._motor_of[:, k])
@@ -249,12 +251,6 @@ def _gripping(spec: Any, entity: Any) -> NDArray[np.int64]:
     return np.array(found, np.int64)
 
 
-def _servos(model: RobotModel) -> list[str]:
-    """Return what each driven motor follows."""
-    of = dict(zip(model.motors, model.servos, strict=True))
-    return [of[name] for name in model.driven]
-
-
 def _transmission(spec: Any, actuator: int) -> list[tuple[int, float]]:
     """Joints an actuator drives, and how much of it goes into each."""
     kind, target = int(spec.actuator_trntype[actuator]), int(spec.actuator_trnid[actuator, 0])
@@ -270,14 +266,11 @@ def _transmission(spec: Any, actuator: int) -> list[tuple[int, float]]:
     raise InputError(f"physics: motor {name!r} drives no joints, which Genesis' motors do; take --physics mujoco")
 
 
-def _joint_name(spec: Any, name: str, *, driven: bool) -> str:
-    """Return the name of a joint: of the one an actuator drives, or the one that has the name itself."""
-    return str(spec.joint(int(spec.actuator_trnid[spec.actuator(name).id, 0])).name if driven else name)
-
-
 #: Genesis takes the larger of two frictions, and 0.01 at least. Tyres and feet, which go before the ground in MuJoCo,
 #: have more than the ground here; solids and people have none of their own.
-GROUND_FRICTION, SMOOTH, OBJECT_FRICTION = 0.6, 0.01, 0.6
+GROUND_FRICTION = 0.6
+SMOOTH = 0.01
+OBJECT_FRICTION = 0.6
 #: Side of the squares whose solids are one link, metres: boxes around links are compared first.
 _TILE = 120.0
 #: Collisions that are looked at in a step at most.
@@ -448,15 +441,11 @@ class _Solids:
 
 
 def _mover(gs: Any, index: int, on_foot: bool) -> Any:
-    parked: Mapping[str, Any] = {"pos": parked_mover(index), "fixed": True, "visualization": False, **_BITS}
+    place = PARKED_APART * index, 0.0, PARKED
+    parked: Mapping[str, Any] = {"pos": place, "fixed": True, "visualization": False, **_BITS}
     if on_foot:
         return gs.morphs.Cylinder(radius=0.5, height=1.0, **parked)
     return gs.morphs.Box(size=(1.0, 1.0, 1.0), **parked)
-
-
-def parked_mover(index: int) -> tuple[float, float, float]:
-    """Where a kinematic body waits that stands for nobody."""
-    return PARKED_APART * index, 0.0, PARKED
 
 
 def _add_object(gs: Any, scene: Any, index: int) -> Any:
@@ -518,9 +507,9 @@ class GenesisShapes:
             rows = slice(int(self._start[geom]), int(self._end[geom]))
             self._vertices[rows] = self._unit[rows] * size
         for link in np.unique(self._link[geoms]).tolist():
-            self._bound(link)
+            self._set_bounds(link)
 
-    def _bound(self, link: int) -> None:
+    def _set_bounds(self, link: int) -> None:
         """Fit the box around a link's shapes, in its frame."""
         mine = range(int(self._first[link]), int(self._last[link]))
         points = np.concatenate(

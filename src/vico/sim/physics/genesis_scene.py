@@ -22,7 +22,19 @@ from vico.sim.physics.engine import Actuate
 from vico.sim.physics.genesis_model import GenesisIndex, build_scene, genesis, numpy_view, state_of
 from vico.sim.physics.mujoco_model import parked_object, place_bodies
 from vico.sim.physics.mujoco_scene import CompiledScene
-from vico.sim.physics.records import COARSE, FINE, Capacity, Contacts, ObjectMotion, Party, RigidObject, StaticScene
+from vico.sim.physics.records import (
+    COARSE,
+    CONTACT_FORCE,
+    CONTACT_NORMAL,
+    CONTACT_POSITION,
+    FINE,
+    Capacity,
+    Contacts,
+    ObjectMotion,
+    Party,
+    RigidObject,
+    StaticScene,
+)
 
 #: Steps in which Genesis solves a frame: 1/200 s each in fine frames, 1/100 s in coarse ones. Fine ones in which
 #: nothing has to be held are solved in one.
@@ -217,7 +229,7 @@ class BuiltScene:
         not zero.
         """
         saved = {name: array.copy() for name, array in self.state.items() if name not in _SPARSE}
-        rows = self._touched()
+        rows = self._touched_slots()
         saved["contact_rows"] = rows
         for name in _SPARSE:
             if name in self.state:
@@ -226,7 +238,7 @@ class BuiltScene:
 
     def load(self, saved: dict[str, NDArray[Any]]) -> None:
         """Write back what `save` returned."""
-        touched = self._touched()
+        touched = self._touched_slots()
         for name, array in self.state.items():
             if name in _SPARSE:
                 array[touched] = 0.0
@@ -234,7 +246,7 @@ class BuiltScene:
             else:
                 array[...] = saved[name]
 
-    def _touched(self) -> NDArray[np.int64]:
+    def _touched_slots(self) -> NDArray[np.int64]:
         if _SPARSE[1] not in self.state:
             return np.zeros(0, np.int64)
         depth, direction = self.state[_SPARSE[1]][:, 0], self.state[_SPARSE[0]][:, 0]
@@ -350,8 +362,8 @@ def read_contacts(solver: Any) -> NDArray[np.float64]:
     kept = np.zeros((len(found["link_a"]), 9))
     # Genesis' normal points from the second to the first.
     kept[:, 0], kept[:, 1] = found["link_b"], found["link_a"]
-    kept[:, 2:5], kept[:, 5:8] = found["position"], found["normal"]
-    kept[:, 8] = np.abs(np.einsum("ni,ni->n", found["force"], found["normal"]))
+    kept[:, CONTACT_POSITION], kept[:, CONTACT_NORMAL] = found["position"], found["normal"]
+    kept[:, CONTACT_FORCE] = np.abs(np.einsum("ni,ni->n", found["force"], found["normal"]))
     return kept
 
 
@@ -361,7 +373,7 @@ def contacts_of(scene: BuiltScene, kept: NDArray[np.float64], entity: NDArray[np
     party, owner = scene.party[links], scene.owner[links]
     movers = party == Party.BODY
     owner = np.where(movers, entity[np.where(movers, owner, 0)], owner).astype(np.int32)
-    columns = (kept[:, column].copy() for column in (slice(2, 5), slice(5, 8), 8))
+    columns = (kept[:, column].copy() for column in (CONTACT_POSITION, CONTACT_NORMAL, CONTACT_FORCE))
     return Contacts(party, owner, scene.number[links], *columns)
 
 

@@ -22,6 +22,7 @@ from vico.sim.physics.engine import Actuate
 from vico.sim.physics.mujoco_model import (
     FRICTION,
     SOLID_GROUPS,
+    LinkState,
     base_motion,
     begin_frame,
     motion_of,
@@ -34,6 +35,9 @@ from vico.sim.physics.mujoco_model import (
 from vico.sim.physics.mujoco_scene import CompiledScene, EngineParameters, SharedModel
 from vico.sim.physics.records import (
     COARSE,
+    CONTACT_FORCE,
+    CONTACT_NORMAL,
+    CONTACT_POSITION,
     FINE,
     SOLVER_STEPS,
     Base,
@@ -60,12 +64,6 @@ def _keep_warning(message: str) -> None:
         _WARNINGS.append(message)
 
 
-def collect_warnings() -> None:
-    """Have MuJoCo say here what it would append to a file in the folder people happen to be in."""
-    if mujoco.get_mju_user_warning() is None:
-        mujoco.set_mju_user_warning(_keep_warning)
-
-
 def step_solver(model: Any, data: Any, steps: int) -> None:
     """Have MuJoCo take some steps.
 
@@ -88,21 +86,6 @@ def take_warnings() -> list[str]:
     return said
 
 
-def report_warnings(said: Sequence[str], seconds: float, *, finite: bool) -> None:
-    """Warn of what MuJoCo has said.
-
-    Raises
-    ------
-    PhysicsError
-        If not all speeds are `finite`.
-    """
-    if not finite:
-        why = f" ({said[0]})" if said else ""
-        raise PhysicsError(f"physics: the robots' motion diverged at {seconds:.2f} s{why}; report it with the snapshot")
-    for message in said:
-        warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=4)
-
-
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
 _GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -122,7 +105,9 @@ class MujocoEngine:
     """
 
     def __init__(self, scene: CompiledScene, places: NDArray[np.float64]) -> None:
-        collect_warnings()
+        # MuJoCo would append its warnings to a file in the working directory.
+        if mujoco.get_mju_user_warning() is None:
+            mujoco.set_mju_user_warning(_keep_warning)
         places = np.asarray(places, np.float64)
         if places.shape != (len(scene.models), 3):
             raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
@@ -287,7 +272,7 @@ class MujocoEngine:
         if gains is not None and gains != self._gains_of[robot]:
             mine = self.compiled.servos_of[robot]
             self._parameters.stiffness[mine], self._parameters.damping[mine] = gains
-            self._parameters.changed()
+            self._parameters.mark_changed()
             self._gains_of[robot] = gains
 
     def thrust(
@@ -332,7 +317,7 @@ class MujocoEngine:
         mine = self.compiled.servos_of[robot]
         self._parameters.stiffness[mine] = self.compiled.stiffness[mine]
         self._parameters.damping[mine] = self.compiled.damping[mine]
-        self._parameters.changed()
+        self._parameters.mark_changed()
         self._gains_of[robot] = None
         self._forget()
 
@@ -355,7 +340,7 @@ class MujocoEngine:
         self._movers.set(obstacles, dt, self._qpos[self.compiled.base_position][~self._parked])
         if not np.array_equal(self._parameters.mover_half, self._movers.half):
             self._parameters.mover_half[:] = self._movers.half
-            self._parameters.changed()
+            self._parameters.mark_changed()
         self._move_movers()
 
     @property
@@ -367,7 +352,7 @@ class MujocoEngine:
         """Have people and vehicles be where those of another engine are."""
         self._movers.restore(movers.arrays())
         self._parameters.mover_half[:] = movers.half
-        self._parameters.changed()
+        self._parameters.mark_changed()
         self._move_movers()
         self._forget()
 
@@ -380,7 +365,7 @@ class MujocoEngine:
         """Have ground, tyres and feet grip with this share of their friction on dry ground."""
         if self._parameters.grip[0] != share:
             self._parameters.grip[0] = share
-            self._parameters.changed()
+            self._parameters.mark_changed()
 
     # Free rigid objects.
 
@@ -474,7 +459,7 @@ class MujocoEngine:
         told = (
             (self._qpos, self._qvel, s.first, self._velocity_before),
             (s.solids.cells, s.solids.reaches, self._near_solids),
-            (*s.link_parts, *self._link_motion, self._links_meet),
+            LinkState(*s.link_parts, *self._link_motion, self._links_meet),
             (movers.entity, movers.start, movers.end, movers.time),
             (s.mover_mocap, self._mocap_pos, self._mocap_quat),
         )
@@ -506,7 +491,13 @@ class MujocoEngine:
         """Raise or warn if MuJoCo said something."""
         said, finite = take_warnings(), math.isfinite(float(np.add.reduce(self._qvel)))
         if said or not finite:
-            report_warnings(said, self._data.time, finite=finite)
+            if not finite:
+                why = f" ({said[0]})" if said else ""
+                raise PhysicsError(
+                    f"physics: the robots' motion diverged at {self._data.time:.2f} s{why}; report it with the snapshot"
+                )
+            for message in said:
+                warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=4)
 
     def _last_contacts(self) -> NDArray[np.float64]:
         """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them.
@@ -526,7 +517,8 @@ class MujocoEngine:
         party, owner = s.geom_party[geoms], s.geom_owner[geoms]
         movers = party == Party.BODY
         owner = np.where(movers, self._movers.entity[np.where(movers, owner, 0)], owner).astype(np.int32)
-        return Contacts(party, owner, s.geom_link[geoms], *(kept[:, a].copy() for a in (slice(2, 5), slice(5, 8), 8)))
+        columns = (kept[:, column].copy() for column in (CONTACT_POSITION, CONTACT_NORMAL, CONTACT_FORCE))
+        return Contacts(party, owner, s.geom_link[geoms], *columns)
 
     # State.
 

@@ -7,7 +7,7 @@ of MuJoCo's arrays, and write poses into them, of many at once.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,19 @@ from vico.errors import InputError
 from vico.io.compiled import compiled
 from vico.io.mujoco import mujoco
 from vico.sim.physics.collision_shapes import SLACK, find_near, is_clear, moved_poses
-from vico.sim.physics.records import BALL, BOX, COARSE, CYLINDER, PARTS, SOLVER_STEPS, Capacity, StaticScene
+from vico.sim.physics.records import (
+    BALL,
+    BOX,
+    COARSE,
+    CONTACT_FORCE,
+    CONTACT_NORMAL,
+    CONTACT_POSITION,
+    CYLINDER,
+    PARTS,
+    SOLVER_STEPS,
+    Capacity,
+    StaticScene,
+)
 from vico.world.heights import HeightField
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
@@ -184,7 +196,11 @@ def _add_ground(spec: Any, scene: StaticScene) -> None:
         return
     for west, south in scene.squares.tolist():
         half = scene.side / 2
-        _add_field(spec, ground, (west + half, south + half), square_grid(scene, west, south), half)
+        # Neighbouring squares have the same heights along their common edge.
+        count = max(round(scene.side / _KERB_CELL), 1) + 1
+        x, y = (np.linspace(first, first + scene.side, count) for first in (west, south))
+        xx, yy = np.meshgrid(x, y)
+        _add_field(spec, ground, (west + half, south + half), scene.height(np.stack([xx, yy], axis=-1)), half)
 
 
 def _add_field(spec: Any, body: Any, middle: tuple[float, float], heights: NDArray[np.float64], half: float) -> None:
@@ -199,14 +215,6 @@ def _add_field(spec: Any, body: Any, middle: tuple[float, float], heights: NDArr
         userdata=((heights - low) / rise).astype(np.float32).ravel().tolist(),
     )
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*middle, low], **_SOLID)
-
-
-def square_grid(scene: StaticScene, west: float, south: float) -> NDArray[np.float64]:
-    """Heights of the ground in one of a scene's squares, metres, shape ``(n, n)``; neighbours have the same edge."""
-    count = max(round(scene.side / _KERB_CELL), 1) + 1
-    x, y = (np.linspace(first, first + scene.side, count) for first in (west, south))
-    xx, yy = np.meshgrid(x, y)
-    return scene.height(np.stack([xx, yy], axis=-1))
 
 
 def ground_grid(scene: StaticScene, *, kerbs: bool = True) -> tuple[NDArray[np.float64], float]:
@@ -292,7 +300,8 @@ def base_motion(positions, speeds, first):  # type: ignore[no-untyped-def]
         for i in range(3):
             position[k, i] = positions[q + i]
             velocity[k, i], angular_velocity_body[k, i] = speeds[v + i], speeds[v + 3 + i]
-        w, x, y, z = positions[q + 3], positions[q + 4], positions[q + 5], positions[q + 6]
+        turn = q + 3  # its quaternion follows its position
+        w, x, y, z = positions[turn], positions[turn + 1], positions[turn + 2], positions[turn + 3]
         quaternion[k] = w, x, y, z
         rotation[k, 0] = w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
         rotation[k, 1] = 2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)
@@ -330,6 +339,30 @@ def place_bodies(poses, entity, where, positions, quaternions):  # type: ignore[
             quaternions[body] = 1.0, 0.0, 0.0, 0.0
 
 
+class LinkState(NamedTuple):
+    """Links of all robots as `begin_frame` takes them; row = link, but for `places` and `motion` (body), `centre`.
+
+    Attributes
+    ----------
+    owner, body, radius, root
+        As `CompiledScene.link_parts`.
+    places, motion, centre
+        Positions of bodies, their angular and linear velocities about the centres of their robots' masses, and those
+        centres, as MuJoCo has them.
+    meets
+        Which links might meet solids, bool; written.
+    """
+
+    owner: NDArray[np.int64]
+    body: NDArray[np.int64]
+    radius: NDArray[np.float64]
+    root: NDArray[np.int64]
+    places: NDArray[np.float64]
+    motion: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    meets: NDArray[np.bool_]
+
+
 @compiled
 def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ignore[no-untyped-def]
     """Say which links could touch something solid in a frame, and move people and vehicles on to its end.
@@ -346,8 +379,7 @@ def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ign
         As `SolidCells.cells`, reaches of the robots, and `near`, which is written: of which robots links might meet
         solids, bool, shape ``(robots,)``.
     links
-        As `CompiledScene.link_parts`; positions of bodies, their velocities about the centres of their robots'
-        masses and those centres, as MuJoCo has them; and what is written: which links might meet solids, bool.
+        A `LinkState`.
     movers
         Entities, poses at the beginning and at the end of the motion, and seconds of it that have passed.
     mocap
@@ -359,19 +391,18 @@ def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ign
     for k in range(len(first)):
         for i in range(3):
             before[k, i] = speeds[first[k, 1] + i]
-    owner, body, radius, root, places, motion, centre, meets = links
-    for k in range(len(owner)):
-        meets[k] = near[owner[k]]
-        if known < 0.0 or not meets[k]:
+    for k in range(len(links.owner)):
+        links.meets[k] = near[links.owner[k]]
+        if known < 0.0 or not links.meets[k]:
             continue
-        b = body[k]
-        wx, wy, wz, vx, vy, vz = motion[b]
-        x, y, z = places[b]
-        ax, ay, az = x - centre[root[k], 0], y - centre[root[k], 1], z - centre[root[k], 2]
+        b, centre, radius = links.body[k], links.centre[links.root[k]], links.radius[k]
+        wx, wy, wz, vx, vy, vz = links.motion[b]
+        x, y, z = links.places[b]
+        ax, ay, az = x - centre[0], y - centre[1], z - centre[2]
         vx, vy, vz = vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax
-        speed = math.sqrt(vx * vx + vy * vy + vz * vz) + math.sqrt(wx * wx + wy * wy + wz * wz) * radius[k]
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz) + math.sqrt(wx * wx + wy * wy + wz * wz) * radius
         if 2.0 * speed * (frame + known) < SLACK:
-            meets[k] = not is_clear(cells, (x, y, z), radius[k] + SLACK)
+            links.meets[k] = not is_clear(cells, (x, y, z), radius + SLACK)
     entity, start, end, time = movers
     if time[0] < time[1] - 1e-9 and entity.any():
         time[0] += frame
@@ -380,12 +411,12 @@ def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ign
 
 
 def solved_contacts(data: Any) -> NDArray[np.float64]:
-    """Shapes (2), position (3), normal (3) and force of the contacts that the last step solved, shape ``(n, 9)``."""
+    """Contacts that the last step solved: two shapes, and the columns `CONTACT_POSITION` and on, shape ``(n, 9)``."""
     contact, solved = data.contact, np.asarray(data.contact.efc_address) >= 0
     found = np.empty((int(solved.sum()), 9))
     found[:, :2] = np.asarray(contact.geom)[solved]
-    found[:, 2:5] = np.asarray(contact.pos)[solved]
-    found[:, 5:8] = np.asarray(contact.frame)[solved, :3]
+    found[:, CONTACT_POSITION] = np.asarray(contact.pos)[solved]
+    found[:, CONTACT_NORMAL] = np.asarray(contact.frame)[solved, :3]
     # The first row of an elliptic or frictionless contact is its normal force.
-    found[:, 8] = data.efc_force[np.asarray(contact.efc_address)[solved]]
+    found[:, CONTACT_FORCE] = data.efc_force[np.asarray(contact.efc_address)[solved]]
     return found

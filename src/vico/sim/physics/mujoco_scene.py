@@ -50,7 +50,12 @@ class RobotIndex:
     def __init__(self, model: Any, index: int, robot: RobotModel) -> None:
         prefix = f"r{index}/"
         motors = np.array([model.actuator(prefix + motor).id for motor in robot.driven], np.int64)
-        joints = [_joint_of(model, prefix + joint, driven=joint in robot.driven) for joint in robot.joints]
+        # A motor's name stands for the joint that it drives.
+        joints = [
+            int(model.actuator_trnid[model.actuator(prefix + name).id, 0] if name in robot.driven
+                else model.joint(prefix + name).id)
+            for name in robot.joints
+        ]  # fmt: skip
         base = model.body(prefix + "base")
         self.motor = motors
         self.servo = motors[[servo == "position" for servo in robot.servos]] if robot.driven else motors
@@ -237,7 +242,11 @@ class CompiledScene:
         self._link_bits = np.array(m.body_contype[self._links])
         self._mover_bits = np.array(m.body_contype[self.mover_body]), np.array(m.body_conaffinity[self.mover_body])
         owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
-        self.link_parts = owner, self._links, _radii(m, self._links), np.asarray(m.body_rootid[self._links], np.int64)
+        radii = np.zeros(len(self._links))  # metres from a body's origin within which its shapes are
+        sizes = np.linalg.norm(m.geom_pos, axis=1) + m.geom_rbound
+        for k, body in enumerate(self._links.tolist()):
+            radii[k] = sizes[m.geom_bodyid == body].max(initial=0.0)
+        self.link_parts = owner, self._links, radii, np.asarray(m.body_rootid[self._links], np.int64)
         pristine = mujoco.MjData(m)
         m.opt.enableflags &= ~SLEEP
         mujoco.mj_kinematics(m, pristine)
@@ -359,10 +368,10 @@ class ChunkedScenes:
         with self._lock:
             known = next((one for one in reversed(self._known.values()) if needed <= one.chunks), None)
             if known is None:
-                known = self._compiled(self._near(places, _AHEAD))
+                known = self._compiled_scene(self._near(places, _AHEAD))
         return known.full if scene.slots else known
 
-    def _compiled(self, chunks: frozenset[Chunk]) -> CompiledScene:
+    def _compiled_scene(self, chunks: frozenset[Chunk]) -> CompiledScene:
         while len(self._known) >= _SCENES:
             self._known.pop(next(iter(self._known)))
         # From the south-west: the order of solids decides the order of contacts.
@@ -400,15 +409,6 @@ def _reach(model: Any, bodies: NDArray[np.int64]) -> float:
     return whole
 
 
-def _radii(model: Any, bodies: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Metres from each body's origin within which its shapes are."""
-    found = np.zeros(len(bodies))
-    sizes = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
-    for k, body in enumerate(bodies.tolist()):
-        found[k] = sizes[model.geom_bodyid == body].max(initial=0.0)
-    return found
-
-
 def _slide(model: Any, joint: int) -> float:
     """Metres a joint moves its body at most, away from where that turns."""
     kind = model.jnt_type[joint]
@@ -416,11 +416,6 @@ def _slide(model: Any, joint: int) -> float:
         return float(np.abs(model.jnt_range[joint]).max()) if model.jnt_limited[joint] else np.inf
     # A hinge or ball away from its body's origin swings that around itself.
     return 0.0 if kind == mujoco.mjtJoint.mjJNT_FREE else 2.0 * float(np.linalg.norm(model.jnt_pos[joint]))
-
-
-def _joint_of(model: Any, name: str, *, driven: bool) -> int:
-    """Return a joint: the one an actuator drives, or the one that has the name itself."""
-    return int(model.actuator_trnid[model.actuator(name).id, 0]) if driven else int(model.joint(name).id)
 
 
 def _run_of(indices: NDArray[Any]) -> slice | NDArray[Any]:
@@ -474,7 +469,7 @@ class EngineParameters:
         self.object_inertia[:] = cube.inertia(OBJECT_MASS)
         self.token = object()
 
-    def changed(self) -> None:
+    def mark_changed(self) -> None:
         """Note that some of the numbers were written."""
         self.token = object()
 
@@ -482,7 +477,7 @@ class EngineParameters:
         """Say what an object is made of, and weighs, kilograms."""
         self.object_parts[slot], self.object_mass[slot] = parts.rows, mass
         self.object_inertia[slot] = parts.inertia(mass)
-        self.changed()
+        self.mark_changed()
 
     def hold(self, model: SharedModel) -> None:
         """Have a model say what these say."""
@@ -514,7 +509,7 @@ class EngineParameters:
 
     def _write_parts(self, model: Any) -> None:
         s, parts = self._scene, PartRows(self.object_parts)
-        geoms, used = s.object_geoms, parts.used
+        geoms, used = s.object_geoms, parts.is_used
         model.geom_size[geoms], model.geom_rbound[geoms] = parts.sizes, parts.radii
         model.geom_aabb[geoms, 3:] = parts.half
         model.geom_pos[geoms], model.geom_quat[geoms] = parts.position, parts.quaternion
@@ -543,11 +538,11 @@ class EngineParameters:
         """Take over what another engine of the same scene, with objects or without, says of all but objects."""
         self.stiffness[:], self.damping[:] = other.stiffness, other.damping
         self.mover_half[:], self.grip[:] = other.mover_half, other.grip
-        self.changed()
+        self.mark_changed()
 
     def restore(self, numbers: NDArray[np.float64]) -> None:
         """Go back to what `numbers` was."""
         if numbers.shape != self.numbers.shape:
             raise SchemaError("physics: the saved state belongs to other robots or surroundings")
         self.numbers[:] = numbers
-        self.changed()
+        self.mark_changed()

@@ -251,6 +251,12 @@ class ObjectMotion:
     resting: NDArray[np.bool_]
 
 
+# Columns of an engine's own contacts, shape ``(n, 9)``: after the two shapes or links come ...
+CONTACT_POSITION = slice(2, 5)  # ENU, m
+CONTACT_NORMAL = slice(5, 8)  # from the first to the second
+CONTACT_FORCE = 8  # along the normal, N
+
+
 class Party(IntEnum):
     """What kind of thing takes part in a contact."""
 

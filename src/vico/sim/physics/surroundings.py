@@ -108,20 +108,17 @@ def static_scene_of(world: PhysicsGround, *, flying: bool = False) -> StaticScen
             flat = np.ptp(points, axis=0).min() < 1e-3
             if not flat and points[:, 2].min() < float(height(points[:, :2]).max()) + reach:
                 hulls.append(points)
-    boxes, pillars = _objects(world.objects, height, reach)
-    return StaticScene(height, tuple(hulls), boxes, pillars)
-
-
-def _objects(objects: Objects, height: HeightField, reach: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    objects = world.objects
     chosen = objects.where(objects.solid & objects.outdoors & (objects.size_z > _FLAT))
     stem = np.array([_STEMS.get(str(kind), 0.0) for kind in chosen.kind])
     ground = height(chosen.position) if len(chosen) else np.zeros(0)
     # Only what robots can reach matters, and from a little below ground, for the ground is not level.
     low = np.minimum(chosen.z, ground) - 0.3
     half = (np.minimum(chosen.z + chosen.size_z, chosen.z + reach) - low) / 2
-    boxes = np.column_stack([chosen.x, chosen.y, low + half, chosen.yaw, chosen.size_x / 2, chosen.size_y / 2, half])
-    pillars = np.column_stack([chosen.x, chosen.y, low + half, stem, half])
-    return boxes[stem == 0.0], pillars[stem > 0.0]
+    z = low + half
+    boxes = np.column_stack([chosen.x, chosen.y, z, chosen.yaw, chosen.size_x / 2, chosen.size_y / 2, half])
+    pillars = np.column_stack([chosen.x, chosen.y, z, stem, half])
+    return StaticScene(height, tuple(hulls), boxes[stem == 0.0], pillars[stem > 0.0])
 
 
 #: About the side of a chunk, metres: a whole number of them is as long as a tile.
@@ -187,7 +184,8 @@ class CityChunks:
         if known is None:
             solids = static_scene_of(self._city.part([place]), flying=self._flying)
             corners = [(points[:, :2].min(axis=0), points[:, :2].max(axis=0)) for points in solids.hulls]
-            around = np.hypot(solids.boxes[:, 4], solids.boxes[:, 5])
+            *_, half_length, half_width, _ = solids.boxes.T
+            around = np.hypot(half_length, half_width)
             known = _Tile(
                 solids,
                 np.array(corners).reshape(-1, 4),
@@ -256,8 +254,10 @@ ENTER, LEAVE = 2.5, 3.5
 #: What is higher than this above what is below it falls; what reaches deeper into ground or kerb is lifted out of it
 #: when it enters, but not by more than the second: then it lies in something that physics takes for solid, metres.
 _IN_THE_AIR, _TOO_DEEP = 0.03, 0.15
-#: Kilograms a cubic metre of a thing's box, and bounds of its mass, kg, where no entry says what it weighs.
-_DENSITY, _LIGHTEST, _HEAVIEST = 150.0, 0.05, 60.0
+# Of a thing's box, and bounds of its mass, where no entry says what it weighs.
+_DENSITY = 150.0  # kg/m^3
+_LIGHTEST = 0.05  # kg
+_HEAVIEST = 60.0  # kg
 # Where it is asked what lies below a thing: its middle and near its corners, shares of its half extents.
 _PROBES = np.array([[0.0, 0.0], [0.9, 0.9], [0.9, -0.9], [-0.9, 0.9], [-0.9, -0.9]])
 
@@ -410,7 +410,7 @@ class LooseObjects:
         points = np.column_stack([x + c * u - s * v, y + s * u + c * v, np.full(len(u), z + height)])
         return self._engine.clearance_below(points) - height
 
-    def _moved(self, k: int) -> bool:
+    def _has_moved(self, k: int) -> bool:
         """Return whether somebody else has written a thing's pose since it was last seen or written."""
         objects = self._objects
         stays = np.array_equal(objects.position[k], self._position[k])
@@ -432,7 +432,7 @@ class LooseObjects:
         motion, objects = self._engine.objects(), self._objects
         for slot in taken:
             k = objects.index(int(self.entity[slot]))
-            if self._moved(k):
+            if self._has_moved(k):
                 continue  # by somebody else, within a sub-step: `update` takes it from there
             up = rotation_matrix(motion.quaternion[slot])[:, 2]
             objects.position[k] = motion.position[slot] - up * objects.size[k, 2] / 2

@@ -79,12 +79,17 @@ STANDOFFS, _EXACT = (0.60, 0.54, 0.66), 0.03
 LIFT, ROOM = 0.16, 0.02
 # Tilts of the hand that are tried, rad.
 _TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
-_NEAR, _NEAR_ENOUGH, _STRAIGHT, _TURN = 1.1, 2.2, 0.25, 0.9
+_NEAR = 1.1  # m from the base's middle at which a target is near enough to align with it
+_NEAR_ENOUGH = 2.2  # m of the same for who has to wait for others
+_STRAIGHT = 0.25  # m/s at most while it aligns
+_TURN = 0.9  # rad/s at most while it aligns
 _DONE = {TaskKind.PICK: "picked", TaskKind.PLACE: "placed", TaskKind.OFFER: "handed_over"}
 # Metres before a person, and above the ground there, that things are held out to them.
 _ARM_LENGTH, _HELD_OUT = 0.45, 0.95
 _LOW = 0.05  # metres below where things are carried that make a hand low
-_GRIP_TIME, _STALE, _SETTLED = 1.2, 25.0, 0.02
+_GRIP_TIME = 1.2  # s that fingers take to close or open
+_STALE = 25.0  # s in one stage after which a task has failed
+_SETTLED = 0.02  # rad from the end of the arm's way at which it is there
 # Metres from the base's middle in which what is in the hand can be, and that the hand may be out of its box.
 _REACH, _ABOUT = 1.5, 0.05
 _PEOPLE = 0.9  # metres ahead of the base in which nobody may be
@@ -134,21 +139,6 @@ def begin_task(run: RobotRun, robot: int, kind: TaskKind, target: Array, entity:
         run.followers[robot].begin(path)
 
 
-def begin_pick(run: RobotRun, robot: int, entity: int) -> None:
-    """Begin to pick a thing up.
-
-    Raises
-    ------
-    InputError
-        If the robot has no arm, or there is no such thing.
-    """
-    found = _object(run, entity)
-    if found is None:
-        raise InputError(f"pick: there is no thing {entity}")
-    objects, k = found
-    begin_task(run, robot, TaskKind.PICK, objects.position[k].copy(), entity)
-
-
 def begin_offer(run: RobotRun, robot: int, person: Array) -> None:
     """Begin to hold out what is held to a person who stands at a point.
 
@@ -160,20 +150,6 @@ def begin_offer(run: RobotRun, robot: int, person: Array) -> None:
     away = run.position(robot)[:2] - person[:2]
     away = away / max(float(np.hypot(*away)), 1e-6)
     begin_task(run, robot, TaskKind.OFFER, person + np.array([*(away * _ARM_LENGTH), _HELD_OUT]))
-
-
-def begin_place_on(run: RobotRun, robot: int, entity: int) -> None:
-    """Begin to put what is held on a robot's deck.
-
-    Raises
-    ------
-    InputError
-        If the robot has no arm, or nobody has such a deck.
-    """
-    spot = deck_spot(run, robot, entity)
-    if spot is None:
-        raise InputError(f"place: {entity} has no deck")
-    begin_task(run, robot, TaskKind.PLACE, spot, entity)
 
 
 def abandon_task(run: RobotRun, robot: int) -> None:
@@ -277,7 +253,10 @@ def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool
     elif stage == TaskStage.GRIP and a.kind[row] == TaskKind.OFFER:
         _wait_for_taker(run, work, row, memory)
     elif stage == TaskStage.GRIP:
-        _grip(work, row, memory)
+        # Close past the thing, against the fingers' largest force, or open; then lift.
+        memory[ARM_GOAL][7:] = 0.0 if a.kind[row] == TaskKind.PICK else work.opening
+        if a.timer[row] > _GRIP_TIME:
+            _next(work, row, TaskStage.LIFT)
     else:
         _move(run, robot, work, row, memory)
     return False
@@ -438,14 +417,6 @@ def _move(run: RobotRun, robot: int, work: ArmTasks, row: int, memory: Array) ->
         _after_lift(run, robot, work, row, memory, kind)
     else:
         _finish(run, robot, work, row, _DONE[kind])
-
-
-def _grip(work: ArmTasks, row: int, memory: Array) -> None:
-    """Close past the thing, against the fingers' largest force, or open; then lift."""
-    a = work.arrays
-    memory[ARM_GOAL][7:] = 0.0 if a.kind[row] == TaskKind.PICK else work.opening
-    if a.timer[row] > _GRIP_TIME:
-        _next(work, row, TaskStage.LIFT)
 
 
 def _wait_for_taker(run: RobotRun, work: ArmTasks, row: int, memory: Array) -> None:

@@ -23,12 +23,28 @@ from vico.sim.physics.records import Base, Motion
 from vico.sim.robots.controller import Array, Gains, MotorController, approach, planar_motion
 from vico.sim.robots.quadruped import dense_layer
 
-#: Joints of a leg and of both, and what the network sees.
-LEG, LEGS, OBSERVED = 5, 10, 44
-#: Entries of a robot's memory: where in its stride it is (0..1), whether it steps, seconds it has been calm, the
-#: velocity it follows, the last action, how far ankles and knees are fitted to the ground (left, right), seconds since
-#: it stopped without a command, the place held since then (x, y, yaw, ENU).
-PHASE, STEPPING, CALM, COMMAND, ACTION, GROUND, IDLE, PLACE, MEMORY = 0, 1, 2, 3, 6, 16, 20, 21, 24
+LEG = 5  # joints of a leg
+LEGS = 10  # joints of both
+# Where the parts of what the network sees begin.
+_SEEN_VELOCITY = 0  # of the base in its own frame
+_SEEN_SPIN = 3
+_SEEN_GRAVITY = 6
+_SEEN_COMMAND = 9
+_SEEN_CLOCK = 12  # sine and cosine of where in its stride it is
+_SEEN_ANGLES = 14  # of the joints, less those at rest
+_SEEN_SPEEDS = 24
+_SEEN_ACTION = 34  # the last one
+OBSERVED = 44
+# Entries of a robot's memory.
+PHASE = 0  # where in its stride it is, 0..1
+STEPPING = 1  # whether it steps
+CALM = 2  # s it has been calm
+COMMAND = 3  # the velocity it follows: vx, vy, wz
+ACTION = 6  # the last one
+GROUND = 16  # how far ankles and knees are fitted to the ground, left and right, rad
+IDLE = 20  # s since it stopped without a command
+PLACE = 21  # held since then: x, y, yaw, ENU
+MEMORY = 24
 #: Metres a second and radians of tilt beyond which a standing robot steps to catch itself, and a stepping one goes on:
 #: steps sway.
 _PUSHED, _TILTED = (0.22, 0.60), (0.09, 0.20)
@@ -69,15 +85,6 @@ def is_mirrored(memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _swap_action(memory):  # type: ignore[no-untyped-def]
-    """Exchange left and right of the last action: the other leg begins to swing."""
-    for k in range(LEG):
-        sign = -1.0 if k < 2 else 1.0
-        a, b = memory[ACTION + k], memory[ACTION + LEG + k]
-        memory[ACTION + k], memory[ACTION + LEG + k] = sign * b, sign * a
-
-
-@compiled
 def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-def]
     """Let the stride of a robot go on, begin or end.
 
@@ -106,8 +113,11 @@ def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-de
             memory[STEPPING] = 0.0
         swapped = is_mirrored(memory)
         memory[PHASE] = after - math.floor(after + 1e-9)
-        if swapped != is_mirrored(memory):
-            _swap_action(memory)
+        if swapped != is_mirrored(memory):  # the other leg begins to swing: left and right of the last action change
+            for k in range(LEG):
+                sign = -1.0 if k < 2 else 1.0
+                a, b = memory[ACTION + k], memory[ACTION + LEG + k]
+                memory[ACTION + k], memory[ACTION + LEG + k] = sign * b, sign * a
 
 
 @compiled
@@ -137,16 +147,16 @@ def observe(settings, moving, joints, memory, out):  # type: ignore[no-untyped-d
     for k in range(3):
         v = rotation[0, k] * velocity[0] + rotation[1, k] * velocity[1] + rotation[2, k] * velocity[2]
         sideways = s if k == 1 else 1.0
-        out[k] = sideways * v
-        out[3 + k] = (1.0 if k == 1 else s) * 0.5 * spin[k]
-        out[6 + k] = sideways * -rotation[2, k]
-    out[9], out[10], out[11] = command[0], s * command[1], s * command[2]
+        out[_SEEN_VELOCITY + k] = sideways * v
+        out[_SEEN_SPIN + k] = (1.0 if k == 1 else s) * 0.5 * spin[k]
+        out[_SEEN_GRAVITY + k] = sideways * -rotation[2, k]
+        out[_SEEN_COMMAND + k] = command[k] if k == 0 else s * command[k]
     angle = 2.0 * math.pi * (memory[PHASE] - (0.5 if swap else 0.0))
-    out[12] = math.sin(angle) * memory[STEPPING]
-    out[13] = math.cos(angle) * memory[STEPPING]
-    _put_legs(out, 14, joints[0], settings.rest, swap, 1.0)
-    _put_legs(out, 24, joints[1], np.zeros(LEG), swap, 0.05)
-    out[34:44] = memory[ACTION : ACTION + LEGS]
+    out[_SEEN_CLOCK] = math.sin(angle) * memory[STEPPING]
+    out[_SEEN_CLOCK + 1] = math.cos(angle) * memory[STEPPING]
+    _put_legs(out, _SEEN_ANGLES, joints[0], settings.rest, swap, 1.0)
+    _put_legs(out, _SEEN_SPEEDS, joints[1], np.zeros(LEG), swap, 0.05)
+    out[_SEEN_ACTION:OBSERVED] = memory[ACTION : ACTION + LEGS]
 
 
 @compiled
@@ -169,8 +179,10 @@ def leg_targets(settings, action, memory, out):  # type: ignore[no-untyped-def]
         memory[ACTION + k] = a
 
 
-#: Where the joints that fit a leg to the ground are among its own.
-_HIP, KNEE, _ANKLE = 2, 3, 4
+# Where the joints that fit a leg to the ground are among its own.
+_HIP = 2
+KNEE = 3
+_ANKLE = 4
 #: From which axis to which each joint of a leg turns: yaw, roll, and three times pitch.
 _TURNS = ((0, 1), (1, 2), (2, 0), (2, 0), (2, 0))
 #: Radians and metres of a slope and between two soles beyond which it stands as if there were no more.
@@ -245,7 +257,7 @@ def fit_stance(stance, rotation, angles, memory):  # type: ignore[no-untyped-def
         slopes[leg], heights[leg] = sole_slope(
             stance.places, rotation, angles[LEG * leg : LEG * (leg + 1)], 1.0 - 2.0 * leg
         )
-    length = -(stance.places[3, 2] + stance.places[4, 2])
+    length = -(stance.places[KNEE, 2] + stance.places[_ANKLE, 2])
     rate = (_FIT if stands else _UNFIT) * stance.period
     for leg in range(2):
         ankle = knee = 0.0
@@ -313,27 +325,40 @@ def target_velocity(period, command, position, rotation, memory, out):  # type: 
 _SLEW = (1.5, 1.0, 3.0)
 #: Seconds a fallen one lies before it is lifted, and m/s that it is.
 _LIFTED_AFTER, _LIFT_SPEED = 3.0, 0.35
-#: How hard it is pulled to where it should be, N/m and Ns/m, and upright, Nm and Nms.
-_PULL, _HOLD, _UPRIGHT, _UPRIGHT_HOLD = 1500.0, 400.0, 200.0, 60.0
+# How hard a fallen one is pulled to where it should be, and upright.
+_PULL = 1500.0  # N/m
+_HOLD = 400.0  # Ns/m
+_UPRIGHT = 200.0  # Nm
+_UPRIGHT_HOLD = 60.0  # Nms
+
+
+class _WalkerMotion(NamedTuple):
+    """`Motion` of robots on two legs, as compiled code takes it."""
+
+    position: Array
+    rotation: Array
+    velocity: Array
+    spin: Array
+    angles: Array
+    speeds: Array
 
 
 @compiled
 def _walk(layers, settings, motion, command, memory):  # type: ignore[no-untyped-def]
     """Return the joints' targets of all robots, shape ``(k, 10)``."""
     steps, stance, slew = settings
-    position, rotation, velocity, spin, angles, speeds = motion
     count = len(command)
     seen, wanted = np.empty((count, OBSERVED)), np.empty(3)
     for k in range(count):
-        mine = memory[k]
-        target_velocity(steps.period, command[k], position[k], rotation[k], mine, wanted)
+        mine, rotation, velocity, spin = memory[k], motion.rotation[k], motion.velocity[k], motion.spin[k]
+        target_velocity(steps.period, command[k], motion.position[k], rotation, mine, wanted)
         approach(mine[COMMAND : COMMAND + 3], wanted, slew)
-        planar = planar_motion(rotation[k], velocity[k], spin[k])
-        advance_clock(steps, planar, math.acos(min(max(rotation[k, 2, 2], -1.0), 1.0)), mine)
-        fit_stance(stance, rotation[k], angles[k], mine)
-        level = angles[k].copy()
+        planar = planar_motion(rotation, velocity, spin)
+        advance_clock(steps, planar, math.acos(min(max(rotation[2, 2], -1.0), 1.0)), mine)
+        fit_stance(stance, rotation, motion.angles[k], mine)
+        level = motion.angles[k].copy()
         fit_to_ground(mine, level, -1.0)
-        observe(steps, (rotation[k], velocity[k], spin[k]), (level, speeds[k]), mine, seen[k])
+        observe(steps, (rotation, velocity, spin), (level, motion.speeds[k]), mine, seen[k])
     x = seen.astype(np.float32)
     for index in range(len(layers)):
         x = dense_layer(x, layers[index][0], layers[index][1], index == len(layers) - 1)
@@ -362,7 +387,7 @@ class TwoLegWalker(MotorController):
     def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Joint angles, rad."""
         m = motion
-        moving = (m.position, m.rotation, m.velocity, m.angular_velocity_body, m.angles, m.speeds)
+        moving = _WalkerMotion(m.position, m.rotation, m.velocity, m.angular_velocity_body, m.angles, m.speeds)
         found: Array = _walk(self._layers, self._settings, moving, command, memory)
         return found
 

@@ -62,23 +62,6 @@ def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> No
     run.set_mode(robot, RobotMode.MOTORS if chosen.drives == "motors" else RobotMode.VELOCITY)
 
 
-def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
-    """Follow a velocity (vx, vy, wz): metres a second in the base's frame, radians a second to the left.
-
-    Robots that fly take (vx, vy, vz, wz).
-
-    Raises
-    ------
-    InputError
-        If the robot follows no velocities, or these are not so many finite numbers.
-    """
-    model = run.scene.models[robot]
-    spaces = [name for name, space in model.action_spaces.items() if space.drives == "velocity"]
-    if not spaces:
-        raise InputError(f"drive: {model.title} follows no velocities; command its motors")
-    command(run, robot, velocity, spaces[0])
-
-
 def stop(run: RobotRun, robot: int) -> None:
     """Stand still, or hover."""
     flying.hold_position(run, robot)
@@ -182,8 +165,9 @@ def _need_velocities(run: RobotRun, robot: int, what: str) -> None:
 
 #: Metres over which a slope counts: a robot brakes on the whole of it.
 _REACH = 1.2
-#: Metres ahead between two points that are looked at for walls, how many, and m/s at which a robot may touch one.
-_STEP, _POINTS, _TOUCH = 0.25, 8, 0.3
+_STEP = 0.25  # m ahead between two points that are looked at for walls
+_POINTS = 8  # how many of them
+_TOUCH = 0.3  # m/s at which a robot may touch a wall
 
 
 def slope_ahead(run: RobotRun, robot: int, base: Base) -> float:
@@ -263,7 +247,10 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
         elif mode == _FOLLOW:
             _keep_near(run, robot, others, dt, around.bodies)
         elif mode == _TASK and decide_task(run, robot, around.bodies, dt):
-            _drive_to_work(run, robot, others, dt)
+            # It is on its way to where the arm has something to do; where it can't be gone, that has to do.
+            arrays.status[robot] = status = _steer(run, robot, others, dt)
+            if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+                run.followers[robot].end()
 
 
 def _rest(run: RobotRun, robot: int, dt: float) -> None:
@@ -334,16 +321,8 @@ def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> Ro
     follower, base = run.followers[robot], run.engine.base(robot)
     run.arrays.velocity[robot] = follower.steer(base, others, dt, slope_ahead(run, robot, base))
     if follower.wants_detour:
-        follower.detoured(path_around(run, robot, follower.path[-1], follower.closed(base, others)))
+        follower.take_detour(path_around(run, robot, follower.path[-1], follower.standing_discs(base, others)))
     return follower.status
-
-
-def _drive_to_work(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> None:
-    """Follow the way to where an arm has something to do; where it can't be gone, that has to do."""
-    status = _steer(run, robot, others, dt)
-    run.arrays.status[robot] = status
-    if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
-        run.followers[robot].end()
 
 
 def _keep_near(run: RobotRun, robot: int, others: NDArray[np.void], dt: float, everyone: Bodies) -> None:

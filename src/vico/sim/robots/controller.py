@@ -60,7 +60,7 @@ class MotorController:
         """
         return np.tile(self.model.stance, (len(motion), 1))
 
-    def commanded(self, motion: Motion, command: Array, memory: Array) -> Array:
+    def command_targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Return what servos follow that are commanded one by one, shape ``(k, motors)``; arguments as above."""
         memory[:] = 0.0
         return command
@@ -193,33 +193,26 @@ _BACK, _BACK_SPEED = 4.0, 0.2
 
 
 @compiled
-def _skid(trim, slew, top, wheels, motion, command, memory):  # type: ignore[no-untyped-def]
-    """Return wheel speeds of one robot, rad/s; left and right in turn."""
-    wanted_now, trim_memory = memory[_COMMAND], memory[_TRIM]
-    approach(wanted_now, command, slew)
-    out = np.zeros(len(top))
-    if not command.any() and not wanted_now.any():  # brakes
-        trim_memory[:] = 0.0
-        memory[_ROLLED] += motion[0] * trim.period
-        out[:] = min(max(-_BACK * memory[_ROLLED], -_BACK_SPEED), _BACK_SPEED) / wheels.radius
-        return out
-    memory[_ROLLED] = 0.0
-    wanted = trim_command(trim, motion, wanted_now, trim_memory)
-    for k in range(len(top)):
-        side = -1.0 if k % 2 == 0 else 1.0
-        speed = (wanted[0] + side * wanted[2] * wheels.half_track * wheels.slip) / wheels.radius
-        out[k] = min(max(speed, -top[k]), top[k])
-    return out
-
-
-@compiled
-def _skid_all(settings, rotation, velocity, angular_velocity_body, command, memory):  # type: ignore[no-untyped-def]
-    """Return wheel speeds of all robots, shape ``(k, wheels)``."""
+def _wheel_speeds(settings, rotation, velocity, angular_velocity_body, command, memory):  # type: ignore[no-untyped-def]
+    """Return wheel speeds of all robots, rad/s, left and right in turn, shape ``(k, wheels)``."""
     trim, slew, top, wheels = settings
     out = np.empty((len(command), len(top)))
-    for k in range(len(command)):
-        motion = planar_motion(rotation[k], velocity[k], angular_velocity_body[k])
-        out[k] = _skid(trim, slew, top, wheels, motion, command[k], memory[k])
+    for robot in range(len(command)):
+        motion = planar_motion(rotation[robot], velocity[robot], angular_velocity_body[robot])
+        mine = memory[robot]
+        wanted_now, trim_memory = mine[_COMMAND], mine[_TRIM]
+        approach(wanted_now, command[robot], slew)
+        if not command[robot].any() and not wanted_now.any():  # brakes
+            trim_memory[:] = 0.0
+            mine[_ROLLED] += motion[0] * trim.period
+            out[robot] = min(max(-_BACK * mine[_ROLLED], -_BACK_SPEED), _BACK_SPEED) / wheels.radius
+            continue
+        mine[_ROLLED] = 0.0
+        wanted = trim_command(trim, motion, wanted_now, trim_memory)
+        for k in range(len(top)):
+            side = -1.0 if k % 2 == 0 else 1.0
+            speed = (wanted[0] + side * wanted[2] * wheels.half_track * wheels.slip) / wheels.radius
+            out[robot, k] = min(max(speed, -top[k]), top[k])
     return out
 
 
@@ -238,7 +231,7 @@ class SkidSteer(MotorController):
 
     def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Wheel speeds, rad/s."""
-        found: Array = _skid_all(
+        found: Array = _wheel_speeds(
             self._settings, motion.rotation, motion.velocity, motion.angular_velocity_body, command, memory
         )
         return found

@@ -62,20 +62,11 @@ def cameras(run: RobotRun) -> NDArray[np.float64]:
     """
     found = np.empty((len(run.scene), 6))
     for robot, model in enumerate(run.scene.models):
-        yaw, pitch = run.engine.base(robot).yaw, model.sensors.camera_pitch
-        found[robot, :3] = _eye(run, robot)
+        base, camera = run.engine.base(robot), model.sensors.camera
+        yaw, pitch = base.yaw, model.sensors.camera_pitch
+        found[robot, :3] = base.position if camera is None else base.position + apply_matrix(camera, base.rotation)
         found[robot, 3:] = np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)
     return found
-
-
-def camera_heights(run: RobotRun) -> NDArray[np.float64]:
-    """Height of each robot's camera above its body's bottom, metres; of the base's where there is no camera."""
-    return np.asarray(cameras(run)[:, 2] - run.bodies().position[:, 2])
-
-
-def _eye(run: RobotRun, robot: int) -> NDArray[np.float64]:
-    base, camera = run.engine.base(robot), run.scene.models[robot].sensors.camera
-    return base.position if camera is None else base.position + apply_matrix(camera, base.rotation)
 
 
 def deck_of(run: RobotRun, entity: int) -> DeckPose | None:

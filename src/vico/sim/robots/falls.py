@@ -46,15 +46,6 @@ def note_tilt(run: RobotRun, robot: int, tilted: float) -> None:
         run.note(robot, "fallen")
 
 
-def watch_crashes(run: RobotRun, flight: Flight, dt: float, obstacles: Bodies) -> None:
-    """Note who of a kind that flies fell, and set upright who has lain for long enough; `obstacles` as in `decide`."""
-    for row, robot in enumerate(flight.robots.tolist()):
-        if run.arrays.status[robot] == _FALLEN:
-            _watch_crashed(run, flight, row, dt, obstacles)
-        else:
-            note_tilt(run, robot, dt if _is_down(run, flight, row) else 0.0)
-
-
 def _is_down(run: RobotRun, flight: Flight, row: int) -> bool:
     """Return whether a robot can't right itself, or is none of this world any more."""
     robot, a = int(flight.robots[row]), flight.arrays
@@ -114,7 +105,11 @@ def watch_falls(run: RobotRun, dt: float, obstacles: Bodies) -> None:
     status = run.arrays.status.tolist()
     for group, flight in zip(run.scene.groups, run.flights, strict=True):
         if flight is not None:
-            watch_crashes(run, flight, dt, obstacles)
+            for row, robot in enumerate(flight.robots.tolist()):
+                if run.arrays.status[robot] == _FALLEN:
+                    _watch_crashed(run, flight, row, dt, obstacles)
+                else:
+                    note_tilt(run, robot, dt if _is_down(run, flight, row) else 0.0)
             continue
         limit = group.model.fallen_below
         for robot in group.robots.tolist():

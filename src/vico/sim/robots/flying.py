@@ -17,7 +17,7 @@ from vico.geometry import distance, distances
 from vico.sim.bodies.arrays import Bodies
 from vico.sim.robots.path_following import RobotStatus
 from vico.sim.robots.path_planning import BESIDE, CEILING, HOVER
-from vico.sim.robots.quadrotor import HEADING, POSITION, TURNING, VELOCITY, Flight, FlightPhase
+from vico.sim.robots.quadrotor import HEADING, POSITION, TURNING, VELOCITY, VELOCITY_UP, Flight, FlightPhase
 from vico.sim.robots.state import RobotMode, RobotRun
 
 Array = NDArray[np.float64]
@@ -27,13 +27,17 @@ FLIGHT_BRAKING = 1.5
 
 # Metres above and beside others that it keeps to.
 _ABOVE, _ASIDE = 1.5, 1.5
-# Seconds that the motion of people and vehicles is foreseen, and of others that fly, who come faster; metres within
-# which they are looked for.
-_FORESIGHT, _FLIGHT_FORESIGHT, _NEIGHBOUR_REACH, _FLIGHT_NEAR = 1.5, 2.5, 20.0, 45.0
+# Of people and vehicles, and of others that fly, who come faster.
+_FORESIGHT = 1.5  # s that their motion is foreseen
+_FLIGHT_FORESIGHT = 2.5
+_NEIGHBOUR_REACH = 20.0  # m within which they are looked for
+_FLIGHT_NEAR = 45.0
 # Metres that somebody's feet are above it from which on it is not they who are below.
 _OVERHEAD = 1.0
-# Metres a second it climbs and sinks with to let others pass, and metres above everything below which it does not sink.
-_CLIMB, _GIVE_WAY, _LOW = 2.0, 1.0, 3.0
+# To let others pass it climbs and sinks.
+_CLIMB = 2.0  # m/s
+_GIVE_WAY = 1.0  # m/s
+_LOW = 3.0  # m above everything below which it does not sink
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,7 @@ def keep_apart(run: RobotRun, flight: Flight, row: int, around: FlightNeighbours
     velocity = setpoint[VELOCITY].copy()
     floor, roof = around.floor(velocity), around.roof(velocity)
     if bottom - 0.5 < floor:
-        setpoint[5] = max(setpoint[5], 0.0)
+        setpoint[VELOCITY_UP] = max(setpoint[VELOCITY_UP], 0.0)
         setpoint[2] = max(setpoint[2], floor + flight.model.stand)
     if bottom < floor:
         setpoint[VELOCITY] = 0.0, 0.0, _CLIMB
@@ -120,7 +124,7 @@ def keep_apart(run: RobotRun, flight: Flight, row: int, around: FlightNeighbours
     elif bottom + flight.model.height > roof - 0.5:
         is_free = bottom > run.scene.airspace.top(around.position) + _LOW
         sinks = commanded and is_free and bottom + flight.model.height > roof
-        setpoint[5] = min(setpoint[5], -_GIVE_WAY if sinks else 0.0)
+        setpoint[VELOCITY_UP] = min(setpoint[VELOCITY_UP], -_GIVE_WAY if sinks else 0.0)
         setpoint[2] = min(setpoint[2], around.position[2])
     _keep_inside(run, setpoint, around.position)
 
@@ -150,12 +154,14 @@ _CORNER = 0.6
 # Metres beside its way up to which it flies on as fast as it can, and from which on it only comes back: wind would blow
 # it on into what its way leads round.
 _ON_WAY, _OFF_WAY = 0.5, 2.0
-# Metres a second it comes down with, far above what is below and near it; metres that is.
-_SINK, _TOUCH, _NEAR = 1.5, 0.4, 3.0
+_SINK = 1.5  # m/s it comes down with far above what is below
+_TOUCH = 0.4  # m/s it comes down with near it
+_NEAR = 3.0  # m above it that are near
 # Seconds without sinking, slower than so many metres a second, after which it has landed.
 _CALM, _STILL = 0.5, 0.08
-# Metres behind and above whom it follows, how far that one has to go for another way to be found.
-_BEHIND, _HIGHER, _DRIFT = 4.0, 5.0, 3.0
+_BEHIND = 4.0  # m behind whom it follows
+_HIGHER = 5.0  # m above whom it follows
+_DRIFT = 3.0  # m that one has to go for another way to be found
 # Seconds without getting nearer after which a way counts as blocked; share of its battery at which it lands.
 _PATIENCE, LOW_BATTERY = 30.0, 0.1
 _ERRAND_REST, _ERRAND_HEIGHT = 5.0, 15.0
@@ -378,17 +384,12 @@ def _steer(run: RobotRun, flight: Flight, row: int, robot: int, dt: float) -> Ro
         a.leg[row] = leg = leg + 1
         a.held[row] = [0.0, math.inf]
         away = float(np.linalg.norm(way[leg] - base.position))
-    _note_progress(a.held[row], away, dt)
+    if away < a.held[row, 1] - 0.5:
+        a.held[row] = 0.0, away
+    else:  # it has come no nearer
+        a.held[row, 0] += dt
     _aim(flight, row, base.position, way, leg)
     return RobotStatus.BLOCKED if a.held[row, 0] > _PATIENCE else RobotStatus.MOVING
-
-
-def _note_progress(held: Array, away: float, dt: float) -> None:
-    """Count how long it has come no nearer."""
-    if away < held[1] - 0.5:
-        held[:] = 0.0, away
-    else:
-        held[0] += dt
 
 
 def _aim(flight: Flight, row: int, position: Array, way: Array, leg: int) -> None:
@@ -437,12 +438,12 @@ def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Flig
     if above > 0.3 and base.position[2] - flight.model.stand - 0.3 < floor:
         run.arrays.status[robot] = RobotStatus.WAITING
         a.setpoint[row, 2] = floor + flight.model.stand
-        a.setpoint[row, 5] = 0.0
+        a.setpoint[row, VELOCITY_UP] = 0.0
         return
     run.arrays.status[robot] = RobotStatus.MOVING
-    a.setpoint[row, 5] = -_SINK if above > _NEAR else -_TOUCH
+    a.setpoint[row, VELOCITY_UP] = -_SINK if above > _NEAR else -_TOUCH
     if _TOUCH < above < _NEAR and float(np.hypot(*(base.position - spot)[:2])) > _ON_SPOT:
-        a.setpoint[row, 5] = 0.0
+        a.setpoint[row, VELOCITY_UP] = 0.0
     still = above < 1.0 and abs(float(base.velocity[2])) < _STILL
     a.calm[row] = a.calm[row] + dt if still else 0.0
     if a.calm[row] > _CALM:

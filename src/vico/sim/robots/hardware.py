@@ -45,42 +45,6 @@ def follow_setpoints(run: RobotRun, flight: Flight, group: RobotGroup) -> bool:
     return not (told | (flight.arrays.phase == _LANDED)).any()
 
 
-def command_rotors(
-    run: RobotRun,
-    flight: Flight,
-    group: RobotGroup,
-    memory: np.ndarray,
-    seconds: float,
-    *,
-    all_follow: bool = False,
-) -> None:
-    """Tell the rotors of a kind of robots what speeds to have for some seconds; all that are in the air in one call.
-
-    Parameters
-    ----------
-    memory
-        What the group's controller remembers, shape ``(k, controller.memory)``; updated in place.
-    all_follow
-        As `follow_setpoints` has it.
-    """
-    arrays, robots, a = run.arrays, group.robots, flight.arrays
-    if all_follow:
-        a.wanted[:] = group.controller.rotor_speeds(run.engine.motion(robots), a.setpoint, memory, seconds)
-        return
-    fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
-    led = ~fallen & ~motors & (a.phase != _LANDED)
-    rows = led.nonzero()[0]
-    if len(rows):
-        setpoint, mine = a.setpoint[rows], memory[rows]
-        a.wanted[rows] = group.controller.rotor_speeds(run.engine.motion(robots[rows]), setpoint, mine, seconds)
-        a.setpoint[rows], memory[rows] = setpoint, mine
-    memory[~led] = 0.0
-    a.wanted[~led] = 0.0
-    told = motors & ~fallen
-    a.wanted[told] = arrays.command[robots[told], : len(group.model.motors)]
-    arrays.lying[robots[fallen]] += seconds
-
-
 class AllRotors:
     """The rotors of all robots that fly, within a sub-step: who follows setpoints is decided between sub-steps.
 
@@ -118,7 +82,23 @@ class AllRotors:
     def _actuate(self, since: float, step: float) -> None:
         """Let rotors follow their commands and push for a step that begins so many seconds into the frame."""
         for flight, group, memory, all_follow in self._flown:
-            command_rotors(self._run, flight, group, memory, step, all_follow=all_follow)
+            arrays, robots, a = self._run.arrays, group.robots, flight.arrays
+            motion = self._run.engine.motion
+            if all_follow:
+                a.wanted[:] = group.controller.rotor_speeds(motion(robots), a.setpoint, memory, step)
+            else:
+                fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
+                led = ~fallen & ~motors & (a.phase != _LANDED)
+                rows = led.nonzero()[0]
+                if len(rows):
+                    setpoint, mine = a.setpoint[rows], memory[rows]
+                    a.wanted[rows] = group.controller.rotor_speeds(motion(robots[rows]), setpoint, mine, step)
+                    a.setpoint[rows], memory[rows] = setpoint, mine
+                memory[~led] = 0.0
+                a.wanted[~led] = 0.0
+                told = motors & ~fallen
+                a.wanted[told] = arrays.command[robots[told], : len(group.model.motors)]
+                arrays.lying[robots[fallen]] += step
             flight.push(self._run.engine, step, self._began + since)
 
 
@@ -142,7 +122,11 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
     fallen = arrays.status[robots] == _FALLEN
     led = ~fallen & (arrays.mode[robots] != _MOTORS)
     if led.any():
-        _follow_velocities(run, group, memory, led.nonzero()[0])
+        rows = led.nonzero()[0]
+        who, mine = robots[rows], memory[rows]
+        targets = group.controller.targets(run.engine.motion(who), arrays.velocity[who], mine)
+        run.engine.command_all(who, _as_held(run, who, targets), group.controller.gains(mine))
+        memory[rows] = mine
     for row in (~led).nonzero()[0].tolist():
         robot = int(robots[row])
         if arrays.mode[robot] != _MOTORS or fallen[row]:
@@ -158,7 +142,7 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
             run.engine.command(robot, *lying)
         elif arrays.mode[robot] == _MOTORS:
             who, told = robots[row : row + 1], arrays.command[robot : robot + 1, : len(group.model.motors)]
-            targets = group.controller.commanded(run.engine.motion(who), told, memory[row : row + 1])
+            targets = group.controller.command_targets(run.engine.motion(who), told, memory[row : row + 1])
             run.engine.command(robot, _as_held(run, who, targets)[0], group.controller.command_gains)
         else:
             run.engine.command(robot, group.model.stance)
@@ -167,16 +151,6 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
 def _as_held(run: RobotRun, robots: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """Return targets with fingers kept where they touch what is held by oracle."""
     return targets if run.oracle is None else run.oracle.spread(robots, targets)
-
-
-def _follow_velocities(run: RobotRun, group: RobotGroup, memory: np.ndarray, rows: np.ndarray) -> None:
-    """Have some of a kind's robots follow their velocities, all in one call."""
-    robots, mine = group.robots[rows], memory[rows]
-    targets = _as_held(
-        run, robots, group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)
-    )
-    run.engine.command_all(robots, targets, group.controller.gains(mine))
-    memory[rows] = mine
 
 
 #: Seconds that a robot stands with a low or empty battery until somebody, who is not shown, has put in a full one.
@@ -247,20 +221,15 @@ def _power(run: RobotRun, robot: int, model: RobotModel, battery: BatteryModel) 
     for motor, unit, force in zip(model.motors, model.motor_units, forces, strict=True):
         speed = speeds.get(motor)
         if speed is None:
-            speed = _base_speed(run, robot, unit)
+            # A motor without a joint of its own turns the base, or drives it ahead.
+            base = run.engine.base(robot)
+            turns = unit == "rad/s"
+            speed = float(base.angular_velocity_body[2] if turns else dot(base.rotation[:, 0], base.velocity))
         else:
             heat += force * force
         # Motors that are pushed back feed nothing into the battery.
         work += max(force * speed, 0.0)
     return battery.idle_power + work / battery.efficiency + battery.holding * heat
-
-
-def _base_speed(run: RobotRun, robot: int, unit: str) -> float:
-    """Return how fast the base goes ahead, m/s, or turns, rad/s: what motors do that drive no joint of their own."""
-    base = run.engine.base(robot)
-    if unit == "rad/s":
-        return float(base.angular_velocity_body[2])
-    return float(dot(base.rotation[:, 0], base.velocity))
 
 
 class Reading(NamedTuple):
@@ -314,7 +283,13 @@ def proprioception(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
     }
     flown = flight_of(run, robot)
     if s.joints:
-        angles, speeds = run.engine.joints(robot) if flown is None else _rotors(*flown)
+        if flown is None:
+            angles, speeds = run.engine.joints(robot)
+        else:  # those of its rotors, positive to the left seen from above
+            flight, row = flown
+            assert flight.model.rotors is not None
+            turns = flight.model.rotors.turns
+            angles, speeds = flight.arrays.turned[row] * turns, flight.arrays.speed[row] * turns
         found["joint_position"], found["joint_velocity"] = np.array(angles), np.array(speeds)
     if s.imu:
         imu = run.engine.imu(robot)
@@ -332,10 +307,3 @@ def proprioception(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
         forces = run.engine.contacts().link_forces(robot, len(links))
         found["contacts"] = forces[[links.index(link) for link in s.contacts]]
     return found
-
-
-def _rotors(flight: Flight, row: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return angles and speeds of a robot's rotors, rad and rad/s, positive to the left seen from above."""
-    rotors = flight.model.rotors
-    assert rotors is not None
-    return flight.arrays.turned[row] * rotors.turns, flight.arrays.speed[row] * rotors.turns

@@ -117,7 +117,7 @@ class ArmOnWheels(MotorController):
         )
         return found
 
-    def commanded(self, motion: Motion, command: Array, memory: Array) -> Array:
+    def command_targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Motor commands as they are, but a base that is told to stand drives back what it rolls."""
         moved = _base_motion(motion.rotation, motion.velocity, motion.angular_velocity_body)
         found: Array = _commanded_targets(moved, self._period, command, memory)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,9 @@ NEIGHBOUR = np.dtype(
 GAP, SIDE_GAP = 0.6, 0.15
 #: Metres above and below a robot that count as its height: the ground under two bodies differs.
 _HEIGHT_GAP = 0.5
-#: Metres a second squared it brakes with; metres it looks ahead at most; seconds others' motion is foreseen.
-BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
+BRAKE = 0.8  # m/s^2 it brakes with
+SIGHT = 5.0  # m it looks ahead at most
+FORESIGHT = 3.0  # s others' motion is foreseen
 #: What a slope takes from that, m/s2 for each metre down in a metre ahead, and the least that is left: legs, and heavy
 #: bases on small wheels, stop so late.
 _PULL, _LEAST_BRAKE = 3.0, 0.3
@@ -56,33 +57,55 @@ _SLOWEST = 0.05
 FOLLOW = 1.5
 
 
-@compiled
-def _neighbours(found, count, parts, own, reach):  # type: ignore[no-untyped-def]
-    """Write those near a body into `found`, after the first `count`, and return how many there are then.
+class _BodyArrays(NamedTuple):
+    """`Bodies` as compiled code takes them; row = body."""
 
-    Parameters
-    ----------
-    parts
-        Entity, kind, position, yaw, half length, half width, height and velocity of bodies.
-    own
-        Of the body itself: entity, x, y, bottom, top, cosine and sine of its heading, half its length and width. What
-        lies on it, with its middle within its outline, is not near but part of it.
+    entity: Array
+    kind: Array
+    position: Array
+    yaw: Array
+    half_length: Array
+    half_width: Array
+    height: Array
+    velocity: Array
+
+
+class _OwnOutline(NamedTuple):
+    """A robot among bodies: an upright box; ENU metres, cosine and sine of its heading."""
+
+    entity: int
+    x: float
+    y: float
+    bottom: float
+    top: float
+    cos: float
+    sin: float
+    half_length: float
+    half_width: float
+
+
+@compiled
+def _write_neighbours(found, count, bodies, own, reach):  # type: ignore[no-untyped-def]
+    """Write those near a robot into `found`, after the first `count`, and return how many there are then.
+
+    What lies on it, with its middle within its outline, is not near but part of it.
     """
-    entity, kind, position, yaw, half_length, half_width, height, velocity = parts
-    for k in range(len(entity)):
-        x, y, z = position[k]
-        if math.hypot(x - own[1], y - own[2]) - half_length[k] >= reach or entity[k] == own[0]:
+    for k in range(len(bodies.entity)):
+        x, y, z = bodies.position[k]
+        east, north = x - own.x, y - own.y
+        if math.hypot(east, north) - bodies.half_length[k] >= reach or bodies.entity[k] == own.entity:
             continue
-        if z >= own[4] + _HEIGHT_GAP or z + height[k] <= own[3] - _HEIGHT_GAP:
+        if z >= own.top + _HEIGHT_GAP or z + bodies.height[k] <= own.bottom - _HEIGHT_GAP:
             continue
-        if kind[k] == OBJECT and z > own[3]:
-            ahead, aside = own[5] * (x - own[1]) + own[6] * (y - own[2]), own[5] * (y - own[2]) - own[6] * (x - own[1])
-            if abs(ahead) < own[7] and abs(aside) < own[8]:
+        if bodies.kind[k] == OBJECT and z > own.bottom:
+            ahead, aside = own.cos * east + own.sin * north, own.cos * north - own.sin * east
+            if abs(ahead) < own.half_length and abs(aside) < own.half_width:
                 continue
         one = found[count]
-        one.x, one.y, one.yaw, one.vx, one.vy = x, y, yaw[k], velocity[k, 0], velocity[k, 1]
-        one.rounding = half_width[k] if IS_ROUND[kind[k]] else 0.0
-        one.half_length, one.half_width = half_length[k] - one.rounding, half_width[k] - one.rounding
+        one.x, one.y, one.yaw, one.vx, one.vy = x, y, bodies.yaw[k], bodies.velocity[k, 0], bodies.velocity[k, 1]
+        one.rounding = bodies.half_width[k] if IS_ROUND[bodies.kind[k]] else 0.0
+        one.half_length = bodies.half_length[k] - one.rounding
+        one.half_width = bodies.half_width[k] - one.rounding
         count += 1
     return count
 
@@ -110,12 +133,12 @@ class NearbyBodies:
         x, y, bottom = mine.position[robot].tolist()
         yaw, top = float(mine.yaw[robot]), bottom + float(mine.height[robot])
         outline = float(mine.half_length[robot]), float(mine.half_width[robot])
-        own = (int(mine.entity[robot]), x, y, bottom, top, math.cos(yaw), math.sin(yaw), *outline)
+        own = _OwnOutline(int(mine.entity[robot]), x, y, bottom, top, math.cos(yaw), math.sin(yaw), *outline)
         found = np.empty(len(self._others) + len(mine), NEIGHBOUR)
         count = 0
         for b in (self._others, mine):
-            parts = (b.entity, b.kind, b.position, b.yaw, b.half_length, b.half_width, b.height, b.velocity)
-            count = _neighbours(found, count, parts, own, reach)
+            bodies = _BodyArrays(b.entity, b.kind, b.position, b.yaw, b.half_length, b.half_width, b.height, b.velocity)
+            count = _write_neighbours(found, count, bodies, own, reach)
         return found[:count]
 
 
@@ -302,11 +325,6 @@ def footprint_discs(
     return [(x + c * shift, y + s * shift, width + room) for shift in shifts]
 
 
-def _discs(one: np.void, room: float) -> list[tuple[float, float, float]]:
-    pose = float(one["x"]), float(one["y"]), float(one["yaw"])
-    return footprint_discs(pose, float(one["half_length"]), float(one["half_width"]), room)
-
-
 def _stand_still(others: NDArray[np.void]) -> NDArray[np.bool_]:
     still: NDArray[np.bool_] = np.hypot(others["vx"], others["vy"]) < STILL
     return still
@@ -430,16 +448,20 @@ class PathFollower:
         x, y = base.position[:2]
         return free_ahead(x, y, base.yaw, _BACK_SPEED, (m.half_length, m.half_width), _NO_PATH, 0.0, others)
 
-    def closed(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
+    def standing_discs(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
         """Discs (x, y, radius) a detour keeps out of: those who stand still near, and what is right ahead."""
         still = np.flatnonzero(_stand_still(others))
-        discs = [disc for one in others[still] for disc in _discs(one, self._model.half_width + 0.35)]
+        discs: list[tuple[float, float, float]] = []
+        for one in others[still]:
+            pose = float(one["x"]), float(one["y"]), float(one["yaw"])
+            half_length, half_width = float(one["half_length"]), float(one["half_width"])
+            discs += footprint_discs(pose, half_length, half_width, self._model.half_width + 0.35)
         ahead = base.position[:2] + base.rotation[:2, 0] * (self._model.half_length + GAP)
         if not len(still):
             discs.append((float(ahead[0]), float(ahead[1]), 0.5))
         return np.array(discs).reshape(-1, 3)
 
-    def detoured(self, path: NDArray[np.float64] | None) -> None:
+    def take_detour(self, path: NDArray[np.float64] | None) -> None:
         """Take a new way; without one, or after too many, give up or keep waiting."""
         self.wants_detour = False
         self.detours += 1
@@ -502,7 +524,7 @@ class WaypointFollowers:
         """Row of a robot in the arrays."""
         return int(np.flatnonzero(self.robots == robot)[0])
 
-    def saved(self) -> dict[str, NDArray[Any]]:
+    def state_arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, copied."""
         found = {name: value.copy() for name, value in vars(self.arrays).items()}
         return found | {
@@ -511,7 +533,7 @@ class WaypointFollowers:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `saved` returned."""
+        """Go back to what `state_arrays` returned."""
         for name, value in vars(self.arrays).items():
             value[...] = arrays[name]
         starts = np.concatenate([[0], arrays["way_ends"]]).astype(int)

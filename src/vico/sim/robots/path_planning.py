@@ -189,7 +189,7 @@ class RobotRooms:
         while cells[-1] != first:
             cells.append(int(before[cells[-1]]))
         points = np.vstack([here, grid.points[chosen[cells[::-1]]]])
-        return self._straightened(points, room, radius, closed)
+        return self._straighten(points, room, radius, closed)
 
     def spot(self, room: int, near: Array, radius: float, closed: Array, within: float) -> Array | None:
         """Return the nearest point to a point where a robot has room, clear of discs, shape ``(2,)``; None for none."""
@@ -199,7 +199,7 @@ class RobotRooms:
             return None
         return np.array(grid.points[k])
 
-    def _straightened(self, points: Array, room: int, radius: float, closed: Array) -> Array:
+    def _straighten(self, points: Array, room: int, radius: float, closed: Array) -> Array:
         """Leave out points of a way between which one can go straight."""
         kept, at = [0], 0
         while at < len(points) - 1:
@@ -275,14 +275,15 @@ class RobotRooms:
         things = np.column_stack([np.asarray(column[chosen], np.float64) for column in columns]).reshape(-1, 7)
         table = np.vstack([np.array(rows), things])
         n = len(table)
+        yaw, half_length, half_width, height = (column.copy() for column in table[:, 3:].T)
         return Bodies(
             np.arange(-1, -n - 1, -1).astype(np.int32),
             np.full(n, FIXTURE, np.int8),
             table[:, :3].copy(),
-            table[:, 3].copy(),
-            table[:, 4].copy(),
-            table[:, 5].copy(),
-            table[:, 6].copy(),
+            yaw,
+            half_length,
+            half_width,
+            height,
             np.zeros((n, 2)),
         )
 
@@ -307,8 +308,9 @@ def _nearest(points: Array, free: NDArray[np.bool_], to: Array) -> int:
 _CELL = 0.5
 # Rows of cells whose ground is looked up at once.
 _ROWS = 256
-#: Metres kept above what is flown over, and beside it; between a robot that hovers and anything else.
-OVER, BESIDE, HOVER = 3.0, 2.0, 0.8
+OVER = 3.0  # m kept above what is flown over
+BESIDE = 2.0  # m kept beside what is flown past
+HOVER = 0.8  # m between a robot that hovers and anything else
 #: Highest above ground: where most countries end the air that anybody may fly in.
 CEILING = 120.0
 # Metres by which a spot to land on may be uneven, and within which it has to be even: wind moves who comes down, into a
@@ -318,9 +320,10 @@ _UNEVEN, _SPOT = 0.25, 1.0
 _KERBSIDE = 1.0
 # Metres above where it begins that things may be which do not keep it from going straight up, and above ground.
 _OVERHEAD, _LOW = 0.3, 1.0
-# Where it goes first then: metres above ground, and beside its way there that have to be free; how many of the nearest
-# places are looked at.
-_LEAD, _ALONG, _MOST_SPOTS = 1.5, 0.3, 400
+# Where it goes first then.
+_LEAD = 1.5  # m above ground
+_ALONG = 0.3  # m beside its way there that have to be free
+_MOST_SPOTS = 400  # of the nearest places are looked at
 # Cells of the map on which ways round things are found, in cells of this one.
 _COARSE = 4
 # Speeds by which ways are compared, m/s: sideways, up and down.

@@ -148,8 +148,20 @@ class RobotPopulation:
         commands.command(self.run, robot, vector, space)
 
     def drive(self, robot: int, velocity: ArrayLike) -> None:
-        """Follow a velocity (vx, vy, wz): metres a second in the base's frame, radians a second to the left."""
-        commands.drive(self.run, robot, velocity)
+        """Follow a velocity (vx, vy, wz): metres a second in the base's frame, radians a second to the left.
+
+        Robots that fly take (vx, vy, vz, wz).
+
+        Raises
+        ------
+        InputError
+            If the robot follows no velocities, or these are not so many finite numbers.
+        """
+        model = self.models[robot]
+        spaces = [name for name, space in model.action_spaces.items() if space.drives == "velocity"]
+        if not spaces:
+            raise InputError(f"drive: {model.title} follows no velocities; command its motors")
+        self.command(robot, velocity, spaces[0])
 
     def stop(self, robot: int) -> None:
         """Stand still."""
@@ -226,13 +238,32 @@ class RobotPopulation:
         arm_tasks.begin_task(self.run, robot, TaskKind.REACH, np.asarray(target, np.float64))
 
     def pick(self, robot: int, entity: int) -> None:
-        """Pick a thing up from above."""
-        arm_tasks.begin_pick(self.run, robot, entity)
+        """Pick a thing up from above.
+
+        Raises
+        ------
+        InputError
+            If the robot has no arm, or there is no such thing.
+        """
+        objects = self.run.objects
+        found = np.flatnonzero(objects.entity == entity)
+        if not len(found):
+            raise InputError(f"pick: there is no thing {entity}")
+        arm_tasks.begin_task(self.run, robot, TaskKind.PICK, objects.position[found[0]].copy(), entity)
 
     def place(self, robot: int, target: ArrayLike | int) -> None:
-        """Put what the hand holds down at a point, ENU metres, or on the deck of the robot with an entity."""
+        """Put what the hand holds down at a point, ENU metres, or on the deck of the robot with an entity.
+
+        Raises
+        ------
+        InputError
+            If the robot has no arm, or nobody has such a deck.
+        """
         if isinstance(target, int):
-            arm_tasks.begin_place_on(self.run, robot, target)
+            spot = arm_tasks.deck_spot(self.run, robot, target)
+            if spot is None:
+                raise InputError(f"place: {target} has no deck")
+            arm_tasks.begin_task(self.run, robot, TaskKind.PLACE, spot, target)
             return
         arm_tasks.begin_task(self.run, robot, TaskKind.PLACE, np.asarray(target, np.float64))
 
@@ -441,12 +472,7 @@ class RobotPopulation:
 
     def pass_door(self, robot: int, room: int, taken: NDArray[np.float64]) -> bool:
         """Have a robot come through a door into a room (-1: outdoors); False if no spot there is clear of discs."""
-        run = self.run
-        spot = trips.arrival_spot(run, robot, room, int(run.trips.room[robot]), taken)
-        if spot is None:
-            return False
-        trips.pass_door(run, robot, room, spot)
-        return True
+        return trips.pass_door(self.run, robot, room, taken)
 
     def give_up(self, robot: int) -> None:
         """Have a robot end its way before it is there."""
@@ -467,8 +493,8 @@ class RobotPopulation:
         return drawing.cameras(self.run)
 
     def camera_heights(self) -> NDArray[np.float64]:
-        """Height of each robot's camera above its position, metres."""
-        return drawing.camera_heights(self.run)
+        """Height of each robot's camera above its body's bottom, metres; of the base's where there is no camera."""
+        return np.asarray(self.cameras()[:, 2] - self.bodies().position[:, 2])
 
     def deck(self, entity: int) -> DeckPose | None:
         """Return the deck of the robot with this entity; None if it has none."""
@@ -503,7 +529,7 @@ class RobotPopulation:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future."""
-        return self.run.saved() | self._loose.arrays()
+        return self.run.state_arrays() | self._loose.arrays()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""

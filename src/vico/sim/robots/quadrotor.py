@@ -34,7 +34,9 @@ from vico.sim.robots.controller import Array, MotorController
 from vico.sim.robots.path_following import WaypointFollowers
 from vico.world.heights import HeightField
 
-_EXPONENT, _REFERENCE, _LOWEST = 0.25, 10.0, 1.0
+_EXPONENT = 0.25  # of the power law by which wind grows with height: of towns
+_REFERENCE = 10.0  # m above ground that weather is told for
+_LOWEST = 1.0  # m above ground below which wind grows no weaker
 _INTENSITY, _LENGTH = (0.2, 0.2, 0.1), (60.0, 60.0, 20.0)
 _WAVES = 12
 
@@ -110,8 +112,13 @@ def air_at(gusts, mean, position, above, seconds, out):  # type: ignore[no-untyp
 
 AIR_DENSITY = 1.225
 _STILL = 1e-3  # rad/s below which a rotor stands
-#: Entries of a setpoint: position (ENU, metres), velocity (m/s), heading (rad) and turning (rad/s).
-POSITION, VELOCITY, HEADING, TURNING, SETPOINT = slice(0, 3), slice(3, 6), 6, 7, 8
+# Entries of a setpoint.
+POSITION = slice(0, 3)  # ENU, m
+VELOCITY = slice(3, 6)  # ENU, m/s
+VELOCITY_UP = 5  # the last of these
+HEADING = 6  # rad
+TURNING = 7  # rad/s
+SETPOINT = 8  # how many there are
 
 
 class FlightPhase(IntEnum):
@@ -164,7 +171,7 @@ class FlightArrays:
     wind: NDArray[np.float64]
 
     @classmethod
-    def landed(cls, count: int, rotors: int) -> FlightArrays:
+    def on_ground(cls, count: int, rotors: int) -> FlightArrays:
         """Robots on the ground with full batteries."""
         return cls(
             speed=np.zeros((count, rotors)),
@@ -209,16 +216,18 @@ class Flight(WaypointFollowers):
     arrays: FlightArrays = field(init=False)
 
     def __post_init__(self) -> None:
-        self.arrays = FlightArrays.landed(len(self.robots), len(self.model.motors))
+        self.arrays = FlightArrays.on_ground(len(self.robots), len(self.model.motors))
         self.ways = [self.no_way()] * len(self.robots)
         r = self.model.rotors
         assert r is not None
-        self._lift = (r.thrust, r.moment, r.rotor_drag, 0.5 * AIR_DENSITY * r.drag_area)
-        self._lags = (r.speed_up, r.slow_down)
         # Watts for each N^1.5 of a rotor's thrust: momentum theory.
-        disc = 2.0 * AIR_DENSITY * math.pi * r.radius**2
-        self._power = (1.0 / (math.sqrt(disc) * r.efficiency), r.idle_power, r.capacity)
-        self._places, self._turns, self._site = r.places, r.turns, r.site
+        watts = 1.0 / (math.sqrt(2.0 * AIR_DENSITY * math.pi * r.radius**2) * r.efficiency)
+        drag = 0.5 * AIR_DENSITY * r.drag_area
+        self._rotors = _RotorSettings(
+            r.thrust, r.moment, r.rotor_drag, drag, r.speed_up, r.slow_down, watts, r.idle_power, r.capacity, r.places,
+            r.turns,
+        )  # fmt: skip
+        self._site = r.site
 
     @property
     def in_the_air(self) -> bool:
@@ -234,7 +243,8 @@ class Flight(WaypointFollowers):
         a, motion = self.arrays, engine.motion(self.robots)
         above = motion.position[:, 2] - self._below
         wrenches = _push_all(
-            (self._lift, self._lags, self._power, self._places, self._turns, self.gusts),
+            self._rotors,
+            self.gusts,
             (motion.position, motion.velocity, motion.rotation, above),
             (a.speed, a.wanted, a.turned, a.charge),
             a.wind,
@@ -244,15 +254,39 @@ class Flight(WaypointFollowers):
         engine.thrust_all(self.robots, self._site, wrenches)
 
 
+class _RotorSettings(NamedTuple):
+    """What rotors, airframe and battery of a kind are like, as compiled code takes it; see `RotorModel`.
+
+    Attributes
+    ----------
+    drag
+        Of the whole robot, newtons for each (m/s)^2.
+    watts
+        For each N^1.5 of a rotor's thrust.
+    """
+
+    thrust: float
+    moment: float
+    rotor_drag: float
+    drag: float
+    speed_up: float
+    slow_down: float
+    watts: float
+    idle_power: float
+    capacity: float
+    places: Array
+    turns: Array
+
+
 @compiled
-def _turn_rotors(row, rotors, lags, step):  # type: ignore[no-untyped-def]
+def _turn_rotors(settings, row, rotors, step):  # type: ignore[no-untyped-def]
     """Let the rotors of a robot follow their commands for a step; return the mean square of each one's speed."""
     speed, wanted, turned, charge = rotors
     squares = np.empty(speed.shape[1])
     for k in range(speed.shape[1]):
         before = speed[row, k]
         goal = wanted[row, k] if charge[row] > 0.0 else 0.0
-        lag = lags[0] if goal > before else lags[1]
+        lag = settings.speed_up if goal > before else settings.slow_down
         after = goal + (before - goal) * math.exp(-step / lag)
         speed[row, k] = after if after > _STILL else 0.0
         turned[row, k] = (turned[row, k] + 0.5 * (before + after) * step) % (2.0 * math.pi)
@@ -261,55 +295,60 @@ def _turn_rotors(row, rotors, lags, step):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _push(body, squares, lift, places, turns, out):  # type: ignore[no-untyped-def]
+def _push(settings, body, squares, out):  # type: ignore[no-untyped-def]
     """Write force and torque on a robot, in its frame; return the sum of its rotors' thrusts to the power of 1.5.
 
     `body` is how the air moves past it, in its frame, m/s.
     """
-    thrust_factor, moment, rotor_drag, drag = lift
     out[:] = 0.0
+    force, torque = out[:3], out[3:]
     work = 0.0
     for k in range(len(squares)):
-        thrust = thrust_factor * squares[k]
+        thrust = settings.thrust * squares[k]
         work += thrust**1.5
         speed = math.sqrt(squares[k])
-        x, y, z = places[k]
-        fx, fy = rotor_drag * speed * body[0], rotor_drag * speed * body[1]
-        out[0] += fx
-        out[1] += fy
-        out[2] += thrust
-        out[3] += y * thrust - z * fy
-        out[4] += z * fx - x * thrust
-        out[5] += x * fy - y * fx - turns[k] * moment * thrust
+        x, y, z = settings.places[k]
+        fx, fy = settings.rotor_drag * speed * body[0], settings.rotor_drag * speed * body[1]
+        force[0] += fx
+        force[1] += fy
+        force[2] += thrust
+        torque[0] += y * thrust - z * fy
+        torque[1] += z * fx - x * thrust
+        torque[2] += x * fy - y * fx - settings.turns[k] * settings.moment * thrust
     size = math.sqrt(body[0] ** 2 + body[1] ** 2 + body[2] ** 2)
     for k in range(3):
-        out[k] += drag * size * body[k]
+        force[k] += settings.drag * size * body[k]
     return work
 
 
 @compiled
-def _push_all(settings, motion, rotors, wind, step, seconds):  # type: ignore[no-untyped-def]
+def _push_all(settings, gusts, motion, rotors, wind, step, seconds):  # type: ignore[no-untyped-def]
     """Let rotors turn and batteries drain for a step; return forces and torques on all robots, shape ``(k, 6)``."""
-    lift, lags, power, places, turns, gusts = settings
     position, velocity, rotation, above = motion
     charge = rotors[3]
     out, air, body = np.empty((len(position), 6)), np.empty(3), np.empty(3)
     for row in range(len(position)):
-        squares = _turn_rotors(row, rotors, lags, step)
+        squares = _turn_rotors(settings, row, rotors, step)
         air_at(gusts, wind, position[row], above[row], seconds, air)
         past = air - velocity[row]
         for k in range(3):
             body[k] = rotation[row, 0, k] * past[0] + rotation[row, 1, k] * past[1] + rotation[row, 2, k] * past[2]
-        work = _push(body, squares, lift, places, turns, out[row])
-        drawn = power[0] * work + (power[1] if work > 0.0 else 0.0)
-        charge[row] = max(0.0, charge[row] - drawn * step / power[2])
+        work = _push(settings, body, squares, out[row])
+        drawn = settings.watts * work + (settings.idle_power if work > 0.0 else 0.0)
+        charge[row] = max(0.0, charge[row] - drawn * step / settings.capacity)
     return out
 
 
-_GRAVITY = 9.81
-# 1/s of a position's, a velocity's, an attitude's, a heading's and a rate's error; 1/s^2 of a velocity's integral.
-_POSITION, _VELOCITY, _ATTITUDE, _HEADING_GAIN, _RATE, _RATE_YAW = (0.95, 1.0), (2.2, 4.0), 6.5, 2.8, 18.0, 6.0
-_INTEGRAL, _MOST_INTEGRAL = (0.8, 1.5), 7.0
+_GRAVITY = 9.81  # m/s^2
+# Gains of errors, 1/s; where there are two, sideways and up.
+_POSITION = (0.95, 1.0)
+_VELOCITY = (2.2, 4.0)
+_ATTITUDE = 6.5
+_HEADING_GAIN = 2.8
+_RATE = 18.0
+_RATE_YAW = 6.0
+_INTEGRAL = (0.8, 1.5)  # of a velocity's error, 1/s^2
+_MOST_INTEGRAL = 7.0  # m/s^2
 # Metres that what is followed may be ahead of the robot, and that it flies to as fast as it can at the most.
 _LEASH = 1.5
 _FASTEST_RATE = 4.0  # rad/s

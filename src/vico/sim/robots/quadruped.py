@@ -73,8 +73,12 @@ def leg_angles(x, y, z, side, legs):  # type: ignore[no-untyped-def]
     return hip, np.arctan2(-x, across) + lean, calf
 
 
-#: What the gait remembers: the phase; for each leg the foot's x, y and where it left the ground; the smoothed motion.
-_PHASE, _FEET, _FOOT_SIZE, _MOTION, _MEMORY = 0, 1, 4, 17, 20
+# What the gait remembers.
+_PHASE = 0  # 0..1
+_FEET = 1  # for each leg the foot's x and y, and where it left the ground, metres
+_FOOT_SIZE = 4
+_MOTION = _FEET + 4 * _FOOT_SIZE  # the smoothed motion: vx, vy, wz
+_MEMORY = _MOTION + 3
 _FOOT_X, _FOOT_Y, _LIFTED_X, _LIFTED_Y = range(4)
 
 
@@ -160,7 +164,9 @@ class Trot:
 
 
 # Scales of the observation and its limit, from the policy's deployment configuration.
-_SPIN, _JOINT_SPEED, _LIMIT = 0.25, 0.05, 100.0
+_SPIN = 0.25  # of angular velocities, rad/s
+_JOINT_SPEED = 0.05  # of the joints' speeds, rad/s
+_LIMIT = 100.0
 
 
 @compiled
@@ -207,45 +213,31 @@ def dense_layer(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
     return out
 
 
-#: Where the parts of the policy's observation begin: angular velocity, gravity and command (3 each), joint angles
-#: relative to the pose at rest, joint speeds and the last action (12 each).
-_ANGULAR_VELOCITY, _GRAVITY, _OBSERVED_COMMAND, _ANGLES, _SPEEDS, _ACTION, _OBSERVED = 0, 3, 6, 9, 21, 33, 45
-
-
-@compiled
-def _observation(angular_velocity_body, rotation, command, joints, action, order, rest):  # type: ignore[no-untyped-def]
-    """Return what the policy sees, scaled, shape ``(45,)``."""
-    angles, speeds = joints
-    seen = np.empty(_OBSERVED)
-    for k in range(3):
-        seen[_ANGULAR_VELOCITY + k] = angular_velocity_body[k] * _SPIN
-        seen[_GRAVITY + k] = -rotation[2, k]
-        seen[_OBSERVED_COMMAND + k] = command[k]
-    for k in range(12):
-        seen[_ANGLES + k] = angles[order[k]] - rest[k]
-        seen[_SPEEDS + k] = speeds[order[k]] * _JOINT_SPEED
-        seen[_ACTION + k] = action[k]
-    return seen
-
-
-@compiled
-def _observe_all(motion, command, memory, pose):  # type: ignore[no-untyped-def]
-    """Return what the policy sees of all robots, shape ``(k, 45)``."""
-    rotation, angular_velocity_body, angles, speeds = motion
-    order, rest, _ = pose
-    seen = np.empty((len(command), _OBSERVED))
-    for k in range(len(command)):
-        seen[k] = _observation(
-            angular_velocity_body[k], rotation[k], command[k], (angles[k], speeds[k]), memory[k], order, rest
-        )
-    return seen
+# Where the parts of the policy's observation begin.
+_ANGULAR_VELOCITY = 0
+_GRAVITY = 3
+_OBSERVED_COMMAND = 6
+_ANGLES = 9  # relative to the pose at rest
+_SPEEDS = 21
+_ACTION = 33  # the last one
+_OBSERVED = 45
 
 
 @compiled
 def _evaluate(layers, motion, command, memory, pose):  # type: ignore[no-untyped-def]
     """Return joint targets in the model's order, shape ``(k, 12)``; `memory` becomes the actions."""
     order, rest, scale = pose
-    seen = _observe_all(motion, command, memory, pose)
+    rotation, angular_velocity_body, angles, speeds = motion
+    seen = np.empty((len(command), _OBSERVED))
+    for robot in range(len(command)):
+        for k in range(3):
+            seen[robot, _ANGULAR_VELOCITY + k] = angular_velocity_body[robot, k] * _SPIN
+            seen[robot, _GRAVITY + k] = -rotation[robot, 2, k]
+            seen[robot, _OBSERVED_COMMAND + k] = command[robot, k]
+        for k in range(12):
+            seen[robot, _ANGLES + k] = angles[robot, order[k]] - rest[k]
+            seen[robot, _SPEEDS + k] = speeds[robot, order[k]] * _JOINT_SPEED
+            seen[robot, _ACTION + k] = memory[robot, k]
     x = np.minimum(np.maximum(seen, -_LIMIT), _LIMIT).astype(np.float32)
     for index in range(len(layers)):
         x = dense_layer(x, layers[index][0], layers[index][1], index == len(layers) - 1)
@@ -439,8 +431,9 @@ FOLDED = np.array([0.0, 1.4, -2.65])
 # search in simulation over both models and seven ways to lie, the score being how soon all of them are up.
 _ON_BACK = np.array([[0.98, 3.3, -1.9], [-0.71, 2.81, -1.8]])
 _ON_SIDE = np.array([[-0.83, 3.32, -1.89], [0.0, 1.41, -1.56]])
-#: Seconds an attempt to get up lasts, and when in it the legs begin and cease to push.
-_TRY, _PUSH, _PULL = 3.0, 0.5, 2.06
+_TRY = 3.0  # s that an attempt to get up lasts
+_PUSH = 0.5  # s from its beginning at which the legs begin to push ...
+_PULL = 2.06  # ... and cease to
 
 
 def get_up_targets(lying: float, base: Base, rest: Array) -> Array | None:

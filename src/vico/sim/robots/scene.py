@@ -152,7 +152,14 @@ class RobotScene:
         self.world = world
         self.kinds = tuple(kinds)
         self.models = tuple(robot_model(kind, packs=packs) for kind in kinds)
-        self.groups = _groups(self.models)
+        members: dict[str, list[int]] = {}
+        for robot, model in enumerate(self.models):
+            members.setdefault(model.name, []).append(robot)
+        self.groups = tuple(
+            RobotGroup(model, controller_for(model), np.array(robots, np.int64), round(model.control_period / TICK))
+            for robots in members.values()
+            for model in (self.models[robots[0]],)
+        )
         self._router = router
         self._engine, self._indoor = physics, indoor
         self._room_physics: dict[str, PhysicsScene] = {}
@@ -219,17 +226,6 @@ class RobotScene:
         if key not in self._narrow:
             self._narrow[key] = untraversable_cells(self.world, model)
         return self._narrow[key]
-
-
-def _groups(models: Sequence[RobotModel]) -> tuple[RobotGroup, ...]:
-    members: dict[str, list[int]] = {}
-    for robot, model in enumerate(models):
-        members.setdefault(model.name, []).append(robot)
-    return tuple(
-        RobotGroup(model, controller_for(model), np.array(robots, np.int64), round(model.control_period / TICK))
-        for robots in members.values()
-        for model in (models[robots[0]],)
-    )
 
 
 #: Metres a robot has to be above where it stands on the ground to count as being in the air.

@@ -66,12 +66,12 @@ class RobotTrips:
         self.goal_room[robot] = self.leg[robot] = self.door[robot] = NONE
         self.goal[robot], self.ride[robot] = 0.0, 0.0
 
-    def saved(self) -> dict[str, NDArray[Any]]:
+    def state_arrays(self) -> dict[str, NDArray[Any]]:
         """Every number, copied."""
         return {f"trip_{name}": array.copy() for name, array in vars(self).items()}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `saved` returned."""
+        """Go back to what `state_arrays` returned."""
         for name, array in vars(self).items():
             array[...] = arrays[f"trip_{name}"]
 
@@ -293,7 +293,7 @@ class RobotRun:
 
     # Robots in rooms have engines of their own.
 
-    def housed(self) -> CompositeEngine:
+    def composite_engine(self) -> CompositeEngine:
         """Return the engine as one in which robots can be indoors."""
         if not isinstance(self.engine, CompositeEngine):
             self.engine = CompositeEngine(self.engine)
@@ -333,19 +333,19 @@ class RobotRun:
 
     # Saved and restored.
 
-    def saved(self) -> dict[str, NDArray[Any]]:
+    def state_arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, copied."""
         paths = [follower.path for follower in self.followers]
         found = {f"engine_{key}": value for key, value in self.engine.arrays().items()}
         found |= {name: value.copy() for name, value in vars(self.arrays).items()}
-        found |= self.trips.saved()
+        found |= self.trips.state_arrays()
         found |= {f"memory_{k}": memory.copy() for k, memory in enumerate(self.memory)}
         for k, flight in enumerate(self.flights):
             if flight is not None:
-                found |= {f"flight_{k}_{name}": value for name, value in flight.saved().items()}
+                found |= {f"flight_{k}_{name}": value for name, value in flight.state_arrays().items()}
         for k, work in enumerate(self.work):
             if work is not None:
-                found |= {f"work_{k}_{name}": value for name, value in work.saved().items()}
+                found |= {f"work_{k}_{name}": value for name, value in work.state_arrays().items()}
         found |= {} if self.oracle is None else self.oracle.arrays()
         numbers = [follower.numbers() for follower in self.followers]
         return found | {
@@ -357,7 +357,7 @@ class RobotRun:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `saved` returned.
+        """Go back to what `state_arrays` returned.
 
         Raises
         ------
@@ -398,5 +398,5 @@ class RobotRun:
             self.engine.inside.clear()
         for robot in inside:
             centre = np.array(self.scene.rooms.room(int(self.trips.room[robot])).centre)
-            self.housed().house(robot, self.scene.room_physics(robot), centre, np.array([*centre[:2], 0.0]))
+            self.composite_engine().house(robot, self.scene.room_physics(robot), centre, np.array([*centre[:2], 0.0]))
         self.unhouse()

@@ -239,24 +239,28 @@ def arrival_spot(run: RobotRun, robot: int, space: int, origin: int, taken: Arra
     return rooms.spot(space, near, radius, taken, _BEHIND_DOOR)
 
 
-def pass_door(run: RobotRun, robot: int, space: int, spot: Array) -> None:
-    """Have a robot come through a door and stand at a spot behind it; it goes on from there."""
+def pass_door(run: RobotRun, robot: int, space: int, taken: Array) -> bool:
+    """Have a robot come through a door; return False if no spot behind it is clear of discs. It goes on from there."""
     trips, rooms = run.trips, run.scene.rooms
     origin = int(trips.room[robot])
+    spot = arrival_spot(run, robot, space, origin, taken)
+    if spot is None:
+        return False
     if space == OUTDOORS:
         yaw = rooms.entrances[origin].facing
     else:
         ahead = spot - rooms.door(space, origin)[:2]
         yaw = math.atan2(ahead[1], ahead[0])
-    place, housed = np.array([*spot, yaw]), run.housed()
+    place, engine = np.array([*spot, yaw]), run.composite_engine()
     if space == OUTDOORS:
-        housed.release(robot, place)
+        engine.release(robot, place)
         run.unhouse()
     else:
         centre = np.array(rooms.room(space).centre)
-        housed.house(robot, run.scene.room_physics(robot), centre, place)
+        engine.house(robot, run.scene.room_physics(robot), centre, place)
     trips.room[robot], trips.door[robot], trips.leg[robot], trips.ride[robot] = space, NONE, NONE, 0.0
     run.forget(robot)
+    return True
 
 
 def set_room_obstacles(run: RobotRun, dt: float) -> None:

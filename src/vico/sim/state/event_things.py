@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +22,13 @@ from vico.sim.state.base import SimulationBase
 from vico.world.mesh import Surface
 from vico.world.world import World
 
+if TYPE_CHECKING:
+    from vico.sim.traffic import Traffic
+
 #: Entities of an event's things: so many numbers for each event.
 THINGS_EACH = 100
 # Things are set up where this much is free around them, metres.
 _ROOM = 0.5
-
-
-class HasCars(Protocol):
-    """Who knows where cars are."""
-
-    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
-        """Whether a car is on some lanes (a mask), or on its way there."""
 
 
 class EventSetting(Protocol):
@@ -46,7 +42,7 @@ class EventSetting(Protocol):
         """Where it is."""
 
     @property
-    def traffic(self) -> HasCars | None:
+    def traffic(self) -> Traffic | None:
         """Who drives there."""
 
     def obstacles(self) -> Bodies:

@@ -49,7 +49,9 @@ _VEHICLE_GAP = 0.1  # sideways distance kept from vehicles that are passed, m
 _LONG = 2.5  # half the length of a section of a tram at least, m
 _NOSE = 0.02  # a vehicle's outline is tested so much longer, m
 _NEAR_PATH = 1.5  # more than a bus's corners leave its path in a bend, m
-_FINE_STEP, _COARSE_STEP, _COARSE_FROM = 1.0, 2.0, 8.0  # steps of the sweep, and from where on it takes the larger, m
+_FINE_STEP = 1.0  # m of a step of the sweep
+_COARSE_STEP = 2.0  # m of a larger one
+_COARSE_FROM = 8.0  # m ahead from which on it takes these
 
 
 class Surroundings(NamedTuple):
@@ -357,7 +359,9 @@ VEHICLE_MODELS += [f"bicycle_{colour}" for colour in BICYCLE_PAINTS]
 
 #: Share of each kind of car.
 _KIND_SHARES = {"hatchback": 0.3, "sedan": 0.27, "suv": 0.23, "van": 0.12, "taxi": 0.08}
-_CAR_ACCELERATION, _BUS_ACCELERATION, _HARD_BRAKING = 1.6, 1.1, 8.0  # m/s^2, on dry ground
+_CAR_ACCELERATION = 1.6  # m/s^2, on dry ground
+_BUS_ACCELERATION = 1.1  # m/s^2, on dry ground
+_HARD_BRAKING = 8.0  # m/s^2, on dry ground
 _CAR_SPEED_FACTORS, _BUS_SPEED_FACTOR = (0.85, 1.05), 0.95
 
 

@@ -19,12 +19,14 @@ from vico.sim.bodies.arrays import Bodies, Drawn, concatenate_drawn
 from vico.sim.traffic.car_following import VEHICLE_MODELS
 from vico.sim.traffic.jams import JamLog
 from vico.sim.traffic.lights import LampDrawing
+from vico.sim.traffic.route import is_taken
 from vico.sim.traffic.shapes import Shapes, TrafficLevels
 from vico.sim.traffic.signals import SignalHeads
 from vico.sim.traffic.state import GAIT_TIME, NONE, PRESENT, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
+from vico.world.walkways import Walkways
 
 
 class TrafficDrawing:
@@ -75,7 +77,11 @@ class TrafficDrawing:
         parts.append(self._lamps.draw(lights, elapsed, vehicles))
         if len(pedals):
             ridden = slice(len(transforms) - len(pedals), len(transforms))
-            turned = _crank_transforms(transforms[ridden], pedals)
+            c, s = np.cos(2 * np.pi * pedals), np.sin(2 * np.pi * pedals)  # turns of the cranks
+            cranks = np.tile(np.eye(4), (len(pedals), 1, 1))
+            cranks[:, 0, 0], cranks[:, 0, 2], cranks[:, 2, 0], cranks[:, 2, 2] = c, s, -s, c
+            cranks[:, :3, 3] = CRANK_AXLE
+            turned = product(transforms[ridden].astype(np.float64), cranks).astype(np.float32)
             parts.append(Drawn(["cranks"], np.zeros(len(pedals), np.int32), turned, self._entities[ridden]))
         if self._heads is not None:
             parts.append(self._heads.draw(*shown))
@@ -92,15 +98,6 @@ class TrafficDrawing:
         if self._heads is not None:
             models = models | self._heads.prototypes()
         return models | {"bus": [mirror(part) for part in models["bus"]]} if lefthand else models
-
-
-def _crank_transforms(bicycles: NDArray[np.float32], turns: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return model to world of cranks that have made so many turns, in bicycles at `bicycles`, shape ``(n, 4, 4)``."""
-    c, s = np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)
-    cranks = np.tile(np.eye(4), (len(turns), 1, 1))
-    cranks[:, 0, 0], cranks[:, 0, 2], cranks[:, 2, 0], cranks[:, 2, 2] = c, s, -s, c
-    cranks[:, :3, 3] = CRANK_AXLE
-    return product(bicycles.astype(np.float64), cranks).astype(np.float32)
 
 
 Floats = NDArray[np.float64]
@@ -214,6 +211,7 @@ class TrafficView:
     cyclists: int
     pedestrians: int
     lanes: LaneGraph
+    walks: Walkways
     height: HeightField
     paths: WalkwayNetwork
     fleet: Any
@@ -231,6 +229,7 @@ class TrafficView:
     _riding_speed: NDArray[np.float64]
     _levels: TrafficLevels
     _drawing: TrafficDrawing
+    _shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None]  # lanes and walkways
     _bodies: Bodies | None  # as they stand since they last moved; asked for by everybody
 
     def bodies(self) -> Bodies:
@@ -241,6 +240,24 @@ class TrafficView:
             out = np.concatenate([np.ones(len(found) - self.pedestrians, np.bool_), ~riding])
             self._bodies = found.where(out) if riding.any() else found
         return self._bodies
+
+    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
+        """Return whether a car is on some lanes (a mask), or on its way there."""
+        return bool(is_taken(self._net, self._vehicles, lanes))
+
+    @property
+    def shut_lanes(self) -> NDArray[np.bool_] | None:
+        """Which lanes events keep cars off, without those that lead nowhere else; None for none."""
+        return self._shut[0]
+
+    @property
+    def shut_walkways(self) -> NDArray[np.bool_] | None:
+        """Which walkways nobody is to walk on; None for none."""
+        return self._shut[1]
+
+    def is_shut_street_taken(self) -> bool:
+        """Return whether a car is where an event keeps cars off."""
+        return self._shut[0] is not None and self.is_taken(self._shut[0])
 
     def _everybody(self) -> Bodies:
         """Return vehicles and all pedestrians, who ride in buses far away."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
 
 import numpy as np
 import shapely
@@ -11,10 +10,10 @@ from numpy.typing import NDArray
 
 from vico.geometry import distance
 from vico.sim.environment.event_sites import Gathering
+from vico.sim.traffic.drawing import TrafficView
 from vico.sim.traffic.placement import guided_walks
-from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.state import CROWD, NONE, WINDOW, WalkwayNetwork
-from vico.world.walkways import SIDEWALK, Walkways
+from vico.sim.traffic.state import CROWD, NONE, WINDOW
+from vico.world.walkways import SIDEWALK
 
 _MOST = 0.4  # share of all pedestrians that go to one event
 _COMES_FROM = 350.0  # m from where they come at the most
@@ -22,23 +21,6 @@ _ARRIVED = 6.0  # m from where they leave the sidewalk
 _PLACARDS = 3  # of so many who march one has a placard
 _RAISED_FROM, _RAISING = 18.0, 4.0  # m from where a march is joined at which they go up, and in which
 _STROLL = (20, 61)  # s before a stall
-
-
-class HasPedestrians(Protocol):
-    """Traffic, as far as crowds are concerned; pedestrians' bodies come after those of `vehicles`."""
-
-    pedestrian_state: Any
-    paths: WalkwayNetwork
-    walks: Walkways
-    shapes: Shapes
-    vehicles: int
-
-    @property
-    def shut_walkways(self) -> NDArray[np.bool_] | None:
-        """Which walkways nobody is to walk on; None for none."""
-
-    def is_shut_street_taken(self) -> bool:
-        """Return whether a car is where an event keeps cars off."""
 
 
 class Gatherings:
@@ -55,7 +37,7 @@ class Gatherings:
         The gatherings that go on.
     """
 
-    def __init__(self, traffic: HasPedestrians) -> None:
+    def __init__(self, traffic: TrafficView) -> None:
         self._traffic, self._walkers = traffic, traffic.pedestrian_state
         self.now: Sequence[Gathering] = ()
         self._plain = traffic.paths

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
+from vico.sim.traffic.junctions import waits_outside
 from vico.sim.traffic.state import NONE
 
 #: Who has stood still, or walked on the spot, for so long is stuck, s.
@@ -104,11 +105,6 @@ class JamLog:
         ]
 
 
-def entity_before(blocker: int, entities: NDArray[np.int32]) -> int:
-    """Return the entity of the body a vehicle stands behind, 0 for nobody; `entities` of all bodies of the step."""
-    return int(entities[blocker]) if NONE < blocker < len(entities) else 0
-
-
 _BACK_UP_AFTER = 3.0  # s that both have stood
 _ALIKE = 0.85  # cosine of the angle between two headings that count as the same
 _QUEUE = 6  # vehicles behind one another that make room
@@ -166,8 +162,7 @@ def _drives_before(shapes, other, vehicle):  # type: ignore[no-untyped-def]
 @compiled
 def _waits_beside_way(net, vehicle, other):  # type: ignore[no-untyped-def]
     """Return whether `other` waits for a junction on another street than those that a vehicle takes: no queue."""
-    waits = other.junction_wait > 0.0 and other.granted_count == 0 and net.lanes[other.lane].junction < 0
-    return waits and other.lane != vehicle.lane and not _plans_over(vehicle, other.lane)
+    return waits_outside(net, other) and other.lane != vehicle.lane and not _plans_over(vehicle, other.lane)
 
 
 @compiled

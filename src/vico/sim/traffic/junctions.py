@@ -24,7 +24,7 @@ from vico.sim.traffic.route import NEVER, STANDING_ROOM, clear_of_tracks, is_lan
 from vico.sim.traffic.state import DRIVING, HELD_JUNCTIONS, NONE, PRESENT, PREVIOUS_LANES, SEVERAL
 
 #: What stands against entering a junction: nothing, one who cannot leave it before, others.
-FREE, LETS_OUT, TAKEN = 0, 1, 2
+FREE, LETS_OUT, TAKEN = range(3)
 
 _LONG = 6.0  # m from which on a vehicle needs a junction to itself
 _LONG_COUNTS = 4.0  # times as much does its wait count where others share: an empty junction is rare
@@ -227,16 +227,6 @@ def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _note_lane_waits(net, junctions, vehicle):  # type: ignore[no-untyped-def]
-    """Note how long a vehicle has waited for the lanes that it wants to take through the junction it queues for."""
-    wait, queued, waits = counted_wait(junctions, vehicle), vehicle.queued_junction, junctions.claims.longest_lane_wait
-    for k in range(vehicle.granted_count, vehicle.planned_count):
-        lane = vehicle.planned_lanes[k]
-        if net.lanes[lane].junction == queued:
-            waits[lane] = max(waits[lane], wait)
-
-
-@compiled
 def note_claims(net, fleet, junctions):  # type: ignore[no-untyped-def]
     """Note who is where in shared junctions, and how long the first in each queue has waited.
 
@@ -253,20 +243,24 @@ def note_claims(net, fleet, junctions):  # type: ignore[no-untyped-def]
     for vehicle in fleet:
         if claims.any_shared:
             _note_taken(net, junctions, vehicle)
-        lane, queued, wait = vehicle.queued_exit, vehicle.queued_junction, counted_wait(junctions, vehicle)
-        if lane >= 0:
-            junctions.longest_exit_wait[lane] = max(junctions.longest_exit_wait[lane], wait)
+        queued_exit, queued, wait = vehicle.queued_exit, vehicle.queued_junction, counted_wait(junctions, vehicle)
+        if queued_exit >= 0:
+            junctions.longest_exit_wait[queued_exit] = max(junctions.longest_exit_wait[queued_exit], wait)
         if queued < 0:
             continue
         if claims.exclusive[queued] or vehicle.length > _LONG:
             junctions.longest_wait[queued] = max(junctions.longest_wait[queued], wait)
-        else:
-            _note_lane_waits(net, junctions, vehicle)
+            continue
+        for k in range(vehicle.granted_count, vehicle.planned_count):
+            lane = vehicle.planned_lanes[k]
+            if net.lanes[lane].junction == queued:
+                claims.longest_lane_wait[lane] = max(claims.longest_lane_wait[lane], wait)
 
 
 _BEFORE = 0.6  # m kept before tracks where a vehicle waits
 _ON_TRACK = 0.3  # m before tracks from which on a vehicle is taken to be on them
-_BEYOND = 1.0  # m kept behind tracks
+#: Metres kept behind tracks.
+BEYOND_TRACKS = 1.0
 _CREEPS = 1.0  # m/s: who is slower may come to stand
 #: Metres beyond its sight that a vehicle looks for room behind tracks, beside its own length.
 FARTHER = 15.0
@@ -308,24 +302,12 @@ def track_ahead(net, vehicle, look):  # type: ignore[no-untyped-def]
             to_track = ahead + net.tracks[c].start - _BEFORE
             if distance >= NEVER and _ON_TRACK - _BEFORE < to_track < look:
                 distance = max(to_track, 0.0)
-                beyond = ahead + net.tracks[c].end + vehicle.length + _BEYOND
+                beyond = ahead + net.tracks[c].end + vehicle.length + BEYOND_TRACKS
                 called = net.tracks[c].called
         ahead += lane.length
         if ahead > look and ahead > beyond + FARTHER:
             break
     return TrackAhead(distance, beyond, NEVER, called)
-
-
-@compiled
-def look_over(track):  # type: ignore[no-untyped-def]
-    """Return how far a vehicle looks to see whether there is room behind tracks, metres; 0 without any."""
-    return track.beyond + _BEYOND if track.distance < NEVER else 0.0
-
-
-@compiled
-def waits_for_tram(track, distance):  # type: ignore[no-untyped-def]
-    """Return whether a tram comes on tracks that lie before a place so many metres ahead."""
-    return track.called and track.distance < distance
 
 
 @compiled
@@ -539,7 +521,7 @@ def _who_is_at_exit(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-
 
 
 @compiled
-def _waits_outside(net, vehicle):  # type: ignore[no-untyped-def]
+def waits_outside(net, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a vehicle waits for a junction before it: for ever, if who has waited longer cannot pass it."""
     return vehicle.junction_wait > 0.0 and vehicle.granted_count == 0 and net.lanes[vehicle.lane].junction < 0
 
@@ -588,7 +570,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
     if lane >= 0 and is_overtaken(junctions.longest_exit_wait[lane], counted_wait(junctions, vehicle)):
         return False
     other = _who_is_at_exit(vehicle, leave, view, len(fleet))
-    if 0 <= other < len(fleet) and _waits_outside(net, fleet[other]):
+    if 0 <= other < len(fleet) and waits_outside(net, fleet[other]):
         vehicle.kept_out_from = fleet[other].lane  # that one goes first, and who comes behind it stays back
         return False
     if other >= 0:

@@ -10,6 +10,7 @@ import numpy as np
 
 from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.car_following import ANY_BODY, TOUCH, touched_at
+from vico.sim.traffic.parking import is_behind_delivery
 from vico.sim.traffic.path import (
     LANE_CHANGE,
     PATH_POINT,
@@ -158,39 +159,9 @@ def _vehicles_on(net, fleet, lane):  # type: ignore[no-untyped-def]
     return count
 
 
-@inlined
-def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untyped-def]
-    """Move a car to a neighbour lane with fewer vehicles if there is a gap."""
-    lane = vehicle.lane
-    here = _vehicles_on(net, fleet, lane)
-    for beside in (net.lanes[lane].left, net.lanes[lane].right):
-        is_open = beside >= 0 and not net.lanes[beside].closed and not net.lanes[beside].shut
-        is_better = is_open and _vehicles_on(net, fleet, beside) < here
-        if is_better and change_lane(net, vehicle, beside, view):
-            break
-
-
-@compiled
-def change_to_lane_beside(net, vehicle, view):  # type: ignore[no-untyped-def]
-    """Move a car to a neighbour lane if there is a gap, however many drive there."""
-    lane = vehicle.lane
-    for beside in (net.lanes[lane].left, net.lanes[lane].right):
-        is_open = beside >= 0 and not net.lanes[beside].closed and not net.lanes[beside].shut
-        if is_open and change_lane(net, vehicle, beside, view):
-            break
-
-
 @compiled
 def _is_open(net, lane):  # type: ignore[no-untyped-def]
     return lane >= 0 and not net.lanes[lane].closed and not net.lanes[lane].shut
-
-
-@compiled
-def keep_to_kerb(net, vehicle, view):  # type: ignore[no-untyped-def]
-    """Move a cyclist to the neighbour lane towards the kerb if there is one and a gap."""
-    beside = net.lanes[vehicle.lane].right
-    if _is_open(net, beside) and vehicle.time_since_lane_change > _LEAST_TIME:
-        change_lane(net, vehicle, beside, view)
 
 
 @compiled
@@ -213,20 +184,42 @@ def wants_to_overtake_cyclist(net, vehicle, view, ahead, wanted):  # type: ignor
     return is_held_up and vehicle.time_since_lane_change > _LEAST_TIME and left > _LEAST_LANE
 
 
-@compiled
-def overtake_cyclist(net, vehicle, view):  # type: ignore[no-untyped-def]
-    """Move a car to the neighbour lane towards the middle of the street if there is one and a gap."""
-    beside = net.lanes[vehicle.lane].left
-    if _is_open(net, beside):
-        change_lane(net, vehicle, beside, view)
+@inlined
+def choose_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: ignore[no-untyped-def]
+    """Change lanes as the route does, past a delivery, to the kerb, past a cyclist, or out of a queue.
 
-
-@compiled
-def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
-    """Move a bus to the neighbour lane where its route goes on, if it does and there is a gap."""
-    beside = route_lane_beside(net, vehicle)
-    if beside >= 0 and change_lane(net, vehicle, beside, view):
-        advance_on_route(net, vehicle)
+    Parameters
+    ----------
+    stop_distance
+        Metres to its stop, `NEVER` for none.
+    ahead
+        Its leader, the gap to it (metres) and its speed; the speed the vehicle would like (m/s).
+    """
+    leader, gap, leading, wanted = ahead
+    lane = vehicle.lane
+    left, right = net.lanes[lane].left, net.lanes[lane].right
+    if vehicle.route >= 0:
+        # Not before its stop, where its route goes on in the lane beside after that: it would drive past it.
+        if not vehicle.at_stop and vehicle.planned_count == 0 and stop_distance >= NEVER:
+            beside = route_lane_beside(net, vehicle)
+            if beside >= 0 and change_lane(net, vehicle, beside, view):
+                advance_on_route(net, vehicle)
+    elif is_behind_delivery(net, fleet, vehicle):
+        for beside in (left, right):
+            if _is_open(net, beside) and change_lane(net, vehicle, beside, view):
+                break
+    elif vehicle.is_bicycle:
+        if _is_open(net, right) and vehicle.time_since_lane_change > _LEAST_TIME:
+            change_lane(net, vehicle, right, view)
+    elif leader >= 0 and wants_to_overtake_cyclist(net, vehicle, view, (leader, gap, leading), wanted):
+        if _is_open(net, left):
+            change_lane(net, vehicle, left, view)
+    elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
+        here = _vehicles_on(net, fleet, lane)
+        for beside in (left, right):
+            is_emptier = _is_open(net, beside) and _vehicles_on(net, fleet, beside) < here
+            if is_emptier and change_lane(net, vehicle, beside, view):
+                break
 
 
 @compiled

@@ -10,8 +10,10 @@ from vico.io.compiled import compiled
 from vico.sim.bodies.arrays import Drawn
 from vico.sim.traffic.state import APPROACHING, NONE
 
-#: Bits of what a vehicle shows.
-BRAKE, LEFT, RIGHT = 1, 2, 4
+# Bits of what a vehicle shows.
+BRAKE = 1
+LEFT = 2
+RIGHT = 4
 
 _BRAKES = 0.6  # m/s^2: who loses speed faster is on the brake
 _SIGNALS_FROM = 35.0  # m before a turn, or before a lane change is over

@@ -112,7 +112,9 @@ _U_TURN, _TURN = 2.6, 0.6  # rad
 _BORDER = 6.0  # how far from the outermost point of the streets the map's edge counts as reached, m
 _LEAST_WALK = 60.0  # m of connected sidewalk that are worth walking along
 _CONFLICT = 1.45  # m to each side of a lane's centre line that a turning car takes
-_CAR_HALF_WIDTH, _CROSSING_MARGIN, _PAST_CROSSING = 0.9, 0.3, 0.5  # m
+_CAR_HALF_WIDTH = 0.9  # m of what a car takes of its lane
+_CROSSING_MARGIN = 0.3  # m beside a crossing and beyond its ends that count as part of it
+_PAST_CROSSING = 0.5  # m beyond a crossing at which a rear has left it
 
 
 @dataclass(frozen=True)

@@ -54,9 +54,13 @@ _LATE = 1.5  # m/s^2: a place for which one had to brake harder is too near
 _GIVES_UP_AFTER = 12.0  # s of standing after which one drives on that has not got to its place
 _HOLDS_UP, _HELD_UP_WITHIN = 40.0, 60.0  # s that somebody stands behind a delivery, and m, after which it is over
 _SIGNALS_FROM, _SIGNALS_FOR = 35.0, 2.0  # m before a place, s before one leaves it
-_REAR_VIEW, _REAR_GAP, _REAR_TIME = 45.0, 4.0, 3.5  # m and s that who comes from behind has to be away
+_REAR_VIEW = 45.0  # m behind it that a car looks before it leaves a place
+_REAR_GAP = 4.0  # m that who comes from behind has to be away ...
+_REAR_TIME = 3.5  # ... and s
 _PERSON_GAP, _VEHICLE_GAP = 0.3, 0.1  # m kept sideways
-_SWING_OUT, _SEES_DELIVERY, _PATIENT = 10.5, 60.0, 3.0  # m behind a delivery, and s after a lane change
+_SWING_OUT = 10.5  # m behind a delivery that a car needs to change lanes
+_SEES_DELIVERY = 60.0  # m behind a delivery from which on it does
+_PATIENT = 3.0  # s after a lane change in which it makes no other one
 _APART = 20.0  # m between places that are taken at a time: nobody is in the way of who leaves the one behind
 _STANDS = 0.1  # m/s
 _TOO_FAR = 0.8  # m beyond the beginning of a way, at which the front axle has passed it
@@ -349,12 +353,13 @@ _CAR_PARK_SPEED, _CAR_PARK_REVERSE = 2.8, 1.2  # m/s, and backwards
 _LOOKS_BACK = 2.0  # s with the lamps on before one backs out
 _REAR_AXLE = 0.3  # m along the way out at which the rear axle stands that has been backed out
 _REACHED = 0.03  # m
-_SETS_OUT, _STREET_REAR_GAP, _TIME = (
-    3.0,
-    4.0,
-    1.5,
-)  # m before the street at which one looks; m and s beyond the time it takes
-_CAR_PARK_PERSON_GAP, _BESIDE, _WALKS, _BEFORE = 0.3, 0.6, 0.3, 1.5  # m, m, m/s and m: people on their way across
+_SETS_OUT = 3.0  # m before the street at which one looks whether somebody comes
+_STREET_REAR_GAP = 4.0  # m that who comes has to be away ...
+_TIME = 1.5  # ... and s, beyond the time that it takes to drive out
+_CAR_PARK_PERSON_GAP = 0.3  # m kept from people
+_BESIDE = 0.6  # m beside it where people on their way across count
+_WALKS = 0.3  # m/s from which on somebody walks
+_BEFORE = 1.5  # m before where they cross at which a car waits
 _LOOKS_FOR, _CAR_PARK_PATIENCE = 9, 8.0  # m ahead, and s of standing after which only who is in the way counts
 _NEAR_STREET, _LONGEST = 15.0, 60.0  # m of a way from its lane; s that standing farther in counts, at most
 

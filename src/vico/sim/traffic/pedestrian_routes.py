@@ -177,7 +177,9 @@ _LEFT_OF_MIDDLE = 0.3  # companions walk side by side no farther left than this 
 _ROOM_CHANGE = 0.6  # m/s to the side, from beside to behind and back
 _COMES_WITHIN, _COMES_BESIDE = 3.2, 1.1  # m ahead and to the side where somebody who comes is let pass
 _LET_PASS = 2.0  # s that companions stay one behind the other for them
-_FOLLOWS_AT, _FOLLOWS_WITHIN, _FOLLOWS_BESIDE = 0.75, 1.3, 0.5  # m to one of the group ahead, kept and looked for
+_FOLLOWS_AT = 0.75  # m kept to one of the group ahead
+_FOLLOWS_WITHIN = 1.3  # m ahead that one is looked for ...
+_FOLLOWS_BESIDE = 0.5  # ... and m to the side
 _CATCH_UP, _FASTEST = 0.8, 1.4  # share of one's pace for each metre one is behind, and the most
 _TOGETHER, _PARTED = 2.0, 3.0  # m: who leads slows down from the first on and stands from the second on
 _PARTED_LONG = 120.0  # s after which it goes on
@@ -378,7 +380,8 @@ _LEAD, _LEAD_WHEN_HINDERED = 0.7, 2.0  # how far ahead the point runs, m: past a
 _HINDERED_AFTER = 3.0  # who has got nowhere for so long looks that far ahead, s
 _CARS_FIRST_AFTER, _CARS_FIRST_UNTIL = 10.0, 12.0  # s waited by a car that goes first then, and by the pedestrian
 _LEFT_BEHIND = 15.0  # s after which a companion whose leader has crossed crosses, too
-_GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
+_GIVE_UP_CROSSING = 20.0  # s waited for a crossing before turning round ...
+_GIVE_UP_SPREAD = 10.0  # ... and s more by `lateral_share`
 _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
 
 
@@ -495,13 +498,6 @@ def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ig
 
 
 @compiled
-def _gives_up_crossing(walker):  # type: ignore[no-untyped-def]
-    """Return whether a walker has waited so long for a crossing that it turns round; who is led does not."""
-    longest, spread = _GIVE_UP_CROSSING
-    return walker.leader == NONE and walker.crossing_wait > longest + spread * walker.lateral_share
-
-
-@compiled
 def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
     """Move the followed point on until it is far enough ahead; return whether there is something to wait for.
 
@@ -531,7 +527,8 @@ def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt): 
             walker.offset = min(max(offset, 0.0), paths.walkways[walkway].length)
             continue
         if not _may_go_onto(paths, walker, junctions, is_asked, following, dt):
-            if _gives_up_crossing(walker):
+            longest = _GIVE_UP_CROSSING + _GIVE_UP_SPREAD * walker.lateral_share
+            if walker.leader == NONE and walker.crossing_wait > longest:
                 turn_round(paths, walker, x, y)
             return True
         _enter_walkway(paths, walker, junctions, following, node)

@@ -64,22 +64,6 @@ def _take_spot(paths, walker, k, seconds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def leave_spot(walker):  # type: ignore[no-untyped-def]
-    """Have somebody walk on."""
-    walker.spot, walker.stand_kind, walker.stand_time = NONE, 0, 0.0
-    walker.jammed_time = walker.stuck_time = 0.0
-
-
-@compiled
-def _wants(paths, walker, k):  # type: ignore[no-untyped-def]
-    """Return whether somebody who passes spot k stops there, if it is free: a matter of chance."""
-    kind = paths.spots[k].kind
-    if walker.group_size != (2 if kind == TALK else 1):
-        return False
-    return next_random(walker) < _CHANCE[kind]
-
-
-@compiled
 def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[no-untyped-def]
     """Have pedestrian i stop at one of the spots it has come past since its walkway's metre `offset`."""
     walker = pedestrians[i]
@@ -88,10 +72,11 @@ def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[
         return
     low, high = min(offset, walker.offset), max(offset, walker.offset)
     for k in range(paths.spot_first[way], paths.spot_first[way + 1]):
-        passes = low < paths.spots[k].offset <= high
-        if not passes or not _wants(paths, walker, k) or not _is_free(paths, pedestrians, k, shapes, i, first):
-            continue
         kind = paths.spots[k].kind
+        passes = low < paths.spots[k].offset <= high and walker.group_size == (2 if kind == TALK else 1)
+        # Whether it stops is a matter of chance.
+        if not passes or next_random(walker) >= _CHANCE[kind] or not _is_free(paths, pedestrians, k, shapes, i, first):
+            continue
         seconds = _SHORTEST[kind] + next_random(walker) * (_LONGEST[kind] - _SHORTEST[kind])
         if kind == TALK:
             other = pedestrians[i + 1]
@@ -118,14 +103,16 @@ def note_standing(paths, pedestrians, walker, is_there, is_asked, dt):  # type: 
     deserted = walker.stand_kind == TALK and walker.leader != NONE and pedestrians[walker.leader].stand_kind != TALK
     is_over = walker.stand_time <= 0.0 or paths.walkways[walker.walkway].shut
     if is_over or deserted or (not is_there and walker.jammed_time > 6.0):
-        leave_spot(walker)
+        walker.spot, walker.stand_kind, walker.stand_time = NONE, 0, 0.0
+        walker.jammed_time = walker.stuck_time = 0.0
 
 
 @compiled
-def turn_towards(shapes, b, yaw, dt):  # type: ignore[no-untyped-def]
-    """Turn body b on the spot."""
+def _turn_towards(shapes, b, yaw, rate, dt):  # type: ignore[no-untyped-def]
+    """Turn body b towards a heading, by `rate` rad/s at most; return by how much its own differed, rad."""
     turn = (yaw - shapes.yaw[b] + np.pi) % (2 * np.pi) - np.pi
-    shapes.yaw[b] += min(max(turn, -_STANDING_TURN_RATE * dt), _STANDING_TURN_RATE * dt)
+    shapes.yaw[b] += min(max(turn, -rate * dt), rate * dt)
+    return turn
 
 
 def stand_at_start(paths: WalkwayNetwork, walkers: Records, shapes: Shapes, first: int, seed: int) -> None:
@@ -290,8 +277,7 @@ def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-
     speed = min(walker.preferred_speed * pace * min(1.0, free / 0.6), walker.speed + _ACCELERATION * dt)
     if speed * dt <= _LEAST_STEP:
         return 0.0
-    turn = (heading - shapes.yaw[b] + np.pi) % (2 * np.pi) - np.pi
-    shapes.yaw[b] += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+    turn = _turn_towards(shapes, b, heading, _TURN_RATE, dt)
     slow, still = _TURNS_FIRST
     speed *= min(max((still - abs(turn)) / (still - slow), 0.0), 1.0)
     step = min(speed * dt, away if is_waiting else speed * dt)
@@ -380,7 +366,7 @@ def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):  # type
         note_distance(pedestrians, i, shapes, b - i)
     step = 0.0
     if is_there:
-        turn_towards(shapes, b, walker.stand_yaw, dt)
+        _turn_towards(shapes, b, walker.stand_yaw, _STANDING_TURN_RATE, dt)
     else:
         # Sides of walkways do not count. In a crowd one slows down towards one's place, or goes on with a march.
         if walker.stand_kind == CROWD:

@@ -22,18 +22,19 @@ from vico.sim.traffic.car_following import (
 )
 from vico.sim.traffic.drawing import TrafficDrawing, TrafficView
 from vico.sim.traffic.gatherings import Gatherings
-from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
+from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog
 from vico.sim.traffic.junctions import crossed_tracks
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrian_routes import PEDESTRIAN_RADIUS, mark_busy_crossings
 from vico.sim.traffic.pedestrians import advance_pedestrians, stand_at_start
 from vico.sim.traffic.placement import HandPlaced, Starting, TrafficSetup
-from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
+from vico.sim.traffic.route import count_per_street, drop_shut_plans, widen_shut
 from vico.sim.traffic.shapes import Shapes, TrafficLevels, shapes_of
 from vico.sim.traffic.signals import Circles, SignalClock, SignalHeads, SignalsShown
 from vico.sim.traffic.state import (
     AWAY,
     COMING,
+    NONE,
     PEDESTRIAN_RECORD,
     TOP_SPEED,
     VEHICLE_STATE,
@@ -282,7 +283,7 @@ class Traffic(TrafficView):
 
     def signals_shown(self) -> SignalsShown | None:
         """Return what all signals show now; None where they are not obeyed."""
-        return None if self.signals is None else self.signals.shown(self._net, self.paths)
+        return None if self.signals is None else self.signals.signals_shown(self._net, self.paths)
 
     @property
     def lane_lights(self) -> NDArray[np.uint8]:
@@ -292,15 +293,6 @@ class Traffic(TrafficView):
     def drop_shut_plans(self) -> None:
         """Have cars plan anew that were about to drive where it is shut since."""
         drop_shut_plans(self._net, self._vehicles)
-
-    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
-        """Return whether a car is on some lanes (a mask), or on its way there."""
-        return bool(is_taken(self._net, self._vehicles, lanes))
-
-    @property
-    def shut_lanes(self) -> NDArray[np.bool_] | None:
-        """Which lanes events keep cars off, without those that lead nowhere else; None for none."""
-        return self._shut[0]
 
     def set_rounds(self, rounds: Sequence[Sequence[int]]) -> None:
         """Have buses drive by other rounds: lane numbers of each; `fleet.route` are their numbers."""
@@ -332,15 +324,6 @@ class Traffic(TrafficView):
     def crossed_tracks(self) -> NDArray[np.bool_]:
         """Return on which of these crossings vehicles are or will not stop before, bool, shape ``(crossings,)``."""
         return np.asarray(crossed_tracks(self._net, self._vehicles), np.bool_)
-
-    @property
-    def shut_walkways(self) -> NDArray[np.bool_] | None:
-        """Which walkways nobody is to walk on; None for none."""
-        return self._shut[1]
-
-    def is_shut_street_taken(self) -> bool:
-        """Return whether a car is where an event keeps cars off."""
-        return self._shut[0] is not None and self.is_taken(self._shut[0])
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
@@ -402,7 +385,9 @@ class Traffic(TrafficView):
             come_back(self._net, self._vehicles, v, everybody)
 
     def _before(self, v: int) -> int:
-        return entity_before(int(self.fleet.blocker[v]), self._entities)
+        """Return the entity of the body that a vehicle stands behind, 0 for nobody."""
+        blocker = int(self.fleet.blocker[v])
+        return int(self._entities[blocker]) if NONE < blocker < len(self._entities) else 0
 
     @property
     def reentered(self) -> int:

@@ -16,7 +16,11 @@ from vico.sim.traffic.state import (
 
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
-_DEAD_END, _JUNCTION_AGAIN, _BEEN_THERE, _TURN_BACK = 4.0, 2.0, 50.0, 1e6  # costs, in vehicles on a street
+# Costs of lanes, in vehicles on a street.
+_DEAD_END = 4.0
+_JUNCTION_AGAIN = 2.0
+_BEEN_THERE = 50.0
+_TURN_BACK = 1e6
 _SHUT = 1e8  # only where there is no other way, turning back among them
 _LESS_PICKY = 5.0  # s of waiting that count like a vehicle on a street
 
@@ -42,18 +46,13 @@ def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_dead_end(net, street):  # type: ignore[no-untyped-def]
-    """Return whether a street only leads back."""
-    onward = net.lanes[street].first_next
-    return net.lanes[street].end_next == onward + 1 and net.lanes[net.next[onward]].u_turn
-
-
-@compiled
 def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-untyped-def]
     """Return what speaks against taking lane `option` to `street`: vehicles there, and ways that lead nowhere new."""
     # The longer it has waited to go its way, the less it minds where another one leads.
     cost = street_load[net.lanes[street].edge] + next_random(vehicle) * (1.0 + vehicle.junction_wait / _LESS_PICKY)
-    if _is_dead_end(net, street):
+    # A dead end: a street that only leads back.
+    onward = net.lanes[street].first_next
+    if net.lanes[street].end_next == onward + 1 and net.lanes[net.next[onward]].u_turn:
         cost += _DEAD_END  # only when everywhere else is busy
     # Out of a junction, not round and round in it, and not back to where the car waits.
     if net.lanes[street].junction >= 0:
@@ -81,13 +80,6 @@ def _goal_after(net, vehicle):  # type: ignore[no-untyped-def]
         while goal < vehicle.goal_end and net.goal_edge[goal] == net.lanes[lane].edge:
             goal += 1
     return goal if goal < vehicle.goal_end else NONE
-
-
-@compiled
-def _pass_goal(net, vehicle):  # type: ignore[no-untyped-def]
-    """Note that a car that leaves its lane has been at its goal, if that is there."""
-    while vehicle.goal != NONE and net.goal_edge[vehicle.goal] == net.lanes[vehicle.lane].edge:
-        vehicle.goal = vehicle.goal + 1 if vehicle.goal + 1 < vehicle.goal_end else NONE
 
 
 @compiled
@@ -192,7 +184,8 @@ def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
     """Step on to the planned lanes that a vehicle's front has reached."""
     while vehicle.offset > net.lanes[vehicle.lane].length and vehicle.planned_count > 0:
         vehicle.offset -= net.lanes[vehicle.lane].length
-        _pass_goal(net, vehicle)
+        while vehicle.goal != NONE and net.goal_edge[vehicle.goal] == net.lanes[vehicle.lane].edge:
+            vehicle.goal = vehicle.goal + 1 if vehicle.goal + 1 < vehicle.goal_end else NONE
         for k in range(PREVIOUS_LANES - 1, 0, -1):
             vehicle.previous_lanes[k] = vehicle.previous_lanes[k - 1]
         vehicle.previous_lanes[0] = vehicle.lane

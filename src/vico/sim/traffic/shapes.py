@@ -193,7 +193,8 @@ class TrafficLevels:
         jumped = np.hypot(xy[:, 0] - before[0], xy[:, 1] - before[1]) > _JUMP
         for k in jumped.nonzero()[0].tolist():
             graph, (row, offset), i = (self._lanes, lane, k) if k < vehicles else (self._walks, walkway, k - vehicles)
-            self.z[k] = _height_on(graph, int(row[i]), float(offset[i]))
+            own = slice(int(graph.first[row[i]]), int(graph.first[row[i] + 1]))
+            self.z[k] = np.interp(offset[i], graph.along[own], graph.z[own])
         ground, points = self._height(xy), _points(xy, self.z)
         self.z[:] = self._surface(points, ground)
         on_lanes, on_walks = self._lane_leads, self._walk_leads
@@ -296,12 +297,6 @@ def _near_raised(
         if np.array_equal(ahead, before[0]) and np.array_equal(behind, before[1]):
             break
     return np.minimum(ahead, behind) < _APPROACH
-
-
-def _height_on(graph: LaneGraph | Walkways, row: int, offset: float) -> float:
-    """Return how high a lane or walkway is, metres along it."""
-    own = slice(int(graph.first[row]), int(graph.first[row + 1]))
-    return float(np.interp(offset, graph.along[own], graph.z[own]))
 
 
 def shapes_of(bodies: Bodies, levels: TrafficLevels) -> Shapes:

@@ -64,8 +64,8 @@ class SignalsShown(NamedTuple):
                 "position": np.round(self.position[k], 3).tolist(),
             }
             if one["for"] == "pedestrians":
-                ends = np.round(self.crossing[k], 3).tolist()
-                one |= {"crossing": [ends[:2], ends[2:4]], "width": ends[4]}
+                *ends, width = np.round(self.crossing[k], 3).tolist()
+                one |= {"crossing": [ends[:2], ends[2:]], "width": width}
             found.append(one)
         return found
 
@@ -172,7 +172,7 @@ class SignalClock:
         x, y = self.position[program].tolist()
         return SignalDay(np.roll(column, -int(self._offset[program])), (x, y))
 
-    def shown(self, net: LaneNetwork, paths: WalkwayNetwork) -> SignalsShown:
+    def signals_shown(self, net: LaneNetwork, paths: WalkwayNetwork) -> SignalsShown:
         """Return what all of them show now, as `show` has written it."""
         light = np.concatenate([net.lanes["light"][self.lane], paths.walkways["light"][self.walkway]])
         return SignalsShown(self._place, light, self._ends)
@@ -300,11 +300,15 @@ class SignalHeads:
         self._walkway = walked[walk_of[seen]]
         places = [np.column_stack([at[k], poles.z[k]]) for k in (driven, seen)]
         turns, scales = np.asarray(poles.yaw), np.asarray(poles.scale)
-        self._transforms = _head_transforms(
-            np.concatenate([places[0], posts, places[1], posts]),
-            np.concatenate([turns[driven], turn + np.pi, turns[seen], turn + np.pi]),
-            np.concatenate([scales[driven], np.ones(len(own)), scales[seen], np.ones(len(own))]),
-        )
+        place = np.concatenate([places[0], posts, places[1], posts])
+        yaw = np.concatenate([turns[driven], turn + np.pi, turns[seen], turn + np.pi])
+        scale = np.concatenate([scales[driven], np.ones(len(own)), scales[seen], np.ones(len(own))])
+        self._transforms = np.zeros((len(place), 4, 4), np.float32)
+        c, s = np.cos(yaw) * scale, np.sin(yaw) * scale
+        self._transforms[:, 0, 0], self._transforms[:, 0, 1] = c, -s
+        self._transforms[:, 1, 0], self._transforms[:, 1, 1] = s, c
+        self._transforms[:, 2, 2], self._transforms[:, 3, 3] = scale, 1.0
+        self._transforms[:, :3, 3] = place
         entity = np.asarray(poles.entity, np.int32)
         nobody = np.zeros(len(own), np.int32)
         self._entity = np.concatenate([entity[driven], nobody, entity[seen], nobody])
@@ -380,14 +384,3 @@ def _nearest_crossing(at: NDArray[np.float64], walks: Walkways, walked: NDArray[
     away = np.linalg.norm(at[:, None, None, :] - ends[None], axis=3).min(axis=1)
     nearest = away.argmin(axis=1)
     return np.where(away[np.arange(len(at)), nearest] <= _NEAR_CROSSING, nearest, -1)
-
-
-def _head_transforms(
-    place: NDArray[np.float64], yaw: NDArray[np.float64], scale: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    found = np.zeros((len(place), 4, 4), np.float32)
-    c, s = np.cos(yaw) * scale, np.sin(yaw) * scale
-    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1] = c, -s, s, c
-    found[:, 2, 2], found[:, 3, 3] = scale, 1.0
-    found[:, :3, 3] = place
-    return found

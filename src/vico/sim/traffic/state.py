@@ -29,14 +29,12 @@ TOP_SPEED = 13.9  # m/s, whatever the street allows
 NONE = -1  # no lane, junction, route, body: wherever an index may be missing
 SEVERAL = -2  # more than one vehicle
 #: Where a vehicle is: on the streets, out of the world, or out of it and to come back as soon as there is room.
-PRESENT, AWAY, COMING = 0, 1, 2
+PRESENT, AWAY, COMING = range(3)
 #: Whether a car stops at a place beside the road: it drives, comes to the place, backs into it, stands there, or waits
-#: for a gap to leave it.
-DRIVING, APPROACHING, BACKING_IN, STANDING, LEAVING = 0, 1, 2, 3, 4
-#: In car parks, besides: it is on the way in, backs into the aisle, or is on the way out.
-DRIVING_IN, BACKING_OUT, DRIVING_OUT = 5, 6, 7
+#: for a gap to leave it. In car parks, besides: it is on the way in, backs into the aisle, or is on the way out.
+DRIVING, APPROACHING, BACKING_IN, STANDING, LEAVING, DRIVING_IN, BACKING_OUT, DRIVING_OUT = range(8)
 #: What a signal shows.
-DARK, GREEN, AMBER, RED = 0, 1, 2, 3
+DARK, GREEN, AMBER, RED = range(4)
 
 _F, _I, _B = np.float64, np.int32, np.bool_
 
@@ -176,9 +174,8 @@ WALKWAY = np.dtype(
 
 #: Why a pedestrian stands, or follows a point of its own: it looks into a window, talks, waits at a stop; from `LED` on
 #: others say where and how long: it boards a bus, or belongs to an event's crowd.
-WINDOW, TALK, STOP = 1, 2, 3
-LED = BOARD = 4
-CROWD = 5
+WINDOW, TALK, STOP, BOARD, CROWD = range(1, 6)
+LED = BOARD
 #: A spot beside a walkway at which people stand.
 SPOT = np.dtype(
     [

@@ -30,7 +30,9 @@ from vico.world.world import World
 _BEYOND = 10.0  # m of lane after a way out that belong to it
 _PAST_MIDDLE = 4.0  # m straight on beyond a spot's middle
 _SPOT_END = 0.3  # m of a spot that a car leaves free
-_OFF_LANE, _OFF_WALKWAY, _NEAR_STREET = 0.8, 0.6, 14.0  # m kept from lane and sidewalk by who waits; of way before it
+_OFF_LANE = 0.8  # m kept from the lane by who waits
+_OFF_WALKWAY = 0.6  # m kept from the sidewalk by who waits
+_NEAR_STREET = 14.0  # m of the way out before its end in which that place lies
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +61,8 @@ def places_in_car_parks(
         if any(lane is None or network.lanes["closed"][lane] for lane in ends):
             continue
         first, last = int(ends[0] or 0), int(ends[1] or 0)
-        if any(len(tree.query(shapely.LineString(line), predicate="intersects")) for line in _lines_of(spot)):
+        driven = [shapely.LineString(line) for line in (ways.into.line, ways.back, ways.out.line)]
+        if any(len(tree.query(line, predicate="intersects")) for line in driven):
             continue
         lead = lanes.at(first, ways.into.offset - np.arange(WAY_LEAD, 0.0, -0.5))[:, :2]
         after = lanes.at(last, ways.out.offset + np.arange(0.5, _BEYOND, 0.5))[:, :2]
@@ -90,10 +93,6 @@ def places_in_car_parks(
         for name, value in row.items():
             places[name][k] = value
     return places, np.concatenate(points) if points else np.zeros(0, PATH_POINT)
-
-
-def _lines_of(spot: ParkingSpot) -> list[list[tuple[float, float]]]:
-    return [] if spot.ways is None else [spot.ways.into.line, spot.ways.back, spot.ways.out.line]
 
 
 def _inwards(line: Sequence[tuple[float, float]]) -> Floats:
@@ -147,9 +146,13 @@ _RADIUS, _LEAST_TAPER = 6.0, 8.0  # m, of the bend into a place, and of lane it 
 _AIR = 0.12  # m between a car on its way into a place and anything that stands
 _BEFORE, _AFTER = 6.0, 7.0  # m of lane before that way and after it, where others wait for a junction
 _STEP = 0.5  # m between outlines of the way
-_DELIVERY_ENDS, _DELIVERY_EVERY, _DELIVERY_LANE = 35.0, 20.0, 80.0  # m to a lane's ends, between places, of lane
+_DELIVERY_ENDS = 35.0  # m from a lane's ends to the first place
+_DELIVERY_EVERY = 20.0  # m between places
+_DELIVERY_LANE = 80.0  # m of lane, at least
 _EDGE, _INWARDS = 0.15, 0.5  # m that a van keeps to its lane's edge; how far it leaves the middle
-_CROSSING, _STOP, _RAILS = 10.0, 25.0, 4.0  # m kept to crossings, stops and rails
+_CROSSING = 10.0  # m kept to crossings
+_STOP = 25.0  # m kept to stops
+_RAILS = 4.0  # m kept to rails
 
 
 class _Place(NamedTuple):
@@ -210,7 +213,8 @@ def _parking(world: World, network: LaneNetwork, lanes: LaneGraph, tree: shapely
         lane = lanes.index.get(spot.lane) if spot.lane is not None else None
         if spot.car is not None or spot.kind != "kerb" or lane is None or network.lanes["closed"][lane]:
             continue
-        place = _Place(lane, spot.offset, spot.side, spot.length - _SPARE, _taper(spot.side), True, False)
+        taper = max(_LEAST_TAPER, float(np.sqrt(6.0 * abs(spot.side) * _RADIUS)))
+        place = _Place(lane, spot.offset, spot.side, spot.length - _SPARE, taper, True, False)
         if not _fits_lane(place, _CAR, lanes):
             continue
         ways = [_swept(place, _CAR, lanes, ahead=ahead) for ahead in (True, False)]
@@ -245,10 +249,6 @@ def _deliveries(
             near = any(len(shapes.query(way, predicate="dwithin", distance=away)) for shapes, away in kept)
             if not near and not len(tree.query(way, predicate="intersects")):
                 yield place
-
-
-def _taper(side: float) -> float:
-    return max(_LEAST_TAPER, float(np.sqrt(6.0 * abs(side) * _RADIUS)))
 
 
 def _fits_lane(place: _Place, size: tuple[float, float, float, float], lanes: LaneGraph) -> bool:
@@ -288,15 +288,18 @@ _LANE_LEFT = 0.65  # m that the middles of others can be apart who pass beside s
 _FROM_WALL = 0.65  # m from a window to who looks in
 _BESIDE_DOOR = (1.7, 2.6)  # m along the wall from a door to a window
 _WALL_WITHIN = (0.35, 0.9)  # m to the wall of who looks in
-# Metres around doors, around where passengers wait and around bicycle stations that stay free.
-_DOOR_FREE, _STOP_FREE, _STATION_FREE = 1.0, 1.1, 2.5
+_DOOR_FREE = 1.0  # m around doors that stay free
+_STOP_FREE = 1.1  # m around where passengers wait
+_STATION_FREE = 2.5  # m around bicycle stations
 _APART = 2 * _BODY + 0.1  # m between two who stand, at least
 _SPOT_CELL = 2.5  # m along a cell by which round places are found: none is wider to a side
 _REACH = 6.0  # m from a walkway to a spot beside it
 _OTHER_WALKWAYS = 0.9  # m to them
 _PAIR_EVERY, _PAIR_APART = 30.0, 0.72  # m along a sidewalk between pairs, and between the two of a pair
 _BEND = 0.05  # m by which that may differ
-_AT_STOP, _STOP_GRID, _PER_STOP = 5.0, 0.5, 6  # m around where passengers wait, m between places tried, and people
+_AT_STOP = 5.0  # m around where passengers wait
+_STOP_GRID = 0.5  # m between places that are tried there
+_PER_STOP = 6  # people at most
 _STOP_ROOM, _FROM_LANE = 0.35, 1.9  # m around who waits, and from there to the middle of the lane or track
 _STOP_REACH = 9.0  # m from a walkway to who waits
 _WAY = 1.5  # m along the walkway that the way to a spot takes
@@ -426,31 +429,20 @@ def with_spots(
     _add_windows(site, world)
     _add_pairs(site)
     spots = np.array(site.rows, SPOT) if site.rows else np.zeros(0, SPOT)
-    return network._replace(spots=_sort_spots(spots), spot_first=_first(spots, len(walks)))
-
-
-def _sort_spots(spots: Records) -> Records:
-    """Return spots by walkway, with their partners' new numbers."""
+    # They are sorted by walkway, so partners get new numbers.
     order = np.argsort(spots["walkway"], kind="stable")
     place = np.empty(len(order), np.int32)
     place[order] = np.arange(len(order))
-    found = spots[order]
-    paired = found["partner"] != NONE
-    found["partner"][paired] = place[found["partner"][paired]]
-    return found
-
-
-def _first(spots: Records, walkways: int) -> NDArray[np.int32]:
-    first = np.zeros(walkways + 1, np.int32)
-    first[1:] = np.cumsum(np.bincount(spots["walkway"], minlength=walkways))
-    return first
+    spots = spots[order]
+    paired = spots["partner"] != NONE
+    spots["partner"][paired] = place[spots["partner"][paired]]
+    first = np.zeros(len(walks) + 1, np.int32)
+    first[1:] = np.cumsum(np.bincount(spots["walkway"], minlength=len(walks)))
+    return network._replace(spots=spots, spot_first=first)
 
 
 def _add_stops(site: _Site, world: World) -> None:
-    """Add spots on free ground around where passengers wait for buses and trams, the nearest first, facing them.
-
-    Stops are numbered as those of buses, then those of trams.
-    """
+    """Add spots on free ground around where passengers wait for buses and trams, the nearest first, facing them."""
     transit, lanes = world.transit, world.lanes
     served = {stop for line in transit.lines for stop in line.stops}
     tracks = [shapely.LineString(line.track) for line in transit.tram_lines]

@@ -29,37 +29,24 @@ from vico.sim.traffic.car_following import (
 )
 from vico.sim.traffic.jams import leaves_room_for, vehicles_backing_up
 from vico.sim.traffic.junctions import (
+    BEYOND_TRACKS,
     asks_with_track,
     distance_to_track,
     holds_junction,
     is_hesitating,
-    look_over,
     next_junction_request,
     note_claims,
     release_all_junctions,
     release_junctions,
     request_junctions,
     track_ahead,
-    waits_for_tram,
 )
-from vico.sim.traffic.lane_change import (
-    change_as_route_does,
-    change_to_emptier_lane,
-    change_to_lane_beside,
-    distance_to_let_in,
-    keep_to_kerb,
-    overtake_cyclist,
-    places_to_let_in,
-    room_to_change,
-    wants_lane_change,
-    wants_to_overtake_cyclist,
-)
+from vico.sim.traffic.lane_change import choose_lane, distance_to_let_in, places_to_let_in, room_to_change
 from vico.sim.traffic.lights import shown_lights
 from vico.sim.traffic.parking import (
     choose_place,
     come_to_place,
     distance_to_place,
-    is_behind_delivery,
     speed_into_place,
     stay_at_place,
     stay_in_car_park,
@@ -133,7 +120,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         look = look_ahead(vehicle)
         path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
         track = track_ahead(net, vehicle, look)
-        look = max(look, look_over(track))
+        if track.distance < NEVER:
+            look = max(look, track.beyond + BEYOND_TRACKS)  # is there room behind the tracks?
         if is_hesitating(net, vehicle) or loses_its_green(net, vehicle):
             vehicle.granted_count = 0
             release_junctions(net, junctions, vehicle)
@@ -146,7 +134,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
         # Nor does who makes room for another one: it stands, and who holds a junction does not back up.
-        is_behind = is_behind or vehicle.gives_way_to != NONE or waits_for_tram(track, request.distance)
+        waits_for_tram = track.called and track.distance < request.distance
+        is_behind = is_behind or vehicle.gives_way_to != NONE or waits_for_tram
         vehicle.queued_junction = vehicle.queued_exit = NONE
         if not _keeps_others_out(vehicle, junctions):
             vehicle.kept_out_from = NONE
@@ -157,10 +146,17 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             and not at_signal
             and not request_junctions(net, fleet, junctions, vehicle, request, view)
         )
-        keeps_wait = at_signal or vehicle.gives_way_to != NONE
-        vehicle.junction_wait = _junction_wait(vehicle, is_refused, keeps_wait, dt)
+        # At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each. So
+        # does who makes room for another one.
+        keeps_wait = is_refused or at_signal or vehicle.gives_way_to != NONE
+        if vehicle.speed >= _CREEP or not keeps_wait:
+            vehicle.junction_wait = 0.0
+        elif is_refused:
+            vehicle.junction_wait += dt
 
-        wanted = desired_speed(net, vehicle)
+        # The speed that it drives at on an empty lane.
+        wanted = min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed)
+        wanted = speed_into_place(vehicle, wanted)
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
         gap, leader = clip_leader_before_stop(stop, gap, leader)
         leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
@@ -184,7 +180,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         else:
             shapes.vx[v] = shapes.vy[v] = 0.0
 
-        is_standing = vehicle.speed < _standing_speed(vehicle, dt)
+        # On snow and ice one that has just set off is so slow that it would be taken for one that does not get going.
+        is_standing = vehicle.speed < min(STANDING, _STARTED * vehicle.acceleration * dt)
         vehicle.blocker = leader if gap < _BLOCKER_GAP and is_standing else NONE
         release_junctions(net, junctions, vehicle)
         vehicle.lights = shown_lights(net, vehicle, speed, dt)
@@ -192,7 +189,9 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         vehicle.stopped_time = vehicle.stopped_time + dt if is_standing else 0.0
         come_to_place(net, vehicle)
         if is_bus:
-            _arrive_at_stop(vehicle, stop_distance, is_standing)
+            vehicle.at_stop = vehicle.at_stop or (stop_distance < 0.5 and is_standing)
+            if vehicle.at_stop:
+                vehicle.stopped_time = 0.0
         elif is_refused and _gives_up_waiting(vehicle, dt):
             vehicle.planned_count = vehicle.granted_count
 
@@ -200,7 +199,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         if vehicle.lane != lane:
             choose_place(net, fleet, vehicle)
             continue
-        _change_lane(net, fleet, vehicle, view, stop_distance, (leader, gap, leading, wanted))
+        choose_lane(net, fleet, vehicle, view, stop_distance, (leader, gap, leading, wanted))
 
 
 @compiled
@@ -210,12 +209,6 @@ def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
     if vehicle.route >= 0 and is_here and vehicle.stop_offset > vehicle.offset - 1.0:
         return max(vehicle.stop_offset - vehicle.offset, 0.0)
     return distance_to_place(vehicle)
-
-
-@inlined
-def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
-    """Return the speed a vehicle drives at on an empty lane, m/s."""
-    return speed_into_place(vehicle, min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed))
 
 
 @inlined
@@ -268,32 +261,6 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wan
     return stop, limit_now
 
 
-@inlined
-def _change_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: ignore[no-untyped-def]
-    """Change lanes as the route does, past a delivery, or out of a queue.
-
-    Parameters
-    ----------
-    stop_distance
-        Metres to its stop, `NEVER` for none.
-    ahead
-        Its leader, the gap to it (metres) and its speed; the speed the vehicle would like (m/s).
-    """
-    leader, gap, leading, wanted = ahead
-    if vehicle.route >= 0:
-        # Not before its stop, where its route goes on in the lane beside after that: it would drive past it.
-        if not vehicle.at_stop and vehicle.planned_count == 0 and stop_distance >= NEVER:
-            change_as_route_does(net, vehicle, view)
-    elif is_behind_delivery(net, fleet, vehicle):
-        change_to_lane_beside(net, vehicle, view)
-    elif vehicle.is_bicycle:
-        keep_to_kerb(net, vehicle, view)
-    elif leader >= 0 and wants_to_overtake_cyclist(net, vehicle, view, (leader, gap, leading), wanted):
-        overtake_cyclist(net, vehicle, view)
-    elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
-        change_to_emptier_lane(net, fleet, vehicle, view)
-
-
 @compiled
 def _keeps_others_out(vehicle, junctions):  # type: ignore[no-untyped-def]
     """Return whether those stay back, until a vehicle has gone, who would stand in its way at the end of their lane.
@@ -303,27 +270,6 @@ def _keeps_others_out(vehicle, junctions):  # type: ignore[no-untyped-def]
     """
     is_patient = not junctions.claims.any_shared or vehicle.junction_wait < _KEEPS_OUT_FOR
     return vehicle.junction_wait > 0.0 and is_patient
-
-
-@compiled
-def _junction_wait(vehicle, is_refused, keeps_wait, dt):  # type: ignore[no-untyped-def]
-    """Return how long a vehicle has waited for a junction, s.
-
-    At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each. So does
-    who makes room for another one.
-    """
-    if vehicle.speed >= _CREEP or not (is_refused or keeps_wait):
-        return 0.0
-    return vehicle.junction_wait + (dt if is_refused else 0.0)
-
-
-@compiled
-def _standing_speed(vehicle, dt):  # type: ignore[no-untyped-def]
-    """Return the speed below which a vehicle stands, m/s.
-
-    On snow and ice one that has just set off is so slow that it would be taken for one that does not get going.
-    """
-    return min(STANDING, _STARTED * vehicle.acceleration * dt)
 
 
 @inlined
@@ -382,15 +328,6 @@ def _move_back(net, vehicle, view, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _arrive_at_stop(vehicle, stop_distance, is_standing):  # type: ignore[no-untyped-def]
-    """Open a bus's doors where it stands at its stop."""
-    if stop_distance < 0.5 and is_standing:
-        vehicle.at_stop = True
-    if vehicle.at_stop:
-        vehicle.stopped_time = 0.0
-
-
-@compiled
 def _gives_up_waiting(vehicle, dt):  # type: ignore[no-untyped-def]
     """Return whether a car looks for another way now: a full exit is no reason to wait for ever."""
     return vehicle.junction_wait > _OTHER_WAY_AFTER and int(vehicle.junction_wait / dt) % 50 == 0
@@ -421,12 +358,6 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
     shapes.yaw[v] = np.arctan2(s, c)
     shapes.vx[v] = shapes.vy[v] = 0.0
     return True
-
-
-@compiled
-def has_left_map(net, vehicle):  # type: ignore[no-untyped-def]
-    """Return whether a car stands at the end of a lane that leads nowhere."""
-    return vehicle.planned_count == 0 and vehicle.offset >= net.lanes[vehicle.lane].length - 0.3
 
 
 @compiled
@@ -506,7 +437,8 @@ def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  
             continue
         if len(entries) == 0:
             continue
-        left = has_left_map(net, vehicle)
+        # A car that stands at the end of a lane that leads nowhere has left the map.
+        left = vehicle.planned_count == 0 and vehicle.offset >= net.lanes[vehicle.lane].length - 0.3
         if not left and vehicle.stopped_time < patience:
             continue
         for _ in range(3):

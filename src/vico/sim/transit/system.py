@@ -8,7 +8,7 @@ door. Bicycles to rent are `Bicycles`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -120,7 +120,9 @@ class TransitVehicles:
         tram = bus - self.traffic.buses
         if tram >= 0:
             return self.trams.doors(tram, out)
-        return _beside(self.bus_pose(bus), DOORS, (BUS_SIZE[1] / 2 + out) * self._kerb)
+        x, y, yaw = self.bus_pose(bus)[:3]
+        c, s, right = math.cos(yaw), math.sin(yaw), (BUS_SIZE[1] / 2 + out) * self._kerb
+        return np.array([[x + a * c + right * s, y + a * s - right * c] for a in DOORS])
 
     def exit_spots(self, bus: int) -> NDArray[np.float64]:
         """Points half a metre outside each door, where riders get off if they are free, shape ``(doors, 2)``."""
@@ -226,12 +228,6 @@ class TransitVehicles:
         if self.stopped_at(bus) is None:
             raise InputError("exit_bus: the bus is moving")
         self._riders_of(bus)[self._place_of(bus, rider)] = -1
-
-
-def _beside(pose: NDArray[np.float64], ahead: Sequence[float], right: float) -> NDArray[np.float64]:
-    """Points `ahead` of a pose and `right` of it."""
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    return np.array([[pose[0] + a * c + right * s, pose[1] + a * s - right * c] for a in ahead])
 
 
 # Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside, and a

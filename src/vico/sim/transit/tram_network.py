@@ -184,8 +184,9 @@ def _look_across(one, one_half, other, other_half, boxes):  # type: ignore[no-un
         best = np.inf
         x, y = one[i, 0], one[i, 1]
         for b in range(len(boxes)):
-            reach = one_half[i] + boxes[b, 4]
-            if x < boxes[b, 0] - reach or x > boxes[b, 2] + reach or y < boxes[b, 1] - reach or y > boxes[b, 3] + reach:
+            west, south, east, north, widest = boxes[b]
+            reach = one_half[i] + widest
+            if x < west - reach or x > east + reach or y < south - reach or y > north + reach:
                 continue
             for j in range(b * _BLOCK, min((b + 1) * _BLOCK, len(other))):
                 dx, dy = x - other[j, 0], y - other[j, 1]
@@ -229,6 +230,9 @@ def _zones_of_runs(tracks: Sequence[Track], runs: Sequence[tuple[int, int, int]]
 
 
 _NOWHERE = 1e9  # metres, x of who is not there
+# Columns of footprints, as `footprint_rows` has them.
+_HALF_LENGTH = 4
+_VELOCITY = slice(7, 9)
 # Points on a section's sides and ends, 0.25 m apart: nobody of 0.25 m reaches in between them, `_TOUCH` kept, unseen.
 _ALONG, _ACROSS = 35, 11
 
@@ -262,11 +266,8 @@ def place_sections(poses, inside, half_length, half_width, speed, footprints):  
     """Write the footprints of a tram's sections, shape ``(n, 9)``; those out of the city are nowhere."""
     for k in range(len(poses)):
         c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        footprints[k, 0] = poses[k, 0] if inside[k] else _NOWHERE
-        footprints[k, 1] = poses[k, 1]
-        footprints[k, 2], footprints[k, 3] = c, s
-        footprints[k, 4], footprints[k, 5], footprints[k, 6] = half_length, half_width, 0.0
-        footprints[k, 7], footprints[k, 8] = speed * c, speed * s
+        x = poses[k, 0] if inside[k] else _NOWHERE
+        footprints[k] = x, poses[k, 1], c, s, half_length, half_width, 0.0, speed * c, speed * s
 
 
 @compiled
@@ -477,8 +478,8 @@ class TramCrossings:
     def _stands(self, line: int, start: float, end: float) -> bool:
         """Return whether a vehicle stands in the way of trams between two distances along a track, metres."""
         points = self._tracks[line].across[int(start / STEP) : int(end / STEP) + 1]
-        stands = np.hypot(self._others[:, 7], self._others[:, 8]) < _CREEPS
-        standing = self._others[stands & (self._others[:, 4] > _VEHICLE)]
+        stands = np.hypot(*self._others[:, _VELOCITY].T) < _CREEPS
+        standing = self._others[stands & (self._others[:, _HALF_LENGTH] > _VEHICLE)]
         return int(first_obstructed(points, standing, 0, 0, ACROSS_REACH, 0.0)) < len(points)
 
 
@@ -590,7 +591,7 @@ class TramNetwork:
         return zones_of(self.tracks)
 
     @cached_property
-    def crossed(self) -> tuple[NDArray[np.void], list[list[CrossedStretch]]]:
+    def crossings(self) -> tuple[NDArray[np.void], list[list[CrossedStretch]]]:
         """Where tracks cross lanes; see `crossed_stretches`."""
         return crossed_stretches(self.tracks, self._lanes)
 

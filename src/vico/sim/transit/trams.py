@@ -128,7 +128,7 @@ class Trams:
             for track in self.tracks
         ]
         self._zones, count = self.network.zones
-        self._crossings = TramCrossings(self.tracks, traffic, self.network.crossed)
+        self._crossings = TramCrossings(self.tracks, traffic, self.network.crossings)
         self.called = self._crossings.called
         obeys = traffic.signals is not None
         self._signals: list[list[TramSignal]] = self.network.signals if obeys else [[] for _ in lines]
@@ -382,13 +382,13 @@ class Trams:
             self._bodies = self._bodies_now()
         return self._bodies
 
-    def _shown(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def _sections_in_city(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Tram, section and x, y, yaw of every section that reaches into the city."""
         trams, section = np.nonzero(self._inside)
         return trams, section, self._poses[trams, section]
 
     def _bodies_now(self) -> Bodies:
-        trams, section, pose = self._shown()
+        trams, section, pose = self._sections_in_city()
         n = len(trams)
         if not n:
             return Bodies.none()
@@ -416,11 +416,14 @@ class Trams:
 
     def draw(self) -> Drawn:
         """Return the sections and the leaves of their doors."""
-        trams, section, pose = self._shown()
+        trams, section, pose = self._sections_in_city()
         n = len(trams)
         names = sorted(self.prototypes())
         made_of = [SHAPES_OF[self.lines[line].kind] for line in self.line_of[trams].tolist()]
-        bases = _transforms(pose, self._traffic.height(pose[:, :2]) if n else np.zeros(0))
+        bases = np.tile(np.eye(4), (n, 1, 1))
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        bases[:, 0, 0], bases[:, 0, 1], bases[:, 1, 0], bases[:, 1, 1] = c, -s, s, c
+        bases[:, :2, 3], bases[:, 2, 3] = pose[:, :2], self._traffic.height(pose[:, :2]) if n else np.zeros(0)
         index = [
             np.array(
                 [names.index(f"{what}_{_PART[k]}") for what, k in zip(made_of, section.tolist(), strict=True)], np.int32
@@ -507,12 +510,3 @@ def _departure(line: TramLine, number: int) -> int:
 def _first_after(line: TramLine, second: float) -> int:
     days, of_the_day = divmod(second, DAY)
     return int(np.searchsorted(line.departures, of_the_day)) + len(line.departures) * int(days)
-
-
-def _transforms(pose: NDArray[np.float64], ground: NDArray[np.float64]) -> NDArray[np.float64]:
-    n = len(pose)
-    found = np.tile(np.eye(4), (n, 1, 1))
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1] = c, -s, s, c
-    found[:, :2, 3], found[:, 2, 3] = pose[:, :2], ground
-    return found
