@@ -17,7 +17,7 @@ from vico.challenges.episodes import code_digest
 from vico.challenges.pick_place.episode import METHOD
 from vico.challenges.pick_place.tasks import SECONDS
 from vico.challenges.records import Job, Setting, foreign_parts, load_challenge
-from vico.datasets.folder import DATASET_FOLDER, Dataset, card_of, write_dataset_record, write_tables
+from vico.datasets.folder import DATASET_FOLDER, RECORD, Dataset, card_of, write_tables
 from vico.datasets.formats.registry import FORMATS
 from vico.datasets.layout import Contents, Layout, PartEpisode, key_of, read_part
 from vico.datasets.pictures import PICTURES
@@ -337,7 +337,14 @@ def _check_request(request: BuildRequest) -> None:
         if len({path.resolve() for path in request.runs}) < len(request.runs):
             raise InputError("dataset: a run is given twice; its frames would count twice")
         return
-    _check_increments(request)
+    drop, clip = request.contents.drop_below, request.clip
+    if not (drop >= 0.0 and 0.0 <= clip < 0.5):
+        raise InputError(
+            f"dataset: increments below {drop} dropped, a share of {clip} cut at each end; give 0 or more, and 0 up to "
+            "less than 0.5"
+        )
+    if (drop or clip) and request.category != CHALLENGE:
+        raise InputError(f"dataset: only actions of {CHALLENGE} are increments, of which small ones are dropped or cut")
     if request.category == CHALLENGE and request.episodes >= 1:
         return
     if not request.worlds or request.episodes < 1:
@@ -353,17 +360,6 @@ def _check_request(request: BuildRequest) -> None:
             raise InputError(
                 f"dataset: no method {part!r}; there are {', '.join(sorted(known.methods))}, or my_module:MyAgent"
             )
-
-
-def _check_increments(request: BuildRequest) -> None:
-    drop, clip = request.contents.drop_below, request.clip
-    if not (drop >= 0.0 and 0.0 <= clip < 0.5):
-        raise InputError(
-            f"dataset: increments below {drop} dropped, a share of {clip} cut at each end; give 0 or more, and 0 up to "
-            "less than 0.5"
-        )
-    if (drop or clip) and request.category != CHALLENGE:
-        raise InputError(f"dataset: only actions of {CHALLENGE} are increments, of which small ones are dropped or cut")
 
 
 #: Told how many of how many episodes are there, and how many of their frames.
@@ -414,7 +410,14 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
     tasks = tasks_of(request)
     check_replaceable(out, force=force, kind=DATASET_FOLDER)
     partial = out.with_name(f"{out.name}.partial")
-    _take(partial)
+    # The folder of the parts is taken up where it is one; what a kill left while the mark was written is ours, too.
+    if partial.is_dir() and any(not path.name.startswith(f".{_MARK}") for path in partial.iterdir()):
+        if not (partial / _MARK).exists() or read_json(partial / _MARK) != _MARKED:
+            raise InputError(f"{partial}: holds something else than parts of a dataset; choose another --out")
+    else:
+        with write_errors(partial):
+            partial.mkdir(parents=True, exist_ok=True)
+        write_json(partial / _MARK, _MARKED)
     with FolderLock(partial, name=out):
         parts = partial / "parts"
         remove_path(parts / ".scratch")
@@ -472,32 +475,11 @@ def _write_dataset(folder: Path, layout: Layout, request: BuildRequest, missing:
     write_tables(folder, layout)
     made = made_from(request)
     record = Dataset.record_of(layout, made, missing)
-    write_bytes(folder / "README.md", card_of(layout, record, _size(folder)).encode())
+    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    write_bytes(folder / "README.md", card_of(layout, record, size).encode())
     files = {
         path.relative_to(folder).as_posix(): sha256_of(path) for path in sorted(folder.rglob("*")) if path.is_file()
     }
     record = {**record, "files": files}
-    write_dataset_record(folder, record)
+    write_json(folder / RECORD, record)  # the last file of a dataset
     return record
-
-
-def _size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-
-
-def _take(partial: Path) -> None:
-    """Make the folder of the parts, or take up the one that is there.
-
-    Raises
-    ------
-    InputError
-        If it is somebody else's.
-    """
-    # What a kill left while the mark was written is not somebody else's.
-    if partial.is_dir() and any(not path.name.startswith(f".{_MARK}") for path in partial.iterdir()):
-        if not (partial / _MARK).exists() or read_json(partial / _MARK) != _MARKED:
-            raise InputError(f"{partial}: holds something else than parts of a dataset; choose another --out")
-        return
-    with write_errors(partial):
-        partial.mkdir(parents=True, exist_ok=True)
-    write_json(partial / _MARK, _MARKED)

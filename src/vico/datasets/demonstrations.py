@@ -103,7 +103,8 @@ def facts_of_run(run: Path, seed: int) -> EpisodeFacts:
     SchemaError
         If a file is damaged.
     """
-    episode = next((path for path in (run / EPISODE_FILE, _file_beside(run, "episodes")) if path.exists()), None)
+    beside = run.resolve().parent.parent / "episodes" / f"{run.resolve().name}.json"
+    episode = next((path for path in (run / EPISODE_FILE, beside) if path.exists()), None)
     if episode is None:
         return EpisodeFacts(seed=seed)
     content = read_json(episode)
@@ -112,10 +113,6 @@ def facts_of_run(run: Path, seed: int) -> EpisodeFacts:
     if task is None:
         raise SchemaError(f"{episode}: the task of the episode is not beside it (tasks/*.json, or {run / TASK_FILE})")
     return facts_of_episode(record, read_json(task))
-
-
-def _file_beside(run: Path, folder: str) -> Path:
-    return run.resolve().parent.parent / folder / f"{run.resolve().name}.json"
 
 
 def _tasks_for(run: Path, record: EpisodeRecord) -> list[Path]:
@@ -257,11 +254,13 @@ def demonstrations_of(
 
 def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], instruction: str) -> Demonstration:
     period = _period(run, agent)
-    steps = _due_steps(run, period)
+    # An agent acts at multiples of its period, but not at the run's last step.
+    ticks = np.rint((run.times - run.times[0]) * TICKS_PER_SECOND).astype(np.int64)
+    steps = np.flatnonzero(ticks[:-1] % period == 0)
     rows = _rows_of(run, "agents", agent["entity"]) | {"time": run.times}
     body = _rows_of(run, "bodies", agent["entity"])
     pose = np.column_stack([body[name] for name in _WORLD_POSE])
-    actions = [_action(text) for text in rows["action"]]
+    actions = [None if text is None else json.loads(text) for text in rows["action"]]
     # What a row says of actions happened on the way to its step.
     taken = [actions[step + 1] for step in steps]
     own = [int(step) for step in steps]
@@ -270,7 +269,16 @@ def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], inst
     else:
         model, form, names = "person", ActionForm(), PERSON_STATE
         state = recorded_person_states(rows | {name: body[name] for name in _WORLD_POSE})
-    vectors, texts = _action_vectors(form, taken, pose[own], f"{run.path}: {agent['name']}")
+    poses = pose[own]
+    who = f"{run.path}: {agent['name']}"
+    vectors = np.zeros((len(taken), len(form.names)), np.float32)
+    texts: list[str] = []
+    for k, action in enumerate(taken):
+        try:
+            vectors[k], text = form.encode(action, poses[k].tolist())
+        except InputError as error:
+            raise InputError(f"{who}: step {k}: {error}") from None
+        texts.append(text)
     parts = current_part(taken, len(facts.instructions))
     # An agent that shares the task with others is told of all of it.
     told = [facts.instructions[part] if facts.instructions else None for part in parts]
@@ -304,24 +312,6 @@ def _rows_of(run: Run, table: str, entity: int) -> dict[str, NDArray[Any]]:
     found = {name: values[mine] for name, values in columns.items()}
     order = np.argsort(found["step"], kind="stable")
     return {name: values[order] for name, values in found.items()}
-
-
-def _action(text: str | None) -> Any:
-    return None if text is None else json.loads(text)
-
-
-def _action_vectors(
-    form: ActionForm, actions: Sequence[Any], poses: NDArray[np.float64], who: str
-) -> tuple[NDArray[np.float32], list[str]]:
-    vectors = np.zeros((len(actions), len(form.names)), np.float32)
-    texts: list[str] = []
-    for k, action in enumerate(actions):
-        try:
-            vectors[k], text = form.encode(action, poses[k].tolist())
-        except InputError as error:
-            raise InputError(f"{who}: step {k}: {error}") from None
-        texts.append(text)
-    return vectors, texts
 
 
 def _robot(
@@ -360,12 +350,6 @@ def _period(run: Run, agent: Mapping[str, Any]) -> int:
             "as formats of trainers want it; record it with a period like 1, 0.5, 0.2 or 0.1"
         )
     return ticks
-
-
-def _due_steps(run: Run, period: int) -> NDArray[np.int64]:
-    """Return the steps at which an agent acted: those at multiples of its period, but for the run's last."""
-    ticks = np.rint((run.times - run.times[0]) * TICKS_PER_SECOND).astype(np.int64)
-    return np.flatnonzero(ticks[:-1] % period == 0)
 
 
 def _instructions(

@@ -183,12 +183,15 @@ def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -
     """
     manifest = run.manifest
     cast = {entity: {"kind": body.kind, "name": body.name} for entity, body in run.cast.items()}
+    # After how many frames more time passed than a frame lasts, such as at appointments.
+    gaps = int((np.diff(run.times[demonstration.steps]) > 1.0 / demonstration.fps + 1e-6).sum())
+    name = run.source("world").name if world is None or world.path is None else world.path.name
     return Origin(
-        {"name": _world_name(run, world), "digest": manifest["world"]["digest"]},
+        {"name": name, "digest": manifest["world"]["digest"]},
         [] if world is None else [source.model_dump(mode="json") for source in world.manifest.sources],
         manifest["state_hash"],
         manifest["producer"],
-        _gaps(demonstration, run),
+        gaps,
         [cast] if world is None else [cast, world.entities],
     )
 
@@ -223,16 +226,6 @@ def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -
         "statistics": {name: vector_statistics(values) for name, values in vectors_of(demonstration).items()},
         "entities": _names(tally.entities, origin.names),
     }
-
-
-def _world_name(run: Run, world: World | None) -> str:
-    return run.source("world").name if world is None or world.path is None else world.path.name
-
-
-def _gaps(demonstration: Demonstration, run: Run) -> int:
-    """Return after how many frames more time passed than a frame lasts, such as at appointments."""
-    times = run.times[demonstration.steps]
-    return int((np.diff(times) > 1.0 / demonstration.fps + 1e-6).sum())
 
 
 def _names(entities: Sequence[int], names: Sequence[Mapping[int, Mapping[str, str]]]) -> list[dict[str, Any]]:

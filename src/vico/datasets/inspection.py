@@ -23,7 +23,6 @@ from vico.datasets.worker import world_of_run
 from vico.errors import InputError, MissingExtraError, VicoError
 from vico.io.files import new_file
 from vico.sim.recording import Run, read_run
-from vico.world.world import World
 
 Report = Callable[[int, int], None]
 
@@ -156,7 +155,17 @@ def _draw_sheet(dataset: Dataset, episode: int, chosen: Sequence[Mapping[str, An
     cell_width = _SIDE + _GAP
     cell_height = len(outputs) * (_SIDE + 2) + _CAPTION_LINES * _LINE + _GAP
     width = max(columns * cell_width + _GAP, 640)
-    heading = _heading(row, length, dataset.about.fps, width // 7)
+    fps = dataset.about.fps
+    letters = width // 7
+    verdict = {True: "done", False: "not done", None: "not judged"}[row["success"]]
+    method = f", method {row['method']}" if row["method"] else ""
+    about = (
+        f"Episode {row['episode_index']} ({row['split']}): {row['agent']} in {row['world']}, seed {row['seed']}{method}"
+        f"; {length} frames at {fps} a second; {verdict}"
+    )
+    heading = textwrap.wrap(about, letters)
+    for instruction in row["instructions"][:3]:
+        heading += textwrap.wrap(f"\u201c{instruction}\u201d", letters)
     top = _GAP + _LINE * len(heading) + _GAP
     rows = -(-len(chosen) // columns)
     sheet = Image.new("RGB", (width, top + rows * cell_height), _PAPER)
@@ -175,19 +184,6 @@ def _draw_sheet(dataset: Dataset, episode: int, chosen: Sequence[Mapping[str, An
             (x, below + _LINE), textwrap.shorten(_frame_caption(dataset, frame), 30, placeholder="..."), _INK, font
         )
     return sheet
-
-
-def _heading(row: Mapping[str, Any], length: int, fps: int, letters: int) -> list[str]:
-    verdict = {True: "done", False: "not done", None: "not judged"}[row["success"]]
-    method = f", method {row['method']}" if row["method"] else ""
-    about = (
-        f"Episode {row['episode_index']} ({row['split']}): {row['agent']} in {row['world']}, seed {row['seed']}{method}"
-        f"; {length} frames at {fps} a second; {verdict}"
-    )
-    lines = textwrap.wrap(about, letters)
-    for instruction in row["instructions"][:3]:
-        lines += textwrap.wrap(f"\u201c{instruction}\u201d", letters)
-    return lines
 
 
 def _frame_caption(dataset: Dataset, frame: Mapping[str, Any]) -> str:
@@ -254,7 +250,15 @@ def write_rerun(out: Path, path: Path, *, world: Path | None = None, report: Rep
         stream = rerun.RecordingStream("vico", recording_id=run.manifest["state_hash"])
         stream.save(temporary)
         if place is not None:
-            _log_world(rerun, stream, place)
+            # What stands still: outlines of buildings, at the ground and at the top of the roof.
+            lines: list[NDArray[np.float64]] = []
+            for building in place.buildings:
+                for ring in building.footprint[:1]:
+                    outline = np.array([*ring, ring[0]], np.float64)[:, :2]
+                    for height in (building.base, building.base + building.height):
+                        lines.append(np.column_stack([outline, np.full(len(outline), height)]))
+            stream.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+            stream.log("world/buildings", rerun.LineStrips3D(lines, colors=[(120, 120, 120)]), static=True)
         for first in range(0, run.last + 1, _STEPS):
             last = min(first + _STEPS - 1, run.last)
             _log_steps(rerun, stream, run, first, last)
@@ -283,18 +287,6 @@ def _set_time(stream: Any, step: int, time: float) -> None:
     stream.set_time("time", duration=time)
 
 
-def _log_world(rerun: ModuleType, stream: Any, world: World) -> None:
-    """Log what stands still: outlines of buildings, at the ground and at the top of the roof."""
-    lines: list[NDArray[np.float64]] = []
-    for building in world.buildings:
-        for ring in building.footprint[:1]:
-            outline = np.array([*ring, ring[0]], np.float64)[:, :2]
-            for height in (building.base, building.base + building.height):
-                lines.append(np.column_stack([outline, np.full(len(outline), height)]))
-    stream.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    stream.log("world/buildings", rerun.LineStrips3D(lines, colors=[(120, 120, 120)]), static=True)
-
-
 def _log_steps(rerun: ModuleType, stream: Any, run: Run, first: int, last: int) -> None:
     tracks = run.tracks(first, last)
     members = [run.cast[int(entity)] for entity in tracks.entity]
@@ -309,12 +301,14 @@ def _log_steps(rerun: ModuleType, stream: Any, run: Run, first: int, last: int) 
         there = np.isfinite(tracks.position[k, :, 0])
         for kind in dict.fromkeys(kinds.tolist()):
             mine = np.flatnonzero(there & (kinds == kind))
+            yaw = tracks.yaw[k, mine]
+            zero = np.zeros(len(yaw))
             stream.log(
                 f"world/bodies/{kind}",
                 rerun.Boxes3D(
                     centers=tracks.position[k, mine] + half[mine] * (0.0, 0.0, 1.0),
                     half_sizes=half[mine],
-                    quaternions=_yaw_quaternions(tracks.yaw[k, mine]),
+                    quaternions=np.column_stack([zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)]),
                     labels=[members[i].agent or "" for i in mine],
                     show_labels=False,
                     colors=[_COLOURS.get(kind, _OTHER_COLOUR)],
@@ -337,9 +331,3 @@ def _actions(run: Run, first: int, last: int) -> Iterator[tuple[int, list[tuple[
                 outcome = "" if record.status == "ok" else f" ({record.status}: {record.reason})"
                 words.append((name, action_caption(record.action) + outcome))
         yield step, words
-
-
-def _yaw_quaternions(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return turns about the vertical as quaternions x, y, z, w."""
-    zero = np.zeros(len(yaw))
-    return np.column_stack([zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)])

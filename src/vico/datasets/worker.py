@@ -89,7 +89,8 @@ def demonstrate_job(
     EmptyInputError
         If nothing was done in it.
     """
-    world = _pick_place_world(job["world"])
+    path = job["world"]
+    world = _read_world(Path(path)) if path else None
     keeper = PictureKeeper(work / "pictures", [_ROBOT], size=contents.size, outputs=contents.outputs)
     made = demonstrate(
         job["seed"],
@@ -101,28 +102,28 @@ def demonstrate_job(
     )
     if not len(made.kept):
         raise EmptyInputError(f"{CHALLENGE}: seed {job['seed']}: nothing was done in it ({made.played.why})")
-    return _demonstration(made), keeper.close(), _origin(made, world or level_field(0))
-
-
-def _demonstration(made: DemonstratedEpisode) -> Demonstration:
     kept, played, task = made.kept, made.played, made.task
-    return Demonstration(
-        agent=_ROBOT,
-        kind="robot",
-        body="manipulator",
-        person="",
-        steps=kept,
-        fps=FPS,
-        state_names=STATE,
-        form=IncrementForm(),
-        state=played.states[kept],
-        action=played.actions[kept],
-        goal=None,
-        text=[""] * len(kept),
-        status=np.full(len(kept), ActionStatus.OK.value, np.int64),
-        instructions=[task.instruction] * len(kept),
-        success=played.success,
-        facts=EpisodeFacts(CHALLENGE, task.source + " to " + task.destination, METHOD, task.seed, played.success),
+    return (
+        Demonstration(
+            agent=_ROBOT,
+            kind="robot",
+            body="manipulator",
+            person="",
+            steps=kept,
+            fps=FPS,
+            state_names=STATE,
+            form=IncrementForm(),
+            state=played.states[kept],
+            action=played.actions[kept],
+            goal=None,
+            text=[""] * len(kept),
+            status=np.full(len(kept), ActionStatus.OK.value, np.int64),
+            instructions=[task.instruction] * len(kept),
+            success=played.success,
+            facts=EpisodeFacts(CHALLENGE, task.source + " to " + task.destination, METHOD, task.seed, played.success),
+        ),
+        keeper.close(),
+        _origin(made, world or level_field(0)),
     )
 
 
@@ -135,15 +136,6 @@ def _origin(made: DemonstratedEpisode, world: World) -> Origin:
         int((np.diff(made.kept) > 1).sum()),
         [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, world.entities],
     )
-
-
-def _pick_place_world(path: str) -> World | None:
-    return _read_pick_place_world(Path(path)) if path else None
-
-
-@lru_cache(maxsize=2)
-def _read_pick_place_world(path: Path) -> World:
-    return read_world(path)
 
 
 Tell = Callable[[Mapping[str, Any]], None]

@@ -53,7 +53,10 @@ class AuditHook:
         self.noticed: list[str] = []
         self._world = os.path.realpath(world)
         self._own = None if own is None else os.path.realpath(own)
-        self._libraries = _library_folders()
+        paths = {sysconfig.get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+        paths |= {*site.getsitepackages(), site.getusersitepackages()}
+        folders = {folder + os.sep for path in paths for folder in (path, os.path.realpath(path))}
+        self._libraries = tuple(sorted(folders))
         self._local = threading.local()
         self._paused = False
         self._rules: dict[str, Callable[[FrameType | None, tuple[Any, ...]], str | None]] = {
@@ -144,9 +147,3 @@ class AuditHook:
         if self._own is not None and os.path.realpath(path).startswith(self._own):
             return True
         return not path.startswith((_PACKAGE, "<frozen", *self._libraries))
-
-
-def _library_folders() -> tuple[str, ...]:
-    paths = {sysconfig.get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib")}
-    paths |= {*site.getsitepackages(), site.getusersitepackages()}
-    return tuple(sorted({folder + os.sep for path in paths for folder in (path, os.path.realpath(path))}))

@@ -101,11 +101,10 @@ class _Served:
         thing = load_agent(spec)
         # Without a seat it is only asked whether there is such an agent.
         seat = message["seat"]
-        self._agent = FunctionAgent(_wait) if seat is None else make_agent(thing, AgentSeat(**seat), public_map)
-
-
-def _wait(observation: Observation, info: Info) -> Action:
-    return {"type": "wait"}
+        if seat is None:
+            self._agent = FunctionAgent(lambda observation, info: {"type": "wait"})
+        else:
+            self._agent = make_agent(thing, AgentSeat(**seat), public_map)
 
 
 def _limit_memory(megabytes: int) -> None:

@@ -100,7 +100,8 @@ class FaultLog:
         new = not self.counts[agent, kind]
         self.counts[agent, kind] += 1
         if new or len(self.first) < FAULTS_LISTED:
-            self.first.append(Fault(step, agent, kind, _shorten(reason)))
+            text = reason if len(reason) <= _LONGEST else reason[: _LONGEST - 3] + "..."
+            self.first.append(Fault(step, agent, kind, text))
 
     def by_kind(self) -> dict[str, int]:
         """Return how many there were of each kind there was."""
@@ -132,10 +133,6 @@ class FaultLog:
 def is_malformed(code: str) -> bool:
     """Whether a refusal (``action_code`` of an observation) says that the action had no form that could be right."""
     return code in _MALFORMED_CODES
-
-
-def _shorten(reason: str) -> str:
-    return reason if len(reason) <= _LONGEST else reason[: _LONGEST - 3] + "..."
 
 
 _Task = tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]

@@ -74,7 +74,10 @@ def _plain_scalar(value: Any, name: str) -> Any:
     if isinstance(value, str):
         if len(value) > _LONGEST_TEXT:
             raise MalformedError(f"{name} is a text of {len(value)} characters")
-        return _checked_unicode(value, name)
+        try:
+            return value.encode().decode()
+        except UnicodeEncodeError:
+            raise MalformedError(f"{name} is no Unicode text") from None
     if isinstance(value, int):
         if abs(value) >= 2**63:
             raise MalformedError(f"{name} is a number out of all range")
@@ -84,13 +87,6 @@ def _plain_scalar(value: Any, name: str) -> Any:
             raise MalformedError(f"{name} is {float(value)}; it has to be a finite number")
         return float(value)
     raise MalformedError(f"{name} is of type {type(value).__name__}; give text, numbers or a list of them")
-
-
-def _checked_unicode(value: str, name: str) -> str:
-    try:
-        return value.encode().decode()
-    except UnicodeEncodeError:
-        raise MalformedError(f"{name} is no Unicode text") from None
 
 
 class ListedInView:

@@ -22,7 +22,7 @@ from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.bodies.seats import Rests, find_rest
 from vico.sim.bodies.state_arrays import Posture, Vehicle
 from vico.sim.cameras import Views
-from vico.sim.people.hearing import ANNOUNCED, has_news, known_events
+from vico.sim.people.hearing import ANNOUNCED, known_events
 from vico.sim.people.placement import eye_height, has_room_to_sit, place_in_line
 from vico.sim.perception import OUTDOORS, AllInView, Viewpoints, in_view, opaque_grid
 from vico.sim.state.simulation_state import SimulationState
@@ -263,7 +263,8 @@ class ObservationBuilder:
         heard = np.zeros(n, bool)
         heard[[self._index[name] for name in self._heard]] = True
         # What is going on in the city may concern them, too.
-        if has_news(self._state):
+        agenda = self._state.environment.agenda
+        if len(agenda) > 0 and agenda.changed:
             heard[:] = True
         heard[list(self._closed)] = True
         heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
@@ -424,12 +425,6 @@ def agent_poses(state: SimulationState) -> NDArray[np.float64]:
     return np.vstack([mine, np.column_stack([robots.position, ahead])])
 
 
-def camera_heights(state: SimulationState) -> NDArray[np.float64]:
-    """Return the height of every agent's camera above its position, metres."""
-    mine = eye_height(state)
-    return mine if state.robots is None else np.concatenate([mine, state.robots.camera_heights()])
-
-
 def observe(
     state: SimulationState,
     seeing: Sequence[int],
@@ -510,9 +505,10 @@ def _render_views(
     """Return views of some agents."""
     order = list(seeing)
     cameras = stances.copy()
-    cameras[:, 2] += camera_heights(state)
+    people = len(state.people)
+    cameras[:people, 2] += eye_height(state)
     if state.robots is not None:
-        cameras[len(state.people) :] = state.robots.cameras()
+        cameras[people:] = state.robots.cameras()
     cameras = cameras[order]
     own = state.people.entity
     if state.robots is not None:

@@ -64,23 +64,19 @@ _GRIDS: WeakKeyDictionary[World, OpaqueGrid] = WeakKeyDictionary()
 def opaque_grid(world: World) -> OpaqueGrid:
     """Return the tops of a world's buildings; found once a world."""
     if world not in _GRIDS:
-        _GRIDS[world] = _rasterise(world)
+        n = math.ceil(2 * world.half / _CELL)
+        highest = np.array([building.base + building.height for building in world.buildings], np.float32)
+        tops = np.concatenate([np.array([-np.inf], np.float32), np.unique(highest)])
+        level = np.zeros((n, n), np.uint16 if len(tops) <= np.iinfo(np.uint16).max else np.uint32)
+        of_building = np.searchsorted(tops, highest)
+        # The highest are written last.
+        for k in np.argsort(of_building, kind="stable").tolist():
+            rings = [np.asarray(ring, np.float64) for ring in world.buildings[k].footprint]
+            starts = np.cumsum([0, *map(len, rings)])
+            x, y = np.ascontiguousarray(np.concatenate(rings).T)
+            fill_polygon(level, x, y, starts, float(world.half), _CELL, level.dtype.type(of_building[k]))
+        _GRIDS[world] = OpaqueGrid(level, tops, world.half)
     return _GRIDS[world]
-
-
-def _rasterise(world: World) -> OpaqueGrid:
-    n = math.ceil(2 * world.half / _CELL)
-    highest = np.array([building.base + building.height for building in world.buildings], np.float32)
-    tops = np.concatenate([np.array([-np.inf], np.float32), np.unique(highest)])
-    level = np.zeros((n, n), np.uint16 if len(tops) <= np.iinfo(np.uint16).max else np.uint32)
-    of_building = np.searchsorted(tops, highest)
-    # The highest are written last.
-    for k in np.argsort(of_building, kind="stable").tolist():
-        rings = [np.asarray(ring, np.float64) for ring in world.buildings[k].footprint]
-        starts = np.cumsum([0, *map(len, rings)])
-        x, y = np.ascontiguousarray(np.concatenate(rings).T)
-        fill_polygon(level, x, y, starts, float(world.half), _CELL, level.dtype.type(of_building[k]))
-    return OpaqueGrid(level, tops, world.half)
 
 
 #: The space of all that is in no room and no bus.
@@ -275,7 +271,9 @@ def in_view(
         How far off bodies are noticed outdoors, metres, one for all or one each; at most `SIGHT`.
     """
     looked_at = bodies.position + np.column_stack([np.zeros((len(bodies), 2)), _LOOKED_AT * bodies.height])
-    keys = _keys(looked_at, spaces)
+    # By the space each point is in, outdoors by its cell: only those of near ones see each other.
+    cells = np.floor(looked_at[:, :2] / SIGHT).astype(np.int64)
+    keys = np.where(spaces == OUTDOORS, _cell_key(cells[:, 0], cells[:, 1]), spaces)
     by_key = np.argsort(keys, kind="stable")
     who, what, far = _pairs(
         np.column_stack([eyes.position, np.cos(eyes.yaw), np.sin(eyes.yaw)]),
@@ -295,12 +293,6 @@ def is_clear(one: NDArray[np.float64], other: NDArray[np.float64], opaque: Opaqu
     """Return whether no building stands between two points outdoors, ENU metres, shape ``(3,)`` each."""
     away = math.hypot(other[0] - one[0], other[1] - one[1])
     return bool(_is_clear(one, other, away, _FREE_END, opaque.half, opaque.cell, (opaque.level, opaque.tops)))
-
-
-def _keys(points: NDArray[np.float64], spaces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a number for the space each point is in, outdoors for the cell: only those of near ones see each other."""
-    cells = np.floor(points[:, :2] / SIGHT).astype(np.int64)
-    return np.where(spaces == OUTDOORS, _cell_key(cells[:, 0], cells[:, 1]), spaces)
 
 
 @compiled

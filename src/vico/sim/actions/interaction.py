@@ -13,7 +13,7 @@ from vico.geometry import distance, distances
 from vico.rules import EARSHOT, REACH, ReasonCode, reach_up
 from vico.sim.actions.model import ActionType, Actors, Field, Refusal, Situation, Values, short
 from vico.sim.bodies.arrays import RESIDENT
-from vico.sim.bodies.collisions import DeckPose, box_gap, free_place_on_deck, lay_on_deck
+from vico.sim.bodies.collisions import box_gap, free_place_on_deck, lay_on_deck
 from vico.sim.bodies.seats import AT_SPOT, PRICE, SERVICE
 from vico.sim.bodies.state_arrays import Posture, Vehicle
 from vico.sim.people.hearing import listeners_of_person, listeners_of_robot
@@ -208,7 +208,13 @@ def put_down(target: Any, i: int, hand: int, state: SimulationState) -> Placemen
                 return _on(container, i, k, state)
     deck = state.deck(target)
     if deck is not None:
-        return _on_deck(target, deck, i, k, state)
+        away = deck.gap(state.people.position[i])
+        if state.people.room[i] >= 0 or away > REACH:
+            return Refusal(ReasonCode.TOO_FAR, f"put: the deck is {away:.1f} m away; reach is {REACH} m")
+        place = free_place_on_deck(deck, target, k, state.objects)
+        if isinstance(place, str):
+            return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {place}")
+        return PlacementPoint(deck.world(place), carrier=target, offset=place)
     return Refusal(ReasonCode.UNKNOWN_TARGET, f"put: {target} is nothing here that a thing can be put on")
 
 
@@ -300,16 +306,6 @@ def _on(container: Container, i: int, k: int, state: SimulationState) -> Placeme
         if clear.all() and not on_floor_below:
             return PlacementPoint(np.array([*spots[index], z]))
     return Refusal(ReasonCode.NO_FREE_SPOT, f"put: no free spot on the {container.kind} within reach")
-
-
-def _on_deck(entity: int, deck: DeckPose, i: int, k: int, state: SimulationState) -> PlacementPoint | Refusal:
-    away = deck.gap(state.people.position[i])
-    if state.people.room[i] >= 0 or away > REACH:
-        return Refusal(ReasonCode.TOO_FAR, f"put: the deck is {away:.1f} m away; reach is {REACH} m")
-    place = free_place_on_deck(deck, entity, k, state.objects)
-    if isinstance(place, str):
-        return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {place}")
-    return PlacementPoint(deck.world(place), carrier=entity, offset=place)
 
 
 _HAND = Field("hand", slot="hand")

@@ -165,7 +165,8 @@ class EventSites:
             return np.array(self.place(event.place).position, np.float64)
         shape = self.street(event) if event.street else self.ground(event)
         if event.street:
-            point = shapely.get_coordinates(shapely.line_interpolate_point(_longest(shape), 0.5, normalized=True))[0]
+            longest = max(shapely.get_parts(shapely.line_merge(shape)), key=lambda line: float(line.length))
+            point = shapely.get_coordinates(shapely.line_interpolate_point(longest, 0.5, normalized=True))[0]
         else:
             point = shapely.get_coordinates(shape.centroid)[0]
         return np.array([*point, float(self._world.height(point))])
@@ -205,11 +206,6 @@ class EventSites:
         return roads
 
 
-def _longest(lines: shapely.Geometry) -> shapely.Geometry:
-    """Return the longest line of several, joined where they meet."""
-    return max(shapely.get_parts(shapely.line_merge(lines)), key=lambda line: float(line.length))
-
-
 # A barrier stands so far within its lane, metres, or in its middle if that is nearer.
 _INTO_LANE = 4.0
 #: What stands across closed lanes.
@@ -238,7 +234,17 @@ def spots_of(one: Occurrence, sites: EventSites) -> list[Spot]:
     models = list(one.kind.things)
     if models == [BARRIER]:
         return _before_lanes(BARRIER, one, sites)
-    return _on_a_lane(models, one, sites)
+    # Spots one behind the other in the middle of the longest closed lane that no bus takes, askew
+    lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
+    usable = [k for k in np.flatnonzero(closed).tolist() if k not in _lanes_of_buses(sites)]
+    if not usable or not models:
+        return []
+    lane = max(usable, key=lambda k: (float(lanes.length[k]), -k))
+    found = []
+    for k, model in enumerate(models):
+        x, y, yaw = lanes.at(lane, max(float(lanes.length[lane]) / 2 - _CAR_APART * k, 0.0)).tolist()
+        found.append(Spot(model, x, y, yaw + _ASKEW * k))
+    return found
 
 
 def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
@@ -259,20 +265,6 @@ def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
     free &= ~np.isin(walkable.class_at(around), (ROADWAY, CROSSING)).any(axis=1)
     chosen = points[free][: len(models)]
     return [Spot(model, float(x), float(y), 0.0) for model, (x, y) in zip(models, chosen, strict=False)]
-
-
-def _on_a_lane(models: list[str], one: Occurrence, sites: EventSites) -> list[Spot]:
-    """Return spots one behind the other in the middle of the longest closed lane that no bus takes, askew."""
-    lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
-    usable = [k for k in np.flatnonzero(closed).tolist() if k not in _lanes_of_buses(sites)]
-    if not usable or not models:
-        return []
-    lane = max(usable, key=lambda k: (float(lanes.length[k]), -k))
-    found = []
-    for k, model in enumerate(models):
-        x, y, yaw = lanes.at(lane, max(float(lanes.length[lane]) / 2 - _CAR_APART * k, 0.0)).tolist()
-        found.append(Spot(model, x, y, yaw + _ASKEW * k))
-    return found
 
 
 def _lanes_of_buses(sites: EventSites) -> set[int]:

@@ -26,7 +26,7 @@ from vico.sim.people.hearing import follow_city_events
 from vico.sim.people.placement import advance_lines
 from vico.sim.state.base import SimulationBase
 from vico.sim.state.simulation_state import SimulationState
-from vico.sim.state.snapshot import arrays_of, copy_arrays, identity, read_snapshot, state_hash, write_snapshot
+from vico.sim.state.snapshot import arrays_of, identity, read_snapshot, state_hash, write_snapshot
 from vico.sim.state.steps import TICKS_PER_SECOND, ControlPeriods, Event, ticks_of
 from vico.world.mesh import Surface
 from vico.world.world import World
@@ -133,7 +133,9 @@ class Simulation:
         days = self.base.days(community)[: len(self.residents)] if community is not None else []
         self.state = initial_state(self.base, self.residents, days, self.config, day)
         self._dressed_for = self.state.environment.weather
-        self.periods = _periods(self.state, self.config)
+        robots = self.state.robots
+        models = {} if robots is None else {name: robots.control_period(k) for k, name in enumerate(robots.names)}
+        self.periods = ControlPeriods.of(self.state.people.names, models, self.config.periods, start=self.state.tick)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
         self.look_away: Collection[str] = ()
@@ -340,7 +342,7 @@ class Simulation:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Return a copy of the whole state; `restore` goes back to it."""
-        return copy_arrays(self.arrays())
+        return {name: np.array(array, copy=True) for name, array in self.arrays().items()}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to a snapshot of a simulation made in the same way."""
@@ -375,13 +377,6 @@ class Simulation:
         """Version, configuration, world, community and objects in one hash: equal ones run equally."""
         residents = [resident.id for resident in self.residents]
         return identity(self.config.record(), self.world.digest, residents, self.state.objects.names)
-
-
-def _periods(state: SimulationState, config: SimConfig) -> ControlPeriods:
-    """Return how often each agent acts."""
-    robots = state.robots
-    models = {} if robots is None else {name: robots.control_period(k) for k, name in enumerate(robots.names)}
-    return ControlPeriods.of(state.people.names, models, config.periods, start=state.tick)
 
 
 def _seeing(state: SimulationState, observe: Sequence[str] | None) -> list[int]:

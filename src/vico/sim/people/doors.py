@@ -393,7 +393,10 @@ def advance_robots_at_doors(state: SimulationState, dt: float) -> None:
         return
     for robot, room in robots.at_doors():
         origin = int(robots.rooms[robot])
-        place = _place_entered(robot, room, state) if origin < 0 else None
+        place = None
+        if origin < 0:  # it enters the place that it is going to, behind whichever door that is
+            goal = robots.trip_room(robot)
+            place = place_of_room(goal if goal >= 0 else room, state)
         if place is not None and closed_reason(place, state):
             robots.give_up(robot)
             continue
@@ -401,14 +404,26 @@ def advance_robots_at_doors(state: SimulationState, dt: float) -> None:
             rooms = state.indoor.rooms
             if robots.ride(robot, dt) < lift_seconds(rooms[room].centre[2] - rooms[origin].centre[2]) - 1e-6:
                 continue
-        if -1 in (origin, room) and not _is_open(room if origin < 0 else origin, state):
+        if -1 in (origin, room) and not _open_entrance(room if origin < 0 else origin, state):
             continue
         if robots.pass_door(robot, room, _occupied_discs(robot, room, state)):
-            _log_passing(robot, origin, room, place, state)
-    _keep_on_decks(state)
+            name, position = robots.names[robot], robots.bodies().position[robot]
+            if origin < 0 and place is not None:
+                state.events.add("enter", name, f"enters {place.name}", position, place=place.id)
+            left = place_of_room(origin, state)
+            if room < 0 and left is not None:
+                state.events.add("exit", name, f"leaves {left.name}", position, place=left.id)
+    # Things on decks are in the rooms that the robots are in.
+    objects = state.objects
+    carried = np.flatnonzero((objects.holder != 0) & (objects.hand < 0))
+    if not len(carried):
+        return
+    room_of = dict(zip(robots.bodies().entity.tolist(), robots.rooms.tolist(), strict=True))
+    for k in carried.tolist():
+        objects.room[k] = room_of.get(int(objects.holder[k]), int(objects.room[k]))
 
 
-def _is_open(room: int, state: SimulationState) -> bool:
+def _open_entrance(room: int, state: SimulationState) -> bool:
     """Open the entrance to a room; return whether it is open."""
     entrance = state.world.places[int(state.indoor.place[room])].entrance
     if entrance is None:
@@ -434,12 +449,6 @@ def place_of_room(room: int, state: SimulationState) -> Place | None:
     return state.world.places[index] if index >= 0 else None
 
 
-def _place_entered(robot: int, room: int, state: SimulationState) -> Place | None:
-    assert state.robots is not None
-    goal = state.robots.trip_room(robot)
-    return place_of_room(goal if goal >= 0 else room, state)
-
-
 def _occupied_discs(robot: int, room: int, state: SimulationState) -> NDArray[np.float64]:
     """Discs (x, y, radius) in which the middle of a robot that comes into a room (-1: outdoors) cannot be."""
     assert state.robots is not None
@@ -450,25 +459,3 @@ def _occupied_discs(robot: int, room: int, state: SimulationState) -> NDArray[np
         return np.column_stack([bodies.position[:, :2], reach + own])
     points = state.taken_in(room)
     return np.column_stack([points[:, :2], np.full(len(points), RADIUS + own)])
-
-
-def _log_passing(robot: int, origin: int, room: int, place: Place | None, state: SimulationState) -> None:
-    assert state.robots is not None
-    name, position = state.robots.names[robot], state.robots.bodies().position[robot]
-    if origin < 0 and place is not None:
-        state.events.add("enter", name, f"enters {place.name}", position, place=place.id)
-    left = place_of_room(origin, state)
-    if room < 0 and left is not None:
-        state.events.add("exit", name, f"leaves {left.name}", position, place=left.id)
-
-
-def _keep_on_decks(state: SimulationState) -> None:
-    """Have things on decks be in the rooms that the robots are in."""
-    robots, objects = state.robots, state.objects
-    assert robots is not None
-    carried = np.flatnonzero((objects.holder != 0) & (objects.hand < 0))
-    if not len(carried):
-        return
-    room_of = dict(zip(robots.bodies().entity.tolist(), robots.rooms.tolist(), strict=True))
-    for k in carried.tolist():
-        objects.room[k] = room_of.get(int(objects.holder[k]), int(objects.room[k]))

@@ -206,12 +206,6 @@ def follow_city_events(state: SimulationState) -> None:
         state.events.add("city", "", f"{one.event.title} {what}", one.middle, **told)
 
 
-def has_news(state: SimulationState) -> bool:
-    """Return whether an event has begun or ended within the last second."""
-    agenda = state.environment.agenda
-    return len(agenda) > 0 and agenda.changed
-
-
 def known_events(state: SimulationState, i: int, pose: NDArray[np.float64]) -> list[dict[str, Any]]:
     """Return what somebody knows of events: of those announced, of closed places at whose doors they stand.
 

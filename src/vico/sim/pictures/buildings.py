@@ -48,7 +48,7 @@ from vico.sim.state.simulation_state import SimulationState
 from vico.world.city_world import CityPart
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Place
-from vico.world.opening_hours import MINUTES, Coordinates, Span, is_within
+from vico.world.opening_hours import MINUTES, is_within
 from vico.world.world import World
 
 
@@ -177,7 +177,11 @@ class RoomLamps:
         self._shared = np.array([room.kind in _SHARED for room in world.rooms], bool) | (self._place < 0)
         origin = world.manifest.origin
         where = (origin.lat, origin.lon)
-        self._hours = [(k, _hours_of(place, date, where)) for k, place in enumerate(world.places) if place.kind != HOME]
+        self._hours = [
+            (k, [(0, MINUTES)] if place.category is Category.ACCOMMODATION else hours_on(place, date, where))
+            for k, place in enumerate(world.places)
+            if place.kind != HOME
+        ]
         self._private = np.array([room.kind in _PRIVATE for room in world.rooms], bool)
         self._looked_up = -1.0
         self._open = np.zeros(len(world.places), bool)
@@ -206,11 +210,6 @@ class RoomLamps:
             for k, spans in self._hours:
                 self._open[k] = is_within(spans, minute)
         return self._open
-
-
-def _hours_of(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
-    """Return when a place that is nobody's home is open on a day."""
-    return [(0, MINUTES)] if place.category is Category.ACCOMMODATION else hours_on(place, date, coordinates)
 
 
 # Share of the homes that nobody of the community lives in that are lit, by the hour.

@@ -234,7 +234,11 @@ class DrawnPeople:
         # What the looks at the start are for.
         self._clothes = np.tile(sim.state.clothes_at_start, (len(self._own), 1))
         self.looks = looks
-        self._worn = _worn_bodies(sim)
+        for name in sim.config.worn:
+            if name not in people.names:
+                there = ", ".join(people.names) or "none"
+                raise InputError(f"worn: nobody is called {name!r}; there are {there}")
+        self._worn = {name: Path(path) for name, path in sim.config.worn.items()}
         self._names = [*people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
         self._bodies: dict[int, SkinnedBody] = {}
         self._far: dict[int, SkinnedBody] = {}
@@ -350,22 +354,6 @@ class DrawnPeople:
             self._far = {i: self.batch.body(k, self._far[i]) for k, i in enumerate(rows, len(rows))}
 
 
-def _worn_bodies(sim: DrawnPopulation) -> dict[str, Path]:
-    """Return the files of those who wear a body of their own, by agent's name.
-
-    Raises
-    ------
-    InputError
-        If there is no such agent.
-    """
-    people = sim.state.people
-    for name in sim.config.worn:
-        if name not in people.names:
-            there = ", ".join(people.names) or "none"
-            raise InputError(f"worn: nobody is called {name!r}; there are {there}")
-    return {name: Path(path) for name, path in sim.config.worn.items()}
-
-
 class PersonMotion(NamedTuple):
     """How people move, one row a person.
 
@@ -414,28 +402,6 @@ class PersonMotion(NamedTuple):
         return PersonMotion(after=after, hands=hands, **plain)
 
 
-def _motion_of_agents(state: SimulationState, height: HeightField) -> PersonMotion:
-    """Return how residents and assistants move; who sits in a bus sits as the seat stands, wherever they look."""
-    p = state.people
-    in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
-    yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
-    before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
-    on_stairs = (state.indoor.treads_under(p.room) > 0) | ((p.room < 0) & (height.going_at(p.position) > 0))
-    over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
-    after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
-    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)
-    rise = np.zeros(len(p))
-    sitting = np.flatnonzero(p.seat >= 0)
-    if len(sitting):
-        seat = p.seat[sitting]
-        yaw[sitting] = state.seats.yaw[seat]
-        rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
-    # Who gets up comes down from the seat to the floor.
-    rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
-    place = p.position.copy(), yaw, on_ground, p.room.copy(), rise, rise_before, hands_of_agents(state)
-    return PersonMotion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
-
-
 def concatenate_motion(a: PersonMotion, b: PersonMotion) -> PersonMotion:
     """Return how some people move, and after them others."""
     pairs = {name: (getattr(a.after, name), getattr(b.after, name)) for name in Transition._fields if name != "ground"}
@@ -463,7 +429,26 @@ class MovingBodies:
     @cached_property
     def agents(self) -> PersonMotion:
         """How residents and assistants move."""
-        return _motion_of_agents(self.state, self._height)
+        state = self.state
+        p = state.people
+        # Who sits in a bus sits as the seat stands, wherever they look.
+        in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
+        yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
+        before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
+        on_stairs = (state.indoor.treads_under(p.room) > 0) | ((p.room < 0) & (self._height.going_at(p.position) > 0))
+        over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
+        after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
+        on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)
+        rise = np.zeros(len(p))
+        sitting = np.flatnonzero(p.seat >= 0)
+        if len(sitting):
+            seat = p.seat[sitting]
+            yaw[sitting] = state.seats.yaw[seat]
+            rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
+        # Who gets up comes down from the seat to the floor.
+        rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
+        place = p.position.copy(), yaw, on_ground, p.room.copy(), rise, rise_before, hands_of_agents(state)
+        return PersonMotion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
 
     @cached_property
     def shapes(self) -> list[Drawn]:

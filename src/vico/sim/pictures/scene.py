@@ -172,7 +172,7 @@ class SceneRenderer:
 
     def picture_waiter(self) -> Callable[[], None]:
         """Return what to call, from any thread, to wait for the pictures of the last `render`."""
-        return self._pictures.wait if self._pictures is not None else _nothing
+        return self._pictures.wait if self._pictures is not None else lambda: None
 
     def show(self, state: SimulationState) -> Scene:
         """Put light and everything that moves where they are in a state; return the scene, for cameras of one's own."""
@@ -385,18 +385,9 @@ def _lighting(environment: Environment, second: float) -> Lighting:
     )
     cover = environment.snow_cover
     wet = max(environment.wet, _ICE_SHINES * environment.ice) * (1.0 - cover)
-    return replace(
-        light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow, unlit=_widest(environment)
-    )
-
-
-def _widest(environment: Environment) -> tuple[float, float, float]:
-    """Return the largest circle of ground on which the power is cut; a radius of 0 for none."""
-    return max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
-
-
-def _nothing() -> None:
-    pass
+    # The largest circle of ground on which the power is cut; a radius of 0 for none.
+    unlit = max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
+    return replace(light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow, unlit=unlit)
 
 
 def _shapes(sim: RenderedSimulation, doors: DrawnDoors) -> dict[str, Sequence[Surface]]:

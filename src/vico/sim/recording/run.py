@@ -29,7 +29,7 @@ from vico.sim.animation import STYLE, Hands, Hold, Transition, free_hands, pose,
 from vico.sim.animation.motions import CLIPS
 from vico.sim.config import find_by_name
 from vico.sim.pictures.people import looks_of_strangers, manner_of_pedestrian
-from vico.sim.recording.films import View, views_of
+from vico.sim.recording.films import VIEWS, View
 from vico.sim.recording.manifest import CastMember, read_cast, read_manifest
 from vico.sim.recording.schema import (
     AGENTS,
@@ -239,7 +239,8 @@ class Run:
     @property
     def views(self) -> dict[str, View]:
         """Films of what agents saw, by agent's name; a frame for every step at which it observed."""
-        return views_of(self.path, [agent["name"] for agent in self.agents], self.last)
+        folders = {agent["name"]: self.path / VIEWS / agent["name"] for agent in self.agents}
+        return {name: View(folder, self.last) for name, folder in folders.items() if any(folder.glob("*.mp4"))}
 
     @property
     def checkpoints(self) -> list[int]:
