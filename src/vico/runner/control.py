@@ -172,7 +172,7 @@ class _Waiting:
 
 
 class Control:
-    """Directs a run (`vico.runner.loop.Director`); its methods may be called from any thread.
+    """Directs a run by `before_step`, a `vico.runner.loop.Director`; its methods may be called from any thread.
 
     Parameters
     ----------

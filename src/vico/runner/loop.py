@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from vico.agents.base import Action, AgentState
 from vico.envs.spaces import short_form
@@ -68,11 +68,9 @@ class Hook:
         """Save what every agent remembers, together with the simulation as it stands now."""
 
 
-class Director(Protocol):
-    """Reaches into a run from outside: holds it up, changes the simulation, has agents do something else."""
-
-    def before_step(self, runner: Runner) -> Mapping[str, Action]:
-        """Do what is due between two steps; return what agents do in the next one in place of their own actions."""
+#: Reaches into a run from outside, between two steps: holds it up, changes the simulation. Returns what agents do in
+#: the next step in place of their own actions.
+Director = Callable[["Runner"], Mapping[str, Action]]
 
 
 class Runner:
@@ -91,7 +89,7 @@ class Runner:
     faults
         Where to note what agents do wrong; where a run is resumed, with what they did before.
     director
-        Who reaches into the run; nobody if None.
+        Called before each step; nobody reaches into the run if None.
     """
 
     def __init__(
@@ -134,7 +132,7 @@ class Runner:
         for hook in self.hooks:
             hook.begin(observations)
         while sim.metrics.steps < steps and not until():
-            directed = {} if self.director is None else self.director.before_step(self)
+            directed = {} if self.director is None else self.director(self)
             if until():
                 break
             if sim.defer_pictures and self._looked_at:

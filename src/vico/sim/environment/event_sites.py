@@ -234,7 +234,7 @@ def spots_of(one: Occurrence, sites: EventSites) -> list[Spot]:
     models = list(one.kind.things)
     if models == [BARRIER]:
         return _before_lanes(BARRIER, one, sites)
-    # Spots one behind the other in the middle of the longest closed lane that no bus takes, askew
+    # One behind the other in the middle of the longest closed lane that no bus takes, askew.
     lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
     usable = [k for k in np.flatnonzero(closed).tolist() if k not in _lanes_of_buses(sites)]
     if not usable or not models:

@@ -199,7 +199,7 @@ def follow_city_events(state: SimulationState) -> None:
     if state.traffic is not None:
         state.traffic.gatherings.follow(agenda.gatherings(None if state.transit is None else state.transit.on_tracks))
         state.traffic.gatherings.advance(state.second)
-    state.things.follow(state)
+    state.things.follow(state.base, agenda, state.traffic, state.obstacles)
     for one, what in news:
         told = {name: value for name, value in one.event.record().items() if name != "kind" and value}
         told |= {"event": one.id, "event_kind": one.event.kind}

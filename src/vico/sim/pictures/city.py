@@ -19,8 +19,8 @@ from vico.render import Cameras, Scene, render
 from vico.render.materials import Palette
 from vico.sim.cameras import Views
 from vico.sim.pictures.buildings import ScenePart
-from vico.sim.pictures.people import MovingBodies
-from vico.sim.pictures.scene import RenderedSimulation, SceneRenderer
+from vico.sim.pictures.people import MovingBodies, RenderedSimulation
+from vico.sim.pictures.scene import SceneRenderer
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.city_world import CityWorld
 from vico.world.silhouettes import CitySilhouettes

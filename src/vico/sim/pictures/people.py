@@ -7,7 +7,7 @@ not depend on who looks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property, partial
 from pathlib import Path
@@ -36,6 +36,8 @@ from vico.sim.traffic.drawing import PedestrianGaits
 from vico.sim.traffic.state import STOP, TALK
 from vico.threads import in_order
 from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.world.world import World
 
 # Who talks goes on for so long, then the other does, s.
 _TURN_TO_TALK = 6.0
@@ -172,8 +174,8 @@ _USUAL_HEIGHT = 1.7
 _Detail = Literal["far", "light", "full"]
 
 
-class DrawnPopulation(Protocol):
-    """Who is drawn: what is asked of a simulation."""
+class RenderedSimulation(Protocol):
+    """What renderers ask of a simulation."""
 
     @property
     def config(self) -> SimConfig:
@@ -190,6 +192,17 @@ class DrawnPopulation(Protocol):
     @property
     def looks(self) -> Sequence[Appearance]:
         """How people look at the start, in the order of their avatars, and after them the pedestrians."""
+
+    @property
+    def world(self) -> World:
+        """Where it happens."""
+
+    @property
+    def shapes(self) -> Mapping[str, Sequence[Surface]]:
+        """Shapes of loose things, by name."""
+
+    def entity(self, entity: int) -> dict[str, str]:
+        """Kind and name of an entity."""
 
 
 class DrawnPeople:
@@ -225,7 +238,7 @@ class DrawnPeople:
     """
 
     def __init__(
-        self, sim: DrawnPopulation, *, detail: Literal["light", "full"], far: bool, everybody: bool = True
+        self, sim: RenderedSimulation, *, detail: Literal["light", "full"], far: bool, everybody: bool = True
     ) -> None:
         people, looks = sim.state.people, list(sim.looks)
         walkers = sim.state.traffic.walkers.entity.tolist() if sim.state.traffic is not None else []

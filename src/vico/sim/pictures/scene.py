@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,9 @@ from vico.sim.pictures.buildings import DrawnDoors, RoomLamps, RoomsInSight, Sce
 from vico.sim.pictures.hands import Holders, draw_in_hands, hands_of_pedestrians
 from vico.sim.pictures.people import (
     DrawnPeople,
-    DrawnPopulation,
     MovingBodies,
     PersonMotion,
+    RenderedSimulation,
     ViewingCameras,
     concatenate_motion,
     far_from_all,
@@ -38,7 +38,6 @@ from vico.sim.pictures.people import (
 )
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.mesh import Surface
-from vico.world.world import World
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
@@ -49,21 +48,6 @@ _ICE_SHINES = 0.6  # as much as wet ground does
 # there who have none; and of how many too many bodies it is worth to choose anew.
 _BESIDE, _SOON, _SPARE_BODIES = 2.0, 40.0, 100
 _OVERCAST = 0.45  # share of the daylight in rooms that a sky full of clouds takes
-
-
-class RenderedSimulation(DrawnPopulation, Protocol):
-    """What the renderer asks of a simulation."""
-
-    @property
-    def world(self) -> World:
-        """Where it happens."""
-
-    @property
-    def shapes(self) -> Mapping[str, Sequence[Surface]]:
-        """Shapes of loose things, by name."""
-
-    def entity(self, entity: int) -> dict[str, str]:
-        """Kind and name of an entity."""
 
 
 class SceneRenderer:

@@ -29,12 +29,13 @@ from vico.sim.animation import STYLE, Hands, Hold, Transition, free_hands, pose,
 from vico.sim.animation.motions import CLIPS
 from vico.sim.config import find_by_name
 from vico.sim.pictures.people import looks_of_strangers, manner_of_pedestrian
-from vico.sim.recording.films import VIEWS, View
+from vico.sim.recording.films import View
 from vico.sim.recording.manifest import CastMember, read_cast, read_manifest
 from vico.sim.recording.schema import (
     AGENTS,
     METRICS,
     TABLES,
+    VIEWS,
     Checkpoint,
     Segment,
     checkpoint_steps,

@@ -24,7 +24,7 @@ from vico.sim.state.steps import Event
 
 if TYPE_CHECKING:
     from vico.sim.loop.simulation import Simulation, StepResult
-    from vico.sim.state.simulation_state import TrafficSystem
+    from vico.sim.traffic import Traffic
 #: An action whose JSON is longer is cut to its type, and says how long it was.
 LONGEST_ACTION = 8192
 _DEEPEST = 6
@@ -217,7 +217,7 @@ def _weather(step: int, sim: Simulation) -> Rows:
     }
 
 
-def _bodies(step: int, bodies: Bodies, traffic: TrafficSystem | None) -> Rows:
+def _bodies(step: int, bodies: Bodies, traffic: Traffic | None) -> Rows:
     lights = np.zeros(len(bodies), np.uint8)
     if traffic is not None and len(traffic.lights):
         vehicles = traffic.bodies().entity[: len(traffic.lights)]

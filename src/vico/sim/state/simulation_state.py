@@ -1,7 +1,4 @@
-"""The state of a simulation: everything that changes, with quick look-ups of the world's fixed facts.
-
-`TrafficSystem` says what the rules of a simulation ask of traffic.
-"""
+"""The state of a simulation: everything that changes, with quick look-ups of the world's fixed facts."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import INNER_DOOR_REACH, ActionStatus, ReasonCode
-from vico.sim.bodies.arrays import STEP_HEIGHT, TALLEST, Bodies, HasBodies, Subsystem
+from vico.sim.bodies.arrays import STEP_HEIGHT, TALLEST, Bodies, HasBodies
 from vico.sim.bodies.avatars import Avatars
 from vico.sim.bodies.collisions import DeckPose, HasDecks
 from vico.sim.bodies.rooms import DoorLeaves, Indoor, doors_near
@@ -27,24 +24,19 @@ from vico.sim.bodies.state_arrays import (
     People,
     Vehicle,
 )
-from vico.sim.environment import Conditions, Environment
+from vico.sim.environment import Environment
 from vico.sim.state.base import OpeningHours, SimulationBase
 from vico.sim.state.event_things import EventThings
 from vico.sim.state.snapshot import arrays_of
 from vico.sim.state.steps import TICKS_PER_SECOND, Events
-from vico.sim.traffic.drawing import PedestrianGaits
-from vico.sim.traffic.gatherings import Gatherings
-from vico.sim.traffic.jams import Jam, JamLog
-from vico.sim.traffic.junctions import JunctionRule
-from vico.sim.traffic.signals import SignalsShown
 from vico.sim.transit import TransitSystem
-from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
 from vico.world.model import Entrance, Place
 from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.sim.robots.population import RobotPopulation
+    from vico.sim.traffic import Traffic
 
 
 # A thing that lies so near to the middle of a seat leaves no room to sit, metres.
@@ -61,82 +53,6 @@ class HasArrays(Protocol):
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
-
-
-class TrafficSystem(Subsystem, Protocol):
-    """What the rules and the renderer ask of traffic, beside what the loop does."""
-
-    @property
-    def walkers(self) -> Bodies:
-        """The pedestrians alone, then the cyclists."""
-
-    @property
-    def lanes(self) -> LaneGraph:
-        """The lanes that vehicles drive on."""
-
-    @property
-    def cyclists(self) -> int:
-        """How many cyclists there are."""
-
-    @property
-    def ridden(self) -> NDArray[np.float64]:
-        """Metres that each cyclist has ridden."""
-
-    def entities(self) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
-        """Return entity and kind of all, those that are not in the streets now among them."""
-
-    @property
-    def gatherings(self) -> Gatherings:
-        """Leads pedestrians to events."""
-
-    @property
-    def riding(self) -> NDArray[np.bool_]:
-        """Which pedestrians ride in buses."""
-
-    @property
-    def passengers(self) -> Bodies:
-        """The pedestrians who ride in buses, where they sit or stand."""
-
-    @property
-    def lights(self) -> NDArray[np.uint8]:
-        """Which lights each vehicle among the bodies shows, bits as `vico.sim.traffic.lights` has them."""
-
-    @property
-    def gait(self) -> PedestrianGaits:
-        """How each pedestrian walks, and each cyclist rides."""
-
-    @property
-    def junction_rule(self) -> JunctionRule:
-        """Who may be in a junction."""
-
-    @property
-    def jams(self) -> JamLog:
-        """Who was taken out of a jam."""
-
-    @property
-    def reentered(self) -> int:
-        """How often cars that had left the map came back in."""
-
-    def set_conditions(self, conditions: Conditions) -> None:
-        """Have everybody drive and walk as it is outdoors now; told before every sub-step."""
-
-    def set_shut(self, lanes: NDArray[np.bool_] | None, walkways: NDArray[np.bool_] | None) -> None:
-        """Have cars keep off some lanes, and pedestrians off some walkways (masks); told before every sub-step."""
-
-    def set_signals(self, second: int, dark: tuple[tuple[float, float, float], ...]) -> None:
-        """Have signals show what they do at a second, and nothing where the power is cut; told every second."""
-
-    def signals_shown(self) -> SignalsShown | None:
-        """Return what all signals show now; None where they are not obeyed."""
-
-    def drop_shut_plans(self) -> None:
-        """Have cars plan anew that were about to drive where it is shut since."""
-
-    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
-        """Whether a car is on some lanes (a mask), or on its way there."""
-
-    def stuck(self) -> list[Jam]:
-        """Who gets nowhere now."""
 
 
 @dataclass
@@ -186,7 +102,7 @@ class SimulationState:
     events: Events
     environment: Environment
     things: EventThings = field(default_factory=EventThings)
-    traffic: TrafficSystem | None = None
+    traffic: Traffic | None = None
     transit: TransitSystem | None = None
     robots: RobotPopulation | None = None
     openings: OpeningHours | None = None
