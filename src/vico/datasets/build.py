@@ -425,7 +425,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
         options = {"parts": str(shared), "contents": request.contents.record()}
         reasons: dict[int, str] = {}
 
-        def done(index: int, answer: Answer) -> None:
+        def note_answer(index: int, answer: Answer) -> None:
             reasons[index] = answer.reason
             if report is not None:
                 report(len(reasons), len(tasks))
@@ -435,7 +435,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
             shared_store_marker(shared, executor) as seen,
         ):
             service = Service(MAKER, {**options, "seen": seen, "code": code_digest()})
-            executor.run(service, [Task(task, near=task["near"]) for task in tasks], done=done)
+            executor.run(service, [Task(task, near=task["near"]) for task in tasks], done=note_answer)
         missing = [f"{tasks[k]['label']}: {' '.join(reasons[k].split())}" for k in sorted(reasons) if reasons[k]]
         episodes = [episode for task in tasks for episode in read_part(parts / task["folder"], task["key"]) or []]
         if request.successes:

@@ -375,11 +375,11 @@ def _schedule(agent: Mapping[str, Any]) -> Callable[[float], str]:
     items = (agent.get("person") or {}).get("schedule") or []
     entries = [(_seconds(item["start"]), _seconds(item["end"]), str(item["activity"])) for item in items]
 
-    def planned(time: float) -> str:
+    def activity_at(time: float) -> str:
         second = math.fmod(time, 86400.0)
         return next((activity for start, end, activity in entries if start <= second < end), "")
 
-    return planned
+    return activity_at
 
 
 def _seconds(clock: str) -> float:

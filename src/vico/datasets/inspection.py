@@ -105,7 +105,10 @@ def _check_pictures(dataset: Dataset, pictures: Mapping[str, Any]) -> str:
 
 #: Depth is drawn bright near and dark far, up to so many metres.
 FARTHEST = 50.0
-_SIDE, _GAP, _LINE, _COLUMNS = 192, 8, 15, 4
+_SIDE = 192  # pixels of a picture's side
+_GAP = 8  # pixels between pictures
+_LINE = 15  # pixels of a line of text
+_COLUMNS = 4  # frames beside each other
 _PAPER, _INK, _FAINT = (255, 255, 255), (20, 20, 20), (110, 110, 110)
 _CAPTION_LINES = 2
 

@@ -276,7 +276,7 @@ class Layout:
         before = 0
         for index, episode in enumerate(self.episodes):
             columns = EpisodeColumns.of(index, before, episode, number, goal=bool(self.goal_names))
-            yield columns if self.action_bounds is None else columns.clipped(*self.action_bounds)
+            yield columns if self.action_bounds is None else columns.with_clipped_actions(*self.action_bounds)
             before += episode.frames
 
     def statistics(self) -> dict[str, Statistics]:
@@ -373,7 +373,7 @@ class EpisodeColumns:
         """Seconds since the episode's first frame, by the frames."""
         return (np.arange(len(self)) / self.fps).astype(np.float32)
 
-    def clipped(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> EpisodeColumns:
+    def with_clipped_actions(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> EpisodeColumns:
         """Return them with actions held within bounds."""
         return replace(self, vectors={**self.vectors, "action": np.clip(self.vectors["action"], low, high)})
 

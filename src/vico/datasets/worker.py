@@ -241,10 +241,10 @@ def _play_episode(
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
     keeper = PictureKeeper(work / "pictures", names, size=contents.size, outputs=contents.outputs)
 
-    def told(label: str, step: int, limit: int) -> None:
+    def tell_step(label: str, step: int, limit: int) -> None:
         tell({"label": label, "step": step, "limit": limit})
 
-    hooks: list[Hook] = [keeper, EpisodeProgress(told, task)]
+    hooks: list[Hook] = [keeper, EpisodeProgress(tell_step, task)]
     record = play_task(
         world,
         people,

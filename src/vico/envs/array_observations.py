@@ -256,7 +256,8 @@ def observation_arrays(
 ) -> dict[str, Array]:
     """Return an observation as arrays; see `PARTS`. Rows that nothing is told of are zeros."""
     pose = np.asarray(observation["pose"], np.float64)
-    heading = math.atan2(pose[4], pose[3])
+    ahead = pose[3:]
+    heading = math.atan2(ahead[1], ahead[0])
     state = observation["state"]
     inside = bool(state["room"])
     free = (

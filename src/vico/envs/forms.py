@@ -129,7 +129,7 @@ class ArrayForm:
         self.around = surroundings_of(observation, info, self.public_map)
         self._riding = observation["state"]["vehicle"] == "bike"
         arrays = observation_arrays(observation, self.around, self.public_map, parts=self.parts)
-        return self.joined(arrays) if self._is_flat else arrays
+        return self.join_numbers(arrays) if self._is_flat else arrays
 
     def decode(self, action: Any) -> Any:
         """Return an element of `action_space` as the short form has it; what already is in the short form stays."""
@@ -168,7 +168,7 @@ class ArrayForm:
         mask = self.table.mask(agent, state, self.around, allows=self.allows, riding=self._riding)
         return mask if isinstance(self.action_space, spaces.Discrete) else self.table.parts_mask(mask)
 
-    def joined(self, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    def join_numbers(self, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
         """Return the numbers of all arrays but texts, in their order, float32."""
         return np.concatenate([arrays[name].reshape(-1) for name in self.numeric]).astype(np.float32)
 

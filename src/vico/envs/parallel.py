@@ -109,11 +109,11 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's observations; the same object each time."""
-        return self.forms[self._known(agent)].observation_space
+        return self.forms[self._require_agent(agent)].observation_space
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's actions; the same object each time."""
-        return self.forms[self._known(agent)].action_space
+        return self.forms[self._require_agent(agent)].action_space
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -129,7 +129,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             Not used.
         """
         result = self.begin(seed)
-        return self._told(result)
+        return self._observations_of(result)
 
     def step(
         self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None
@@ -141,7 +141,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         agents make tensors of them.
         """
         result = self.advance(actions, agent_faults)
-        observations, infos = self._told(result)
+        observations, infos = self._observations_of(result)
         over = not self.agents
         return (
             observations,
@@ -192,7 +192,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         """
         if not self.agents:
             raise InputError("env: the episode is over (or has not begun); call reset() before step()")
-        short = {name: self.forms[self._known(name)].decode(action) for name, action in actions.items()}
+        short = {name: self.forms[self._require_agent(name)].decode(action) for name, action in actions.items()}
         result = self.sim.step(short, agent_faults)
         if self.sim.metrics.steps >= self.max_steps:
             if len(result.observations) < len(self.agents):
@@ -230,7 +230,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             raise InputError("env: one of a world in memory cannot go to another process; write the world first")
         return _rebuild_env, (self.world.path, self.community, self.spec, self._setup)
 
-    def _told(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    def _observations_of(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         observations: dict[str, Any] = {}
         infos: dict[str, dict[str, Any]] = {}
         for name in result.observations:
@@ -274,7 +274,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             self._setup(simulation)
         return simulation
 
-    def _known(self, agent: str) -> str:
+    def _require_agent(self, agent: str) -> str:
         if agent not in self.forms:
             raise InputError(f"env: no agent is called {agent!r}; there are {', '.join(self.possible_agents)}")
         return agent

@@ -125,18 +125,18 @@ class Workers:
         try:
             self._pipes[k].send(call)
         except (BrokenPipeError, ConnectionError):
-            raise self._ended(k, call) from None
+            raise self._exit_error(k, call) from None
 
     def _receive(self, k: int, call: Call) -> Any:
         try:
             good, value = self._pipes[k].recv()
         except (EOFError, ConnectionError):
-            raise self._ended(k, call) from None
+            raise self._exit_error(k, call) from None
         if not good:
             raise WorkerError(f"{self._name(k)} failed in {call.method}: {value}")
         return value
 
-    def _ended(self, k: int, call: Call) -> WorkerError:
+    def _exit_error(self, k: int, call: Call) -> WorkerError:
         self._processes[k].join(_PATIENCE)
         code = self._processes[k].exitcode
         if code is not None and code < 0:

@@ -306,7 +306,7 @@ class Gatherer:
                 answers = dict.fromkeys(names, error)
             for name in names:
                 if isinstance(answer := answers[name], Exception):
-                    self._failed(name, answer, gathered)
+                    self._note_failure(name, answer, gathered)
                 else:
                     gathered.actions[name] = answer
         for name in self._alone:
@@ -326,9 +326,9 @@ class Gatherer:
         try:
             gathered.actions[name] = answer()
         except BaseException as error:
-            self._failed(name, error, gathered)
+            self._note_failure(name, error, gathered)
 
-    def _failed(self, name: str, error: BaseException, gathered: Gathered) -> None:
+    def _note_failure(self, name: str, error: BaseException, gathered: Gathered) -> None:
         gathered.failures[name] = failure_of(error)
         log.info("agent %s failed and waits", name, exc_info=error)
 

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import partial
@@ -250,9 +249,11 @@ class ObservationBuilder:
             return Rests(lambda lies: None)
         here = p.position[i], p.room.item(i)
         clear = partial(has_room_to_sit, i=i, state=state)
-        return Rests(lambda lies: find_rest(state.seats, state.indoor, here, self._taken(), lies=lies, has_room=clear))
+        return Rests(
+            lambda lies: find_rest(state.seats, state.indoor, here, self._occupied_seats(), lies=lies, has_room=clear)
+        )
 
-    def _taken(self) -> NDArray[np.bool_]:
+    def _occupied_seats(self) -> NDArray[np.bool_]:
         if self._seats_taken is None:
             self._seats_taken = self._state.seats_taken()
         return self._seats_taken
@@ -264,7 +265,7 @@ class ObservationBuilder:
         heard[[self._index[name] for name in self._heard]] = True
         # What is going on in the city may concern them, too.
         agenda = self._state.environment.agenda
-        if len(agenda) > 0 and agenda.changed:
+        if len(agenda) > 0 and agenda.has_news:
             heard[:] = True
         heard[list(self._closed)] = True
         heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
@@ -540,8 +541,3 @@ def distinct_entities(image: NDArray[np.int32]) -> list[int]:
 def _mark_corners(here, left, above, marks):  # type: ignore[no-untyped-def]
     for i in range(len(marks)):
         marks[i] = (here[i] != left[i]) & (here[i] != above[i])
-
-
-def gaze_vector(yaw: float, pitch: float) -> tuple[float, float, float]:
-    """Return the unit vector of a gaze, ENU; radians."""
-    return math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)

@@ -30,8 +30,10 @@ from vico.datasets.pictures import frames_of_video, joined_video
 from vico.io.files import write_json
 
 VERSION = "v3.0"
-#: Files are filled up to these sizes, MB, as LeRobot does it; a chunk has so many files.
-DATA_MB, VIDEO_MB, CHUNK = 100, 200, 1000
+# Files are filled up as LeRobot does it.
+DATA_MB = 100  # MB of a data file
+VIDEO_MB = 200  # MB of a video
+CHUNK = 1000  # files of a chunk
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"

@@ -210,8 +210,9 @@ class EventSites:
 _INTO_LANE = 4.0
 #: What stands across closed lanes.
 BARRIER = "road_barrier"
-# Stalls stand so far apart, with so much free ground around the middle of each, and of a stage, metres.
-_STALLS_APART, _STALL_ROOM, _STAGE_ROOM = 5.0, 2.2, 5.0
+_STALLS_APART = 5.0  # m between stalls
+_STALL_ROOM = 2.2  # m of free ground around the middle of a stall
+_STAGE_ROOM = 5.0  # m of free ground around the middle of a stage
 # Directions in which it is asked what is there.
 _AROUND = np.array([(np.cos(a), np.sin(a)) for a in np.arange(12) * np.pi / 6])
 # Cars that have run into each other: metres between their middles, and radians that the one behind is askew.
@@ -287,10 +288,15 @@ def _before_lanes(model: str, one: Occurrence, sites: EventSites) -> list[Spot]:
 
 Floats = NDArray[np.float64]
 
-#: Metres that a march goes a second, between its rows, and between two beside each other.
-MARCH_SPEED, ROW_APART, BESIDE_APART = 0.6, 1.4, 0.95
+MARCH_SPEED = 0.6  # m/s of a march
+ROW_APART = 1.4  # m between its rows
+BESIDE_APART = 0.95  # m between two beside each other
 _ROOM = 0.35  # m around who stands
-_NEAREST, _ROWS, _ROW_DEPTH, _VISITORS_APART, _WIDEST = 5.5, 7, 1.2, 1.1, 1.3  # m, rows, m, m and rad of a half circle
+_NEAREST = 5.5  # m from a stage to the first row before it
+_ROWS = 7  # rows before a stage
+_ROW_DEPTH = 1.2  # m from a row to the next
+_VISITORS_APART = 1.1  # m between two of a row
+_WIDEST = 1.3  # rad to either side that a row goes round a stage
 _BEFORE_STALL = 2.0  # m from a stall's middle to who looks at it
 _ENTRY_WITHIN, _ENTRY_EVERY = 70.0, 3.0  # m from the middle to where people come from, and between points tried
 _NO_PLACES: Floats = np.zeros((0, 3))

@@ -183,7 +183,7 @@ class Simulation:
         """Return what finds the hash of the state as it is now, after a step."""
         tick = self.state.tick
 
-        def found() -> str:
+        def current_hash() -> str:
             if (self.metrics.steps, self.state.tick) != (step, tick):
                 raise InputError(
                     f"hash: the simulation has gone on since step {step}; ask a result before the next step"
@@ -193,7 +193,7 @@ class Simulation:
             watch.lap("hash")
             return digest
 
-        return found
+        return current_hash
 
     def act(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> None:
         """Let the agents that are due begin what they ask for, without any time passing; see `step`."""

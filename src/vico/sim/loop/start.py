@@ -7,7 +7,7 @@ made from the world and the configuration.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from typing import TYPE_CHECKING
 
@@ -218,16 +218,41 @@ def point_along(path: NDArray[np.float64], share: float) -> tuple[NDArray[np.flo
     return path[k] + legs[k] * rest, math.atan2(legs[k, 1], legs[k, 0])
 
 
-def place_anywhere(i: int, state: SimulationState, stream: np.random.Generator) -> None:
-    """Put someone on a random reachable sidewalk or open ground."""
-    for _ in range(100):
-        spot = free_ground(
-            state.world.walkable, state.world.walkable.random_point(stream), state.obstacles(), within=5.0
-        )
-        if spot is not None:
-            put_outdoors(i, spot, float(stream.uniform(-math.pi, math.pi)), state)
-            return
-    raise InputError(f"{state.people.names[i]}: found no free ground to start on; let fewer people take part")
+def place_assistants(first: int, places: Mapping[str, Sequence[float]], state: SimulationState, seed: int) -> None:
+    """Put everybody from a number on where a run gives them a place, x, y and yaw by name; else where the seed says.
+
+    Raises
+    ------
+    InputError
+        If nobody is called so, or there is no free ground within a metre.
+    """
+    walkable = state.world.walkable
+    names = state.people.names[first:]
+    unknown = [name for name in places if name not in names]
+    if unknown:
+        raise InputError(f"assistant_places: nobody is called {unknown[0]!r}; there are {', '.join(names) or 'none'}")
+    for i, name in enumerate(names, first):
+        if name not in places:
+            continue
+        x, y, yaw = places[name]
+        spot = free_ground(walkable, np.array([x, y]), state.obstacles(), within=1.0)
+        if spot is None or not walkable.is_connected(spot):
+            raise InputError(
+                f"assistant_places: {name}: at ({x:.1f}, {y:.1f}) there is no free ground that one gets away from; "
+                "give another place"
+            )
+        put_outdoors(i, spot, yaw, state)
+    for i, name in enumerate(names, first):
+        if name in places:
+            continue
+        stream = rng(seed, "spawn", name)
+        for _ in range(100):
+            spot = free_ground(walkable, walkable.random_point(stream), state.obstacles(), within=5.0)
+            if spot is not None:
+                put_outdoors(i, spot, float(stream.uniform(-math.pi, math.pi)), state)
+                break
+        else:
+            raise InputError(f"{name}: found no free ground to start on; let fewer people take part")
 
 
 _NOWHERE = 2**30
@@ -282,29 +307,7 @@ def initial_state(
     events.names = state.names
     events.begin(0, state.second, events.names)
     place_residents(state, days, config.start)
-    # Put everybody from a number on where a run gives them a place, x, y and yaw by name; else where the seed says
-    first = len(residents)
-    places = config.assistant_places
-    seed = config.seed
-    names = state.people.names[first:]
-    unknown = [name for name in places if name not in names]
-    if unknown:
-        raise InputError(f"assistant_places: nobody is called {unknown[0]!r}; there are {', '.join(names) or 'none'}")
-    for i, name in enumerate(names, first):
-        if name not in places:
-            continue
-        x, y, yaw = places[name]
-        walkable = state.world.walkable
-        spot = free_ground(walkable, np.array([x, y]), state.obstacles(), within=1.0)
-        if spot is None or not walkable.is_connected(spot):
-            raise InputError(
-                f"assistant_places: {name}: at ({x:.1f}, {y:.1f}) there is no free ground that one gets away from; "
-                "give another place"
-            )
-        put_outdoors(i, spot, yaw, state)
-    for i, name in enumerate(names, first):
-        if name not in places:
-            place_anywhere(i, state, rng(seed, "spawn", name))
+    place_assistants(len(residents), config.assistant_places, state, config.seed)
     take_umbrella(slice(None), state)
     state.homes = np.full(len(people), -1, np.int32)
     state.homes[: len(residents)] = [base.place_index.get(resident.home, -1) for resident in residents]

@@ -40,9 +40,10 @@ TURN_RATE = 2.0 * math.pi
 #: Seconds for which a door stays open after somebody was in it.
 DOOR_HOLD = 0.4
 _NEAR_GOAL = 0.03  # metres within which nobody turns to where they go
-# Metres behind the closed leaf from which on one is in the room, and where one comes from who leaves it; where one who
-# goes out turns to where they want to go, metres before it; how far before it the step begins.
-_INSIDE, _FROM, _CLEAR, _STEP = 0.75, 0.8, 0.35, 0.45
+_INSIDE = 0.75  # m behind the closed leaf from which on one is in the room
+_FROM = 0.8  # m behind the closed leaf where one comes from who leaves the room
+_CLEAR = 0.35  # m before the closed leaf where one who goes out turns to where they want to go
+_STEP = 0.45  # m before the closed leaf where the step begins
 _PACE = 1.25  # m/s at which people walk through doors
 _PATIENCE = 2.0  # s for which one waits in a door for others
 _IN_LINE = 20.0  # s for which one waits at an open door until nobody is in it
@@ -251,8 +252,10 @@ def _go_out(i: int, number: int, state: SimulationState) -> None:
     state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
 
 
-# Up to the door one takes this long at most, seconds, to so far from it, metres, between these speeds, m/s.
-_WAY_UP, _ARM, _SLOWEST, _FASTEST = 1.0, 0.5, 0.6, 1.55
+_WAY_UP = 1.0  # s that one takes up to the door at most
+_ARM = 0.5  # m from the door to where one stands before it
+_SLOWEST = 0.6  # m/s up to the door at least
+_FASTEST = 1.55  # m/s up to the door at most
 # People walk to the door as soon as they nearly face it, radians.
 _AHEAD, _FACING = 0.6, 0.05
 _NEAR_DOOR = 0.03  # nearer to where one stands at the door nobody walks, metres

@@ -35,12 +35,16 @@ _NORMAL_RANGE = 3.0
 # What a building on the line takes away: sound goes round its corner, dB.
 _CORNER = 20.0
 
-# Noise where nothing else is to be heard, dB: in a street, in a room, in a bus.
-_STREET, _ROOM, _BUS = 45.0, 40.0, 62.0
-# A car at `_PASSING_SPEED`, heard from `_PASSING` metres away, dB; its noise grows with the third power of its speed,
-# and is never less than its engine's.
-_CAR, _ENGINE, _BUS_MORE = 68.0, 50.0, 6.0
-_PASSING, _PASSING_SPEED = 7.5, 50 / 3.6
+# Noise where nothing else is to be heard.
+_STREET = 45.0  # dB
+_ROOM = 40.0  # dB
+_BUS = 62.0  # dB
+# The noise of a car grows with the third power of its speed, and is never less than its engine's.
+_CAR = 68.0  # dB at `_PASSING_SPEED`, heard from `_PASSING` metres away
+_ENGINE = 50.0  # dB at that distance
+_BUS_MORE = 6.0  # dB that a bus or tram is louder than a car
+_PASSING = 7.5  # m
+_PASSING_SPEED = 50 / 3.6  # m/s
 _FAR = 60.0  # metres; vehicles farther away are part of the street's noise
 _NEAREST = 2.0
 
@@ -220,7 +224,7 @@ def known_events(state: SimulationState, i: int, pose: NDArray[np.float64]) -> l
     if not len(agenda):
         return []
     outdoors = i >= len(state.people) or state.people.room.item(i) < 0
-    found = {one.id: _event_record(one, ANNOUNCED, state) for one in agenda.announced}
+    found = {one.id: _event_record(one, ANNOUNCED, state) for one in agenda.announced_events}
     for one in agenda.going_on if outdoors else ():
         how = _how_noticed(one, pose, state)
         if how:

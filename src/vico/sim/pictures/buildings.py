@@ -80,7 +80,7 @@ class ScenePart:
         low, high = np.array(self.low) - margin, np.array(self.high) + margin
         return np.asarray(((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1), np.bool_)
 
-    def drawn(self, shapes: Drawn) -> Drawn:
+    def shapes_in_tiles(self, shapes: Drawn) -> Drawn:
         """Return those of some shapes that stand in the tiles."""
         here = self.holds(shapes.transforms[:, :2, 3])
         return Drawn(shapes.prototypes, shapes.index[here], shapes.transforms[here], shapes.entity[here])
@@ -104,8 +104,9 @@ def _rows(numbers: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return found
 
 
-# Metres a camera may be outside the walls of its room (in a doorway), below the floor, and above it (on stairs).
-_BESIDE, _BELOW, _ABOVE = 1.0, 1.0, 8.0
+_BESIDE = 1.0  # m that a camera may be outside the walls of its room: in a doorway
+_BELOW = 1.0  # m that it may be below the floor
+_ABOVE = 8.0  # m that it may be above the floor: on stairs
 
 
 class RoomsInSight:
@@ -186,7 +187,7 @@ class RoomLamps:
         self._looked_up = -1.0
         self._open = np.zeros(len(world.places), bool)
 
-    def lit(self, state: SimulationState) -> NDArray[np.bool_]:
+    def lit_rooms(self, state: SimulationState) -> NDArray[np.bool_]:
         """Return whether each room is lit now, shape ``(rooms,)``."""
         environment = state.environment
         powered = environment.has_power(self._xy)
@@ -217,7 +218,10 @@ _HOURS = (0.0, 1.5, 5.0, 7.0, 9.0, 15.0, 17.0, 21.0, 22.5, 24.0)
 _LIT = (0.25, 0.06, 0.06, 0.45, 0.40, 0.40, 0.60, 0.70, 0.60, 0.25)
 # With so many lit, a facade looks as it is painted: not every window of a home that is lit shines.
 _USUAL = 0.6
-_CLOSED_SHOP, _CLOSED_OFFICE, _STAIRS = 0.15, 0.10, 0.04
+# Shares of windows that are lit.
+_CLOSED_SHOP = 0.15
+_CLOSED_OFFICE = 0.10
+_STAIRS = 0.04
 
 
 class WindowLights:

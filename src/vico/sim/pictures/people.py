@@ -282,9 +282,9 @@ class DrawnPeople:
             for i in bodies.keys() - wanted:
                 del bodies[i]
         new = [i for i in rows.tolist() if i not in self._bodies]
-        self._bodies |= self._made(new, self._detail)
+        self._bodies |= self._make_bodies(new, self._detail)
         if self._has_far:
-            self._far |= self._made(new, "far")
+            self._far |= self._make_bodies(new, "far")
         for i in new:
             self._describe(i)
         self.rows = rows.copy()
@@ -337,7 +337,7 @@ class DrawnPeople:
         begun = self._being_made.pop(look, None)
         return self._make(look) if begun is None else begun.result()
 
-    def _made(self, rows: Sequence[int], detail: _Detail) -> dict[int, SkinnedBody]:
+    def _make_bodies(self, rows: Sequence[int], detail: _Detail) -> dict[int, SkinnedBody]:
         """Make bodies, those of a look once; who wears one of their own has it in any detail."""
         kinds = list(dict.fromkeys(self.looks[i] for i in rows))
         made = dict(zip(kinds, in_order(partial(body_of, detail=detail), kinds), strict=True))

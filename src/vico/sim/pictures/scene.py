@@ -44,9 +44,10 @@ _LIGHT_EVERY = 60.0
 # Feet of who sits reach so far below where they would be on a seat of one's own height, and above, metres.
 _FEET_HANG, _FEET_RISE = 0.1, 0.3
 _ICE_SHINES = 0.6  # as much as wet ground does
-# Of parts of a city: metres beside one within which all have bodies, and within which they get them when some come
-# there who have none; and of how many too many bodies it is worth to choose anew.
-_BESIDE, _SOON, _SPARE_BODIES = 2.0, 40.0, 100
+# Of parts of a city.
+_BESIDE = 2.0  # m beside one within which all have bodies
+_SOON = 40.0  # m beside one within which they get bodies when some come there who have none
+_SPARE_BODIES = 100  # bodies too many for which it is worth to choose anew
 _OVERCAST = 0.45  # share of the daylight in rooms that a sky full of clouds takes
 
 
@@ -69,7 +70,7 @@ class SceneRenderer:
         self._detail, self._part = detail, part
         self._pictures: PictureSet | None = None
         self._doors = DrawnDoors.of(sim.state.base) if part is None else DrawnDoors(sim.state.base, part)
-        self._scene = self._made(sim)
+        self._scene = self._empty_scene(sim)
         self._attach(sim)
 
     def rebind(self, sim: RenderedSimulation) -> SceneRenderer:
@@ -80,7 +81,7 @@ class SceneRenderer:
         self._attach(sim)
         return self
 
-    def _made(self, sim: RenderedSimulation) -> Scene:
+    def _empty_scene(self, sim: RenderedSimulation) -> Scene:
         """Return the scene of a run, with nothing that moves in its place yet."""
         shapes, part = _shapes(sim, self._doors), self._part
         mirrored = sim.state.traffic is not None and sim.state.traffic.lanes.lefthand
@@ -190,7 +191,7 @@ class SceneRenderer:
         lit += tuple(value for circle in environment.agenda.effects.dark for value in circle)
         self._scene.moment = state.second
         daylight = (1.0 - environment.dark) * (1.0 - _OVERCAST * weather.clouds**2)
-        self._scene.light_rooms(self._room_lamps.lit(state), round(16.0 * daylight) / 16.0)
+        self._scene.light_rooms(self._room_lamps.lit_rooms(state), round(16.0 * daylight) / 16.0)
         if lit != self._lit:
             self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
@@ -204,7 +205,7 @@ class SceneRenderer:
         state = now.state
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
-            self._scene, self._lit = self._made(self._sim), ()
+            self._scene, self._lit = self._empty_scene(self._sim), ()
             self._viewers.scene = self._scene
             self._set_light(state)
         self._people.follow(state)
@@ -222,7 +223,7 @@ class SceneRenderer:
         self._scene.set_skinned(vertices, normals, *shape, drawn=drawn, limbs=limbs)
         moving = [*now.shapes, *draw_in_hands(state, self._holders(motion, rotations, offsets))]
         if self._part is not None:
-            moving = [self._part.drawn(shapes) for shapes in moving]
+            moving = [self._part.shapes_in_tiles(shapes) for shapes in moving]
         doors = self._doors.draw(state) if len(state.leaves) else None
         moving += [] if doors is None else [doors.shapes]
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in moving]

@@ -59,7 +59,7 @@ class EventThings:
         if "entity" in arrays:
             rows = zip(arrays["entity"].tolist(), arrays["pose"].tolist(), arrays["model"].tolist(), strict=True)
             self._standing = {entity: _Thing(model, tuple(pose)) for entity, pose, model in rows}
-        self._bodies = self._joined()
+        self._bodies = self._join_bodies()
 
     def bodies(self) -> Bodies:
         """Return everything that stands."""
@@ -113,7 +113,7 @@ class EventThings:
     def _stand(self, things: dict[int, _Thing]) -> None:
         """Have these things stand, and no others."""
         self._standing = dict(sorted(things.items()))
-        self._bodies = self._joined()
+        self._bodies = self._join_bodies()
 
     def _missing(
         self,
@@ -148,7 +148,7 @@ class EventThings:
             if not len(others) or gaps(thing.outline(), others).min() >= _ROOM
         }
 
-    def _joined(self) -> Bodies:
+    def _join_bodies(self) -> Bodies:
         things = list(self._standing.values())
         sizes = np.array([shape_of(thing.model)[1] for thing in things], np.float64).reshape(-1, 3)
         poses = np.array([thing.pose for thing in things], np.float64).reshape(-1, 4)
