@@ -255,7 +255,7 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
             tasks.append({**where, "label": str(path), "near": "", **_part_name(index, key_of(decides))})
         return tasks
     if request.category == CHALLENGE:
-        return _shown_tasks(request)
+        return _pick_place_tasks(request)
     digests = [read_world(world).digest for world in request.worlds]
     code = code_digest()
     foreign = [part for part in foreign_parts(load_challenge("assistant"), request.method) if ":" in part]
@@ -271,7 +271,7 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
     return tasks
 
 
-def _shown_tasks(request: BuildRequest) -> list[dict[str, Any]]:
+def _pick_place_tasks(request: BuildRequest) -> list[dict[str, Any]]:
     """Return the tasks of pick-and-place episodes, over the worlds in turn, or in a field without any."""
     contents, code = request.contents.record(), code_digest()
     worlds = [(str(world), read_world(world).digest) for world in request.worlds] or [("", "")]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -299,7 +299,7 @@ def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], inst
         goal=goal,
         text=texts,
         status=rows["status"][steps + 1].astype(np.int64),
-        instructions=_instructions(run, agent, told, run.times[own], instruction),
+        instructions=_instructions(agent, told, run.times[own], instruction),
         success=facts.success,
         facts=facts,
     )
@@ -353,33 +353,23 @@ def _period(run: Run, agent: Mapping[str, Any]) -> int:
 
 
 def _instructions(
-    run: Run,
     agent: Mapping[str, Any],
     told: Sequence[Mapping[str, Any] | None],
     times: NDArray[np.float64],
     instruction: str,
 ) -> list[str]:
     """Return what was asked for at each frame: by the task, by the person's schedule, or as the caller says."""
-    planned = _schedule(agent)
+    items = (agent.get("person") or {}).get("schedule") or []
+    entries = [(_seconds(item["start"]), _seconds(item["end"]), str(item["activity"])) for item in items]
     found: list[str] = []
     for one, time in zip(told, times, strict=True):
         if one is not None:
             found.append(str(one["text"]))
         else:
-            found.append(instruction or planned(float(time)) or NO_INSTRUCTION)
+            second = math.fmod(float(time), 86400.0)
+            planned = next((activity for start, end, activity in entries if start <= second < end), "")
+            found.append(instruction or planned or NO_INSTRUCTION)
     return found
-
-
-def _schedule(agent: Mapping[str, Any]) -> Callable[[float], str]:
-    """Return what tells what a resident's day says at a time, seconds since midnight."""
-    items = (agent.get("person") or {}).get("schedule") or []
-    entries = [(_seconds(item["start"]), _seconds(item["end"]), str(item["activity"])) for item in items]
-
-    def activity_at(time: float) -> str:
-        second = math.fmod(time, 86400.0)
-        return next((activity for start, end, activity in entries if start <= second < end), "")
-
-    return activity_at
 
 
 def _seconds(clock: str) -> float:

@@ -199,6 +199,11 @@ def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -
 def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -> dict[str, Any]:
     """Return what is said of a demonstration, as JSON."""
     facts = demonstration.facts
+    unknown = {"kind": "unknown", "name": ""}
+    entities: list[dict[str, Any]] = []
+    for entity in tally.entities:
+        known = next((one[entity] for one in origin.names if entity in one), unknown)
+        entities.append({"entity": entity, "kind": known["kind"], "name": known["name"]})
     return {
         "frames": len(demonstration),
         "fps": demonstration.fps,
@@ -224,15 +229,5 @@ def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -
         "gaps": origin.gaps,
         "tally": tally.record(),
         "statistics": {name: vector_statistics(values) for name, values in vectors_of(demonstration).items()},
-        "entities": _names(tally.entities, origin.names),
+        "entities": entities,
     }
-
-
-def _names(entities: Sequence[int], names: Sequence[Mapping[int, Mapping[str, str]]]) -> list[dict[str, Any]]:
-    """Return kind and name of entities, as far as they are known."""
-    unknown = {"kind": "unknown", "name": ""}
-    found: list[dict[str, Any]] = []
-    for entity in entities:
-        known = next((one[entity] for one in names if entity in one), unknown)
-        found.append({"entity": entity, "kind": known["kind"], "name": known["name"]})
-    return found

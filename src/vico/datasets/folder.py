@@ -323,6 +323,12 @@ class Dataset:
         if layout.goal_names:
             features["observation.environment_state"] = layout.goal_names
         form = layout.form
+        worlds: dict[str, dict[str, Any]] = {}
+        for episode in layout.episodes:
+            about = episode.about["world"]
+            sources = list(episode.about["sources"])
+            known = worlds.setdefault(about["digest"], {**about, "episodes": 0, "sources": sources})
+            known["episodes"] += 1
         return {
             "schema_name": SCHEMA,
             "version": VERSION,
@@ -340,19 +346,10 @@ class Dataset:
             "features": features,
             "action": {"robot": form.robot, "width": form.width, "space": form.space},
             "statuses": {str(value): name for value, name in STATUSES.items()},
-            "worlds": _worlds(layout),
+            "worlds": sorted(worlds.values(), key=lambda world: (world["name"], world["digest"])),
             "made": dict(made),
             "missing": list(missing),
         }
-
-
-def _worlds(layout: Layout) -> list[dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = {}
-    for episode in layout.episodes:
-        world = episode.about["world"]
-        known = found.setdefault(world["digest"], {**world, "episodes": 0, "sources": list(episode.about["sources"])})
-        known["episodes"] += 1
-    return sorted(found.values(), key=lambda world: (world["name"], world["digest"]))
 
 
 def write_tables(folder: Path, layout: Layout) -> None:

@@ -86,14 +86,9 @@ def _check_frame(dataset: Dataset, frame: Mapping[str, Any], place: int, *, last
         dataset.form.decode(frame["action"], (0.0, 0.0, 0.0, 0.0), frame.get("action.text") or "")
     except InputError as error:
         return str(error)
-    return _check_pictures(dataset, frame["pictures"])
-
-
-def _check_pictures(dataset: Dataset, pictures: Mapping[str, Any]) -> str:
-    size = dataset.about.size
-    for output in dataset.about.outputs:
-        picture, (kind, colours) = pictures.get(output), PICTURES[output]
-        shape = (size, size, colours) if colours > 1 else (size, size)
+    for output in about.outputs:
+        picture, (kind, colours) = frame["pictures"].get(output), PICTURES[output]
+        shape = (about.size, about.size, colours) if colours > 1 else (about.size, about.size)
         if picture is None:
             return f"has no {output}"
         if picture.shape != shape:

@@ -18,7 +18,7 @@ import numpy as np
 from vico.challenges.assistant.challenge import ASSISTANT, EpisodeProgress, play_task, world_and_people
 from vico.challenges.assistant.tasks import Task
 from vico.challenges.episodes import code_digest
-from vico.challenges.pick_place.episode import FPS, METHOD, STATE, DemonstratedEpisode, demonstrate
+from vico.challenges.pick_place.episode import FPS, METHOD, STATE, demonstrate
 from vico.challenges.pick_place.tasks import ENTITY_TABLE, SECONDS, level_field
 from vico.challenges.records import Job
 from vico.datasets.demonstrations import Demonstration, EpisodeFacts, demonstrations_of, facts_of_episode, facts_of_run
@@ -103,6 +103,15 @@ def demonstrate_job(
     if not len(made.kept):
         raise EmptyInputError(f"{CHALLENGE}: seed {job['seed']}: nothing was done in it ({made.played.why})")
     kept, played, task = made.kept, made.played, made.task
+    stage = world or level_field(0)
+    origin = Origin(
+        {"name": stage.manifest.name if stage.path is None else stage.path.name, "digest": stage.digest},
+        [source.model_dump(mode="json") for source in stage.manifest.sources],
+        "",
+        f"vico {__version__}",
+        int((np.diff(kept) > 1).sum()),
+        [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, stage.entities],
+    )
     return (
         Demonstration(
             agent=_ROBOT,
@@ -123,18 +132,7 @@ def demonstrate_job(
             facts=EpisodeFacts(CHALLENGE, task.source + " to " + task.destination, METHOD, task.seed, played.success),
         ),
         keeper.close(),
-        _origin(made, world or level_field(0)),
-    )
-
-
-def _origin(made: DemonstratedEpisode, world: World) -> Origin:
-    return Origin(
-        {"name": world.manifest.name if world.path is None else world.path.name, "digest": world.digest},
-        [source.model_dump(mode="json") for source in world.manifest.sources],
-        "",
-        f"vico {__version__}",
-        int((np.diff(made.kept) > 1).sum()),
-        [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, world.entities],
+        origin,
     )
 
 

@@ -217,10 +217,6 @@ def _has_descriptor(stream: Any) -> bool:
     return True
 
 
-#: Seconds agents from elsewhere have for an action unless a run says otherwise.
-DEADLINE = 60.0
-
-
 @dataclass(frozen=True, kw_only=True)
 class Terms:
     """On which terms agents from elsewhere take part.

@@ -76,12 +76,8 @@ def check_pick(values: Values, i: int, state: SimulationState) -> Refusal | None
         return Refusal(ReasonCode.NOT_PORTABLE, f"pick: {values['object']} is nothing that can be carried")
     if objects.hand[k] >= 0:
         return Refusal(ReasonCode.HELD_ALREADY, f"pick: {objects.names[k]} is in somebody's hand")
-    return _refuse_out_of_reach(k, i, state)
-
-
-def _refuse_out_of_reach(k: int, i: int, state: SimulationState) -> Refusal | None:
-    p, what, point = state.people, state.objects.names[k], state.objects.position[k]
-    if int(state.objects.room[k]) != p.room[i]:
+    what, point = objects.names[k], objects.position[k]
+    if int(objects.room[k]) != p.room[i]:
         return Refusal(ReasonCode.ELSEWHERE, f"pick: {what} is not in here")
     away = math.hypot(point[0] - p.position[i, 0], point[1] - p.position[i, 1])
     if away > REACH:
@@ -259,18 +255,10 @@ def _at_point(
     on_another = object_top_below(thing, point, room, state)
     if on_another is not None and on_another[0][2] > height:
         return PlacementPoint(on_another[0], on=on_another[1])
-    return _on_surface(surface, i, thing, state)
-
-
-def _on_surface(
-    spot: NDArray[np.float64], i: int, thing: ObjectBox, state: SimulationState
-) -> PlacementPoint | Refusal:
-    """Return a spot of a surface, or one beside it where something is there."""
-    p, room = state.people, int(state.people.room[i])
-    other = overlapping_entity(thing, spot, room, state)
+    other = overlapping_entity(thing, surface, room, state)
     if other == 0:
-        return PlacementPoint(spot)
-    beside = free_spot_on_surface(thing, spot, room, state, within=_BESIDE)
+        return PlacementPoint(surface)
+    beside = free_spot_on_surface(thing, surface, room, state, within=_BESIDE)
     if beside is None or math.hypot(beside[0] - p.position[i, 0], beside[1] - p.position[i, 1]) > REACH:
         name = state.entity(other)["name"]
         return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {name} is at that point, and there is no room beside it")

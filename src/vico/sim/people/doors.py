@@ -407,8 +407,14 @@ def advance_robots_at_doors(state: SimulationState, dt: float) -> None:
             rooms = state.indoor.rooms
             if robots.ride(robot, dt) < lift_seconds(rooms[room].centre[2] - rooms[origin].centre[2]) - 1e-6:
                 continue
-        if -1 in (origin, room) and not _open_entrance(room if origin < 0 else origin, state):
-            continue
+        if -1 in (origin, room):
+            inside = room if origin < 0 else origin
+            entrance = state.world.places[int(state.indoor.place[inside])].entrance
+            if entrance is not None:
+                number = state.base.entrance_index[entrance]
+                state.leaves.hold(number, _ROBOT_DOOR_HOLD)
+                if state.leaves.share_of(number) < 1.0 - 1e-6:  # it opens
+                    continue
         if robots.pass_door(robot, room, _occupied_discs(robot, room, state)):
             name, position = robots.names[robot], robots.bodies().position[robot]
             if origin < 0 and place is not None:
@@ -424,16 +430,6 @@ def advance_robots_at_doors(state: SimulationState, dt: float) -> None:
     room_of = dict(zip(robots.bodies().entity.tolist(), robots.rooms.tolist(), strict=True))
     for k in carried.tolist():
         objects.room[k] = room_of.get(int(objects.holder[k]), int(objects.room[k]))
-
-
-def _open_entrance(room: int, state: SimulationState) -> bool:
-    """Open the entrance to a room; return whether it is open."""
-    entrance = state.world.places[int(state.indoor.place[room])].entrance
-    if entrance is None:
-        return True
-    number = state.base.entrance_index[entrance]
-    state.leaves.hold(number, _ROBOT_DOOR_HOLD)
-    return state.leaves.share_of(number) >= 1.0 - 1e-6
 
 
 def closed_reason(place: Place, state: SimulationState) -> str:

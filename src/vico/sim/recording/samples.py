@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -151,7 +151,16 @@ class StepSamples:
 
     def tables(self) -> dict[str, pa.Table]:
         """Return all rows as tables, and wait for others."""
-        tables = {name: _concatenate(name, rows) for name, rows in self._rows.items()}
+        tables: dict[str, pa.Table] = {}
+        for name, parts in self._rows.items():
+            columns: dict[str, Any] = {}
+            for key, column in TABLES[name].items():
+                pieces = [part[key] for part in parts]
+                if column.kind == pa.string():
+                    columns[key] = [value for piece in pieces for value in piece]
+                else:
+                    columns[key] = to_stored(np.concatenate([np.zeros(0), *pieces]), column)
+            tables[name] = table_of(name, columns)
         self._begin()
         return tables
 
@@ -299,14 +308,3 @@ def _events(step: int, events: Sequence[Event]) -> Rows:
         "z": position[:, 2],
         "data": [_SORTED.encode(event.data) for event in events],
     }
-
-
-def _concatenate(name: str, parts: Sequence[Rows]) -> pa.Table:
-    columns: dict[str, Any] = {}
-    for key, column in TABLES[name].items():
-        pieces: Iterable[Any] = [part[key] for part in parts]
-        if column.kind == pa.string():
-            columns[key] = [value for piece in pieces for value in piece]
-        else:
-            columns[key] = to_stored(np.concatenate([np.zeros(0), *pieces]), column)
-    return table_of(name, columns)
