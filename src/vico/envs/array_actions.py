@@ -104,11 +104,6 @@ class ActionTable:
         """Type, level, choice, hand."""
         return spaces.MultiDiscrete([len(self.kinds), LEVEL_COUNT, CHOICE_COUNT, 2])
 
-    @property
-    def flat_space(self) -> spaces.Discrete:
-        """The number of an entry of `menu`."""
-        return spaces.Discrete(len(self.menu))
-
     def action_of(self, entry: Entry, around: Surroundings, *, riding: bool = False) -> dict[str, Any]:
         """Return what numbers stand for, as the short form has it.
 

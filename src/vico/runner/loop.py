@@ -126,7 +126,9 @@ class Runner:
         places, people = [place.id for place in sim.world.places], sim.state.people.names
         names = set(sim.agents)
         if self.states_every:
-            self._check_states()
+            _, failures = self.agents.states()
+            for name, failure in failures.items():
+                raise InputError(f"{name}: {failure.reason}")
         sim.look_away = self.agents.look_away()
         observations, infos = sim.observe(sim.due)
         for hook in self.hooks:
@@ -186,8 +188,3 @@ class Runner:
         if not self.faults.counts[name, failure.kind]:
             log.warning("%s: %s at step %d, and waits: %s", name, failure.kind, number, failure.reason)
         self.faults.add(number, name, failure.kind, failure.reason)
-
-    def _check_states(self) -> None:
-        _, failures = self.agents.states()
-        for name, failure in failures.items():
-            raise InputError(f"{name}: {failure.reason}")

@@ -210,7 +210,7 @@ class ObservationBuilder:
         return sensors | {
             "pose": self.poses[i].copy(),
             "events": [message.record() for message in self._heard.get(name, ())],
-            "state": self._state_of(i),
+            "state": self._robots[i] if i in self._robots else agent_state(i, self._state),
         }
 
     def info(self, name: str) -> dict[str, Any]:
@@ -285,9 +285,6 @@ class ObservationBuilder:
             seen=view.body[people],
             distance=view.distance[people],
         )
-
-    def _state_of(self, i: int) -> dict[str, Any]:
-        return self._robots[i] if i in self._robots else agent_state(i, self._state)
 
 
 def _pad(values: NDArray[Any], length: int, value: int | bool) -> NDArray[Any]:
@@ -374,7 +371,7 @@ def agent_state(i: int, state: SimulationState) -> dict[str, Any]:
         "room": room.id if room else "",
         "place": place.id if place else "",
         "accessible_places": state.accessible_places(i),
-        "doors": state.doors_of(i),
+        "doors": state.doors_in(p.room.item(i)),
         "posture": _POSTURES[p.posture.item(i)],
         "action_status": _STATUSES[p.status.item(i)],
         "action_code": code_name(p.reason_code.item(i)),
