@@ -250,7 +250,9 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
             run = read_run(path)
             chosen_agents(run, request.contents)  # what is wrong with a run is said before anything is made
             decides = {"run": run.manifest["identity"], "hashes": run.hashes[-1], "last": run.last}
-            decides |= {"files": _task_hashes(run.path), "contents": contents}
+            here = run.path.resolve()
+            about = [here / "episode.json", here / "task.json", here.parent.parent / "episodes" / f"{here.name}.json"]
+            decides |= {"files": [sha256_of(one) for one in about if one.exists()], "contents": contents}
             where = {"run": str(path.resolve()), "world": None if given is None else str(given.resolve())}
             tasks.append({**where, "label": str(path), "near": "", **_part_name(index, key_of(decides))})
         return tasks
@@ -312,13 +314,6 @@ def made_from(request: BuildRequest) -> dict[str, Any]:
 
 def _part_name(index: int, key: str) -> dict[str, str]:
     return {"key": key, "folder": f"{index:06d}.{key[:16]}"}
-
-
-def _task_hashes(run: Path) -> list[str]:
-    """Return hashes of what is said of a run's episode."""
-    path = run.resolve()
-    beside = [path / "episode.json", path / "task.json", path.parent.parent / "episodes" / f"{path.name}.json"]
-    return [sha256_of(one) for one in beside if one.exists()]
 
 
 def _check_request(request: BuildRequest) -> None:

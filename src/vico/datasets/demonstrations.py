@@ -77,7 +77,12 @@ def facts_of_episode(record: EpisodeRecord, task: Mapping[str, Any]) -> EpisodeF
     instructions: list[dict[str, Any]] = []
     persons: list[str] = []
     if record.challenge == "assistant":
-        asked = _assistant_task(task)
+        try:
+            asked = Task.model_validate(task)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"]) or "task"
+            raise SchemaError(f"task: {where}: {first['msg']}; play the episode anew") from None
         instructions = asked.instructions()
         persons = [subtask.person.agent for subtask in asked.subtasks]
     return EpisodeFacts(
@@ -109,27 +114,15 @@ def facts_of_run(run: Path, seed: int) -> EpisodeFacts:
         return EpisodeFacts(seed=seed)
     content = read_json(episode)
     record = record_of(content.get("episode") if isinstance(content, dict) else None)
-    task = next((path for path in (run / TASK_FILE, *_tasks_for(run, record)) if path.exists()), None)
-    if task is None:
-        raise SchemaError(f"{episode}: the task of the episode is not beside it (tasks/*.json, or {run / TASK_FILE})")
-    return facts_of_episode(record, read_json(task))
-
-
-def _tasks_for(run: Path, record: EpisodeRecord) -> list[Path]:
-    """Return the files of tasks that an evaluation left for an episode; one, unless it has several settings."""
+    # The files of tasks that an evaluation left for an episode: one, unless it has several settings.
     path = run.resolve()
     parts = path.name.split(".")  # category, method, world, seed, key
     world = parts[2] if len(parts) == 5 else "*"
-    return sorted((path.parent.parent / "tasks").glob(f"{record.category}.{world}.{record.seed}.*.json"))
-
-
-def _assistant_task(task: Mapping[str, Any]) -> Task:
-    try:
-        return Task.model_validate(task)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "task"
-        raise SchemaError(f"task: {where}: {first['msg']}; play the episode anew") from None
+    tasks = sorted((path.parent.parent / "tasks").glob(f"{record.category}.{world}.{record.seed}.*.json"))
+    task = next((path for path in (run / TASK_FILE, *tasks) if path.exists()), None)
+    if task is None:
+        raise SchemaError(f"{episode}: the task of the episode is not beside it (tasks/*.json, or {run / TASK_FILE})")
+    return facts_of_episode(record, read_json(task))
 
 
 def current_part(actions: Sequence[Any], parts: int) -> list[int]:

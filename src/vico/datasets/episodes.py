@@ -137,14 +137,6 @@ class Tally:
         return found
 
 
-def vectors_of(demonstration: Demonstration) -> dict[str, NDArray[Any]]:
-    """Return what statistics are told of, by the name that trainers know it by."""
-    found: dict[str, NDArray[Any]] = {"observation.state": demonstration.state, "action": demonstration.action}
-    if demonstration.goal is not None:
-        found["observation.environment_state"] = demonstration.goal
-    return found
-
-
 @dataclass(frozen=True)
 class Origin:
     """Where a demonstration comes from.
@@ -199,6 +191,9 @@ def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -
 def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -> dict[str, Any]:
     """Return what is said of a demonstration, as JSON."""
     facts = demonstration.facts
+    columns = {"observation.state": demonstration.state, "action": demonstration.action}
+    if demonstration.goal is not None:
+        columns["observation.environment_state"] = demonstration.goal
     unknown = {"kind": "unknown", "name": ""}
     entities: list[dict[str, Any]] = []
     for entity in tally.entities:
@@ -228,6 +223,6 @@ def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -
         "goal": demonstration.goal is not None,
         "gaps": origin.gaps,
         "tally": tally.record(),
-        "statistics": {name: vector_statistics(values) for name, values in vectors_of(demonstration).items()},
+        "statistics": {name: vector_statistics(values) for name, values in columns.items()},
         "entities": entities,
     }

@@ -127,7 +127,10 @@ def write_contact_sheet(path: Path, dataset: Dataset, episode: int, *, frames: i
         raise InputError(f"dataset show: {frames} frames; give 1 to 200")
     if path.suffix.lower() != ".png":
         raise InputError(f"dataset show: {path.name}: pictures are written as .png; give such a name")
-    length = _length(dataset, episode)
+    rows = dataset.episodes()
+    if not 0 <= episode < len(rows):
+        raise InputError(f"{dataset.path}: no episode {episode}; there are 0 to {len(rows) - 1}")
+    length = int(rows[episode]["frames"])
     wanted = set(np.unique(np.linspace(0, length - 1, min(frames, length)).round().astype(int)).tolist())
     chosen = [frame for k, frame in enumerate(dataset.frames(episode)) if k in wanted]
     sheet = _draw_sheet(dataset, episode, chosen, length)
@@ -137,13 +140,6 @@ def write_contact_sheet(path: Path, dataset: Dataset, episode: int, *, frames: i
         {key: value for key, value in frame.items() if key != "pictures"} | {"does": _frame_caption(dataset, frame)}
         for frame in chosen
     ]
-
-
-def _length(dataset: Dataset, episode: int) -> int:
-    rows = dataset.episodes()
-    if not 0 <= episode < len(rows):
-        raise InputError(f"{dataset.path}: no episode {episode}; there are 0 to {len(rows) - 1}")
-    return int(rows[episode]["frames"])
 
 
 def _draw_sheet(dataset: Dataset, episode: int, chosen: Sequence[Mapping[str, Any]], length: int) -> Image.Image:

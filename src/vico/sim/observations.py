@@ -295,7 +295,11 @@ def _pad(values: NDArray[Any], length: int, value: int | bool) -> NDArray[Any]:
 def bodies_in_view(state: SimulationState, stances: NDArray[np.float64], residents: NDArray[np.int64]) -> AllInView:
     """Return what residents, given by their indices, have in view; `stances` as from `poses`."""
     p = state.people
-    feet, mine = stances[residents], _spaces(state)
+    # The space of each avatar: outdoors, its room, or its bus.
+    mine = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
+    in_bus = p.vehicle == Vehicle.BUS
+    mine[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
+    feet = stances[residents]
     eyes = Viewpoints(
         feet[:, :3] + np.column_stack([np.zeros((len(residents), 2)), eye_height(state)[residents]]),
         p.yaw[residents],
@@ -307,15 +311,6 @@ def bodies_in_view(state: SimulationState, stances: NDArray[np.float64], residen
     spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
     sight = state.environment.sight_of(bodies.position, spaces >= 0)
     return in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities, sight=sight)
-
-
-def _spaces(state: SimulationState) -> NDArray[np.int64]:
-    """Return in which space each avatar is, as `Eyes.space`: outdoors, its room, or its bus."""
-    p = state.people
-    spaces = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
-    in_bus = p.vehicle == Vehicle.BUS
-    spaces[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
-    return spaces
 
 
 def _where_robot_is(robot: int, state: SimulationState) -> dict[str, Any]:
