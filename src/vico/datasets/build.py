@@ -67,7 +67,7 @@ SPLITS = (TRAIN, VALIDATION, TEST)
 
 @dataclass(frozen=True)
 class SplitRule:
-    """How episodes are split.
+    """Rule by which episodes are split.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class SplitRule:
 
 @dataclass(frozen=True)
 class Member:
-    """What decides in which split an episode is.
+    """Facts that decide in which split an episode is.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def _keys(member: Member, by: By) -> list[str]:
 
 @dataclass(frozen=True)
 class BuildRequest:
-    """What a dataset is to be made of, and how.
+    """Request for a dataset: what it is made of, and how.
 
     Attributes
     ----------
@@ -368,7 +368,7 @@ _MARKED = {"schema_name": "vico.dataset.build", "version": 1}
 
 @dataclass(frozen=True)
 class Built:
-    """What came of a build.
+    """Result of a build.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ EPISODE_FILE, TASK_FILE = "episode.json", "task.json"
 
 @dataclass(frozen=True)
 class EpisodeFacts:
-    """What a dataset tells of the episode that a demonstration is of.
+    """Facts of the episode that a demonstration is of.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a dataset says of each of its episodes: a row of ``episodes.parquet``, and its statistics.
+"""Facts of each episode of a dataset: a row of ``episodes.parquet``, and its statistics.
 
 Statistics are exact, of vectors and of pictures, for an episode and for all, as formats of trainers want them.
 """
@@ -139,7 +139,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a demonstration comes from.
+    """Origin of a demonstration.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a dataset holds beside what its format wants: ``dataset.json``, ``episodes.parquet``, ``entities.parquet``.
+"""Files of a dataset beside those of its format: ``dataset.json``, ``episodes.parquet``, ``entities.parquet``.
 
 And its card in ``README.md``: what a person who finds the folder wants to know.
 """
@@ -267,7 +267,7 @@ class Dataset:
 
     @property
     def form(self) -> VectorForm:
-        """How its action vectors are read."""
+        """Form of its action vectors."""
         return action_form_of(**self.about.action)
 
     def episodes(self) -> list[dict[str, Any]]:

@@ -68,7 +68,7 @@ class PickPlaceJob:
 
     @property
     def label(self) -> str:
-        """What it is called in messages."""
+        """Name in messages."""
         return f"{CHALLENGE}, {Path(self.world).name or FIELD}, seed {self.seed}"
 
 

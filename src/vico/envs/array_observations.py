@@ -60,7 +60,7 @@ class NearbyEntity:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is around an agent, nearest first.
+    """Surroundings of an agent, nearest first.
 
     Attributes
     ----------

@@ -200,7 +200,7 @@ class ArrayForm:
 
 
 class Form(Protocol):
-    """How one agent is told of what it observes, and how it answers."""
+    """Form of one agent's observations and actions."""
 
     observation_space: spaces.Space[Any]
     action_space: spaces.Space[Any]

@@ -1,4 +1,4 @@
-"""What an environment is made from, as a record that goes to JSON and back, and environments by id.
+"""Specification of an environment, a record that goes to JSON and back, and environments by id.
 
 ``gymnasium.make("vico/Community-v0", ...)`` works once `register_ids` has run, and PettingZoo's registry where it has
 one.
@@ -67,7 +67,7 @@ class EnvOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class EnvSpec(SimSettings):
-    """What an environment is made from, beside the settings of its simulation.
+    """Specification of an environment: its options beside the settings of its simulation.
 
     Attributes
     ----------

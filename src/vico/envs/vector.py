@@ -42,7 +42,7 @@ def boxes_of(space: spaces.Space[Any], where: SpacePath = ()) -> Iterator[tuple[
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the arrays of several environments lie in a block of memory.
+    """Layout of the arrays of several environments in a block of memory.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an isolated agent reaches for and is not given: refused in its process, and reported.
+"""Audit of an isolated agent: what it reaches for and is not given is refused in its process, and reported.
 
 Python tells audit hooks (PEP 578) of files that are opened and of looks at frames and at the garbage collector's list
 of objects, and finders of the modules that are imported. This is a lock for honest people and lazy cheats, not a

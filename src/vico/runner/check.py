@@ -45,7 +45,7 @@ class AgentFinding:
 
 @dataclass
 class AgentCheck:
-    """What a check came to.
+    """Result of a check.
 
     Attributes
     ----------

@@ -61,7 +61,7 @@ class Failure:
 
     @property
     def outcome(self) -> AgentFault:
-        """What the simulation is told of it."""
+        """Outcome for the simulation: a status and a reason."""
         return (ActionStatus.LATE if self.kind == "late" else ActionStatus.FAILED), self.reason
 
 
@@ -92,7 +92,7 @@ class FaultLog:
 
     @property
     def count(self) -> int:
-        """How many there were."""
+        """Number of faults."""
         return self.counts.total()
 
     def add(self, step: int, agent: str, kind: FaultKind, reason: str) -> None:
@@ -186,7 +186,7 @@ class Gathered:
 
     @property
     def agent_faults(self) -> dict[str, AgentFault]:
-        """What `vico.sim.loop.simulation.Simulation.step` is told of those who failed."""
+        """Faults of those who failed, for `vico.sim.loop.simulation.Simulation.step`."""
         return {name: failure.outcome for name, failure in self.failures.items()}
 
 

@@ -19,7 +19,7 @@ from vico.world.public import PublicMap
 
 @dataclass(frozen=True)
 class AgentSeat:
-    """What an agent may be told when it is made: its constructor names what it wants of it as arguments.
+    """Facts that an agent may have when it is made: its constructor names those that it wants as arguments.
 
     Attributes
     ----------

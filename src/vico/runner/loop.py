@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Step:
-    """What a step was.
+    """Record of a step.
 
     Attributes
     ----------

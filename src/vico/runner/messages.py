@@ -1,4 +1,4 @@
-"""What passes between a run and its agents: copies of observations, answers as plain data, messages to a process.
+"""Messages between a run and its agents: copies of observations, answers as plain data, messages to a process.
 
 Agents are given copies, through which nothing of the simulation can be reached or changed. An action is a small dict
 of text and numbers, whatever came. A message to an agent's process is plain data with its length before it, nothing
@@ -90,7 +90,7 @@ def _plain_scalar(value: Any, name: str) -> Any:
 
 
 class ListedInView:
-    """What an agent has in view, as `vico.sim.perception.InView` tells it, in a list of its own.
+    """Bodies that an agent has in view, as `vico.sim.perception.InView` tells it, in a list of its own.
 
     Parameters
     ----------

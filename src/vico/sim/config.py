@@ -1,4 +1,4 @@
-"""What one run is asked to be: a frozen record; change a copy with `dataclasses.replace`.
+"""Configuration of a run: a frozen record; change a copy with `dataclasses.replace`.
 
 `find_by_name` finds agents, things and vehicles by what people call them: ``resident_3``, ``Ann Lee``, ``husky``.
 """
@@ -37,7 +37,7 @@ LIMITS = {"robots": 100, "assistants": 1_000, "cars": 2_000, "cyclists": 1_000, 
 
 @dataclass(frozen=True, kw_only=True)
 class SimSettings:
-    """What a simulation's configuration and an environment's spec have in common: who and what is there.
+    """Settings that a simulation's configuration and an environment's spec share: who and what is there.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What agents are given after each step: their own state, what they heard, who is in view, and pictures.
+"""Observations of agents after each step: their own state, what they heard, who is in view, and pictures.
 
 `ObservationBuilder` makes all but the pictures from a state. Observations are made when somebody asks for them
 (`Observations`), and wait for their pictures then.
@@ -167,7 +167,7 @@ def _closed_to(state: SimulationState, i: int) -> list[str]:
 
 
 class ObservationBuilder:
-    """What agents are told of a moment, but for pictures.
+    """Builder of the observations of a moment, but for pictures.
 
     Parameters
     ----------
@@ -467,7 +467,7 @@ def observe(
 
 
 class _Pictures:
-    """What some agents see, by their names in the order of the views."""
+    """Pictures of some agents, by their names in the order of the views."""
 
     def __init__(self, views: Views, renderer: ObservationRenderer, names: Sequence[str]) -> None:
         self._views, self._renderer = views, renderer

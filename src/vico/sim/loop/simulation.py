@@ -44,7 +44,7 @@ _PAGES_EVERY = 60
 
 @dataclass(frozen=True)
 class StepResult:
-    """What a step brought.
+    """Result of a step.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a run folder tells of the run as a whole: ``run.json``, ``agents.json`` and ``cast.jsonl``.
+"""Files of a run folder about the run as a whole: ``run.json``, ``agents.json`` and ``cast.jsonl``.
 
 The cast is who and what takes part, and from when to when: a log that grows as bodies come and go. A line of
 ``cast.jsonl`` tells of one body: with ``kind``, ``name``, ``size`` and ``agent``, that it is there from ``step`` on, or

@@ -62,7 +62,7 @@ _KEPT = 4
 
 @dataclass(frozen=True)
 class Tracks:
-    """Where everything was in a range of steps.
+    """Positions of everything in a range of steps.
 
     Attributes
     ----------
@@ -391,7 +391,7 @@ def read_run(path: Path | str) -> Run:
 
 @dataclass(frozen=True)
 class JointPoses:
-    """How people hold themselves at a step.
+    """Poses of people at a step.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a recording takes from a simulation at a step, as rows of the tables.
+"""Samples that a recording takes from a simulation at a step, as rows of the tables.
 
 Actions are kept as text: whatever an agent handed in, good or not, in a bounded line of JSON.
 """

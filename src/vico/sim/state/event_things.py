@@ -1,4 +1,4 @@
-"""What stands in the city while an event goes on: bodies like all others, set up where there is room for them."""
+"""Things that stand in the city while an event goes on: bodies like all others, set up where there is room for them."""
 
 from __future__ import annotations
 
