@@ -81,7 +81,7 @@ def transport(side: int, steps: int) -> tuple[float, float]:
             for _ in range(steps):
                 (answer,) = workers.ask([Call("step", (0,))])
                 if shared:
-                    arrays.batched([answer[0]])
+                    arrays.batch([answer[0]])
             found.append((time.perf_counter() - began) / steps * 1000.0)
         finally:
             workers.close()

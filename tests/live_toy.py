@@ -65,7 +65,8 @@ def live_toy(
             with recorder:
                 faults = FaultLog()
                 hooks = [RecordedRun(recorder, faults, notes=hands.notes), viewer]
-                Runner(sim, agents, hooks=hooks, faults=faults, director=hands).run(steps, until=lambda: hands.over)
+                runner = Runner(sim, agents, hooks=hooks, faults=faults, director=hands.before_step)
+                runner.run(steps, until=lambda: hands.over)
             hands.end()
 
         thread = threading.Thread(target=run)

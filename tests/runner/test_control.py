@@ -48,7 +48,7 @@ def played(out: Path, script: list[InterventionLine], *, steps: int = 12) -> lis
     control = Control(out, script=script)
     with Recorder(out, sim, sources={}, wanted=steps) as recorder:
         hooks = [RecordedRun(recorder, FaultLog(), notes=control.notes)]
-        Runner(sim, agents, hooks=hooks, states_every=4, director=control).run(steps)
+        Runner(sim, agents, hooks=hooks, states_every=4, director=control.before_step).run(steps)
     return read_run(out).hashes
 
 
@@ -107,7 +107,8 @@ def test_an_interrupted_run_with_interventions_goes_on_as_if_it_had_not_been(
     control.restore(checkpoint.notes, out=out, step=checkpoint.step)
     assert len(read_interventions(out)) == 3
     with recorder:
-        Runner(sim, agents, hooks=[RecordedRun(recorder, FaultLog(), notes=control.notes)], director=control).run(12)
+        hooks = [RecordedRun(recorder, FaultLog(), notes=control.notes)]
+        Runner(sim, agents, hooks=hooks, director=control.before_step).run(12)
     assert read_run(out).hashes == changed[1]
     assert read_interventions(out) == DONE
 

@@ -33,7 +33,7 @@ def lit(hour: int, *, cut: bool = False, lies: bool = False) -> list[bool]:
     state.people.room[0], state.people.posture[0] = SHOP, Posture.LYING if lies else Posture.STANDING
     if cut:
         state.environment.start_event("power_cut", region=(-6.0, 11.0, 5.0))
-    return RoomLamps(state.world, date(2026, 6, 11)).lit(state).tolist()
+    return RoomLamps(state.world, date(2026, 6, 11)).lit_rooms(state).tolist()
 
 
 def test_rooms_are_lit_by_day_when_they_are_open_and_when_somebody_is_awake_in_them() -> None:

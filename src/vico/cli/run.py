@@ -396,8 +396,9 @@ class Job:
             if viewer is not None:
                 viewer.show(recorder, leg.agents)
                 hooks.append(viewer)
+            director = None if control is None else control.before_step
             runner = Runner(
-                leg.sim, leg.agents, hooks=hooks, states_every=leg.every, faults=leg.faults, director=control
+                leg.sim, leg.agents, hooks=hooks, states_every=leg.every, faults=leg.faults, director=director
             )
             runner.run(steps, until=lambda: bool(asked) or (control is not None and control.over))
             elsewhere = control is not None and control.switch is not None and not asked

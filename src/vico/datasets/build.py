@@ -17,7 +17,7 @@ from vico.challenges.episodes import code_digest
 from vico.challenges.pick_place.episode import METHOD
 from vico.challenges.pick_place.tasks import SECONDS
 from vico.challenges.records import Job, Setting, foreign_parts, load_challenge
-from vico.datasets.folder import DATASET_FOLDER, Dataset, card_of, write_dataset_record, write_tables
+from vico.datasets.folder import DATASET_FOLDER, RECORD, Dataset, card_of, write_tables
 from vico.datasets.formats.registry import FORMATS
 from vico.datasets.layout import Contents, Layout, PartEpisode, key_of, read_part
 from vico.datasets.pictures import PICTURES
@@ -67,7 +67,7 @@ SPLITS = (TRAIN, VALIDATION, TEST)
 
 @dataclass(frozen=True)
 class SplitRule:
-    """How episodes are split.
+    """Rule by which episodes are split.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class SplitRule:
 
 @dataclass(frozen=True)
 class Member:
-    """What decides in which split an episode is.
+    """Facts that decide in which split an episode is.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def _keys(member: Member, by: By) -> list[str]:
 
 @dataclass(frozen=True)
 class BuildRequest:
-    """What a dataset is to be made of, and how.
+    """Request for a dataset: what it is made of, and how.
 
     Attributes
     ----------
@@ -250,12 +250,14 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
             run = read_run(path)
             chosen_agents(run, request.contents)  # what is wrong with a run is said before anything is made
             decides = {"run": run.manifest["identity"], "hashes": run.hashes[-1], "last": run.last}
-            decides |= {"files": _task_hashes(run.path), "contents": contents}
+            here = run.path.resolve()
+            about = [here / "episode.json", here / "task.json", here.parent.parent / "episodes" / f"{here.name}.json"]
+            decides |= {"files": [sha256_of(one) for one in about if one.exists()], "contents": contents}
             where = {"run": str(path.resolve()), "world": None if given is None else str(given.resolve())}
             tasks.append({**where, "label": str(path), "near": "", **_part_name(index, key_of(decides))})
         return tasks
     if request.category == CHALLENGE:
-        return _shown_tasks(request)
+        return _pick_place_tasks(request)
     digests = [read_world(world).digest for world in request.worlds]
     code = code_digest()
     foreign = [part for part in foreign_parts(load_challenge("assistant"), request.method) if ":" in part]
@@ -271,7 +273,7 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
     return tasks
 
 
-def _shown_tasks(request: BuildRequest) -> list[dict[str, Any]]:
+def _pick_place_tasks(request: BuildRequest) -> list[dict[str, Any]]:
     """Return the tasks of pick-and-place episodes, over the worlds in turn, or in a field without any."""
     contents, code = request.contents.record(), code_digest()
     worlds = [(str(world), read_world(world).digest) for world in request.worlds] or [("", "")]
@@ -314,13 +316,6 @@ def _part_name(index: int, key: str) -> dict[str, str]:
     return {"key": key, "folder": f"{index:06d}.{key[:16]}"}
 
 
-def _task_hashes(run: Path) -> list[str]:
-    """Return hashes of what is said of a run's episode."""
-    path = run.resolve()
-    beside = [path / "episode.json", path / "task.json", path.parent.parent / "episodes" / f"{path.name}.json"]
-    return [sha256_of(one) for one in beside if one.exists()]
-
-
 def _check_request(request: BuildRequest) -> None:
     contents = request.contents
     if contents.to not in FORMATS:
@@ -337,7 +332,14 @@ def _check_request(request: BuildRequest) -> None:
         if len({path.resolve() for path in request.runs}) < len(request.runs):
             raise InputError("dataset: a run is given twice; its frames would count twice")
         return
-    _check_increments(request)
+    drop, clip = request.contents.drop_below, request.clip
+    if not (drop >= 0.0 and 0.0 <= clip < 0.5):
+        raise InputError(
+            f"dataset: increments below {drop} dropped, a share of {clip} cut at each end; give 0 or more, and 0 up to "
+            "less than 0.5"
+        )
+    if (drop or clip) and request.category != CHALLENGE:
+        raise InputError(f"dataset: only actions of {CHALLENGE} are increments, of which small ones are dropped or cut")
     if request.category == CHALLENGE and request.episodes >= 1:
         return
     if not request.worlds or request.episodes < 1:
@@ -355,17 +357,6 @@ def _check_request(request: BuildRequest) -> None:
             )
 
 
-def _check_increments(request: BuildRequest) -> None:
-    drop, clip = request.contents.drop_below, request.clip
-    if not (drop >= 0.0 and 0.0 <= clip < 0.5):
-        raise InputError(
-            f"dataset: increments below {drop} dropped, a share of {clip} cut at each end; give 0 or more, and 0 up to "
-            "less than 0.5"
-        )
-    if (drop or clip) and request.category != CHALLENGE:
-        raise InputError(f"dataset: only actions of {CHALLENGE} are increments, of which small ones are dropped or cut")
-
-
 #: Told how many of how many episodes are there, and how many of their frames.
 Report = Callable[[int, int], None]
 
@@ -377,7 +368,7 @@ _MARKED = {"schema_name": "vico.dataset.build", "version": 1}
 
 @dataclass(frozen=True)
 class Built:
-    """What came of a build.
+    """Result of a build.
 
     Attributes
     ----------
@@ -414,7 +405,14 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
     tasks = tasks_of(request)
     check_replaceable(out, force=force, kind=DATASET_FOLDER)
     partial = out.with_name(f"{out.name}.partial")
-    _take(partial)
+    # The folder of the parts is taken up where it is one; what a kill left while the mark was written is ours, too.
+    if partial.is_dir() and any(not path.name.startswith(f".{_MARK}") for path in partial.iterdir()):
+        if not (partial / _MARK).exists() or read_json(partial / _MARK) != _MARKED:
+            raise InputError(f"{partial}: holds something else than parts of a dataset; choose another --out")
+    else:
+        with write_errors(partial):
+            partial.mkdir(parents=True, exist_ok=True)
+        write_json(partial / _MARK, _MARKED)
     with FolderLock(partial, name=out):
         parts = partial / "parts"
         remove_path(parts / ".scratch")
@@ -422,7 +420,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
         options = {"parts": str(shared), "contents": request.contents.record()}
         reasons: dict[int, str] = {}
 
-        def done(index: int, answer: Answer) -> None:
+        def note_answer(index: int, answer: Answer) -> None:
             reasons[index] = answer.reason
             if report is not None:
                 report(len(reasons), len(tasks))
@@ -432,7 +430,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
             shared_store_marker(shared, executor) as seen,
         ):
             service = Service(MAKER, {**options, "seen": seen, "code": code_digest()})
-            executor.run(service, [Task(task, near=task["near"]) for task in tasks], done=done)
+            executor.run(service, [Task(task, near=task["near"]) for task in tasks], done=note_answer)
         missing = [f"{tasks[k]['label']}: {' '.join(reasons[k].split())}" for k in sorted(reasons) if reasons[k]]
         episodes = [episode for task in tasks for episode in read_part(parts / task["folder"], task["key"]) or []]
         if request.successes:
@@ -472,32 +470,11 @@ def _write_dataset(folder: Path, layout: Layout, request: BuildRequest, missing:
     write_tables(folder, layout)
     made = made_from(request)
     record = Dataset.record_of(layout, made, missing)
-    write_bytes(folder / "README.md", card_of(layout, record, _size(folder)).encode())
+    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    write_bytes(folder / "README.md", card_of(layout, record, size).encode())
     files = {
         path.relative_to(folder).as_posix(): sha256_of(path) for path in sorted(folder.rglob("*")) if path.is_file()
     }
     record = {**record, "files": files}
-    write_dataset_record(folder, record)
+    write_json(folder / RECORD, record)  # the last file of a dataset
     return record
-
-
-def _size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-
-
-def _take(partial: Path) -> None:
-    """Make the folder of the parts, or take up the one that is there.
-
-    Raises
-    ------
-    InputError
-        If it is somebody else's.
-    """
-    # What a kill left while the mark was written is not somebody else's.
-    if partial.is_dir() and any(not path.name.startswith(f".{_MARK}") for path in partial.iterdir()):
-        if not (partial / _MARK).exists() or read_json(partial / _MARK) != _MARKED:
-            raise InputError(f"{partial}: holds something else than parts of a dataset; choose another --out")
-        return
-    with write_errors(partial):
-        partial.mkdir(parents=True, exist_ok=True)
-    write_json(partial / _MARK, _MARKED)

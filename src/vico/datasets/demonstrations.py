@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ EPISODE_FILE, TASK_FILE = "episode.json", "task.json"
 
 @dataclass(frozen=True)
 class EpisodeFacts:
-    """What a dataset tells of the episode that a demonstration is of.
+    """Facts of the episode that a demonstration is of.
 
     Attributes
     ----------
@@ -77,7 +77,12 @@ def facts_of_episode(record: EpisodeRecord, task: Mapping[str, Any]) -> EpisodeF
     instructions: list[dict[str, Any]] = []
     persons: list[str] = []
     if record.challenge == "assistant":
-        asked = _assistant_task(task)
+        try:
+            asked = Task.model_validate(task)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"]) or "task"
+            raise SchemaError(f"task: {where}: {first['msg']}; play the episode anew") from None
         instructions = asked.instructions()
         persons = [subtask.person.agent for subtask in asked.subtasks]
     return EpisodeFacts(
@@ -103,36 +108,21 @@ def facts_of_run(run: Path, seed: int) -> EpisodeFacts:
     SchemaError
         If a file is damaged.
     """
-    episode = next((path for path in (run / EPISODE_FILE, _file_beside(run, "episodes")) if path.exists()), None)
+    beside = run.resolve().parent.parent / "episodes" / f"{run.resolve().name}.json"
+    episode = next((path for path in (run / EPISODE_FILE, beside) if path.exists()), None)
     if episode is None:
         return EpisodeFacts(seed=seed)
     content = read_json(episode)
     record = record_of(content.get("episode") if isinstance(content, dict) else None)
-    task = next((path for path in (run / TASK_FILE, *_tasks_for(run, record)) if path.exists()), None)
-    if task is None:
-        raise SchemaError(f"{episode}: the task of the episode is not beside it (tasks/*.json, or {run / TASK_FILE})")
-    return facts_of_episode(record, read_json(task))
-
-
-def _file_beside(run: Path, folder: str) -> Path:
-    return run.resolve().parent.parent / folder / f"{run.resolve().name}.json"
-
-
-def _tasks_for(run: Path, record: EpisodeRecord) -> list[Path]:
-    """Return the files of tasks that an evaluation left for an episode; one, unless it has several settings."""
+    # The files of tasks that an evaluation left for an episode: one, unless it has several settings.
     path = run.resolve()
     parts = path.name.split(".")  # category, method, world, seed, key
     world = parts[2] if len(parts) == 5 else "*"
-    return sorted((path.parent.parent / "tasks").glob(f"{record.category}.{world}.{record.seed}.*.json"))
-
-
-def _assistant_task(task: Mapping[str, Any]) -> Task:
-    try:
-        return Task.model_validate(task)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "task"
-        raise SchemaError(f"task: {where}: {first['msg']}; play the episode anew") from None
+    tasks = sorted((path.parent.parent / "tasks").glob(f"{record.category}.{world}.{record.seed}.*.json"))
+    task = next((path for path in (run / TASK_FILE, *tasks) if path.exists()), None)
+    if task is None:
+        raise SchemaError(f"{episode}: the task of the episode is not beside it (tasks/*.json, or {run / TASK_FILE})")
+    return facts_of_episode(record, read_json(task))
 
 
 def current_part(actions: Sequence[Any], parts: int) -> list[int]:
@@ -257,11 +247,13 @@ def demonstrations_of(
 
 def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], instruction: str) -> Demonstration:
     period = _period(run, agent)
-    steps = _due_steps(run, period)
+    # An agent acts at multiples of its period, but not at the run's last step.
+    ticks = np.rint((run.times - run.times[0]) * TICKS_PER_SECOND).astype(np.int64)
+    steps = np.flatnonzero(ticks[:-1] % period == 0)
     rows = _rows_of(run, "agents", agent["entity"]) | {"time": run.times}
     body = _rows_of(run, "bodies", agent["entity"])
     pose = np.column_stack([body[name] for name in _WORLD_POSE])
-    actions = [_action(text) for text in rows["action"]]
+    actions = [None if text is None else json.loads(text) for text in rows["action"]]
     # What a row says of actions happened on the way to its step.
     taken = [actions[step + 1] for step in steps]
     own = [int(step) for step in steps]
@@ -270,7 +262,16 @@ def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], inst
     else:
         model, form, names = "person", ActionForm(), PERSON_STATE
         state = recorded_person_states(rows | {name: body[name] for name in _WORLD_POSE})
-    vectors, texts = _action_vectors(form, taken, pose[own], f"{run.path}: {agent['name']}")
+    poses = pose[own]
+    who = f"{run.path}: {agent['name']}"
+    vectors = np.zeros((len(taken), len(form.names)), np.float32)
+    texts: list[str] = []
+    for k, action in enumerate(taken):
+        try:
+            vectors[k], text = form.encode(action, poses[k].tolist())
+        except InputError as error:
+            raise InputError(f"{who}: step {k}: {error}") from None
+        texts.append(text)
     parts = current_part(taken, len(facts.instructions))
     # An agent that shares the task with others is told of all of it.
     told = [facts.instructions[part] if facts.instructions else None for part in parts]
@@ -291,7 +292,7 @@ def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], inst
         goal=goal,
         text=texts,
         status=rows["status"][steps + 1].astype(np.int64),
-        instructions=_instructions(run, agent, told, run.times[own], instruction),
+        instructions=_instructions(agent, told, run.times[own], instruction),
         success=facts.success,
         facts=facts,
     )
@@ -304,24 +305,6 @@ def _rows_of(run: Run, table: str, entity: int) -> dict[str, NDArray[Any]]:
     found = {name: values[mine] for name, values in columns.items()}
     order = np.argsort(found["step"], kind="stable")
     return {name: values[order] for name, values in found.items()}
-
-
-def _action(text: str | None) -> Any:
-    return None if text is None else json.loads(text)
-
-
-def _action_vectors(
-    form: ActionForm, actions: Sequence[Any], poses: NDArray[np.float64], who: str
-) -> tuple[NDArray[np.float32], list[str]]:
-    vectors = np.zeros((len(actions), len(form.names)), np.float32)
-    texts: list[str] = []
-    for k, action in enumerate(actions):
-        try:
-            vectors[k], text = form.encode(action, poses[k].tolist())
-        except InputError as error:
-            raise InputError(f"{who}: step {k}: {error}") from None
-        texts.append(text)
-    return vectors, texts
 
 
 def _robot(
@@ -362,40 +345,24 @@ def _period(run: Run, agent: Mapping[str, Any]) -> int:
     return ticks
 
 
-def _due_steps(run: Run, period: int) -> NDArray[np.int64]:
-    """Return the steps at which an agent acted: those at multiples of its period, but for the run's last."""
-    ticks = np.rint((run.times - run.times[0]) * TICKS_PER_SECOND).astype(np.int64)
-    return np.flatnonzero(ticks[:-1] % period == 0)
-
-
 def _instructions(
-    run: Run,
     agent: Mapping[str, Any],
     told: Sequence[Mapping[str, Any] | None],
     times: NDArray[np.float64],
     instruction: str,
 ) -> list[str]:
     """Return what was asked for at each frame: by the task, by the person's schedule, or as the caller says."""
-    planned = _schedule(agent)
+    items = (agent.get("person") or {}).get("schedule") or []
+    entries = [(_seconds(item["start"]), _seconds(item["end"]), str(item["activity"])) for item in items]
     found: list[str] = []
     for one, time in zip(told, times, strict=True):
         if one is not None:
             found.append(str(one["text"]))
         else:
-            found.append(instruction or planned(float(time)) or NO_INSTRUCTION)
+            second = math.fmod(float(time), 86400.0)
+            planned = next((activity for start, end, activity in entries if start <= second < end), "")
+            found.append(instruction or planned or NO_INSTRUCTION)
     return found
-
-
-def _schedule(agent: Mapping[str, Any]) -> Callable[[float], str]:
-    """Return what tells what a resident's day says at a time, seconds since midnight."""
-    items = (agent.get("person") or {}).get("schedule") or []
-    entries = [(_seconds(item["start"]), _seconds(item["end"]), str(item["activity"])) for item in items]
-
-    def planned(time: float) -> str:
-        second = math.fmod(time, 86400.0)
-        return next((activity for start, end, activity in entries if start <= second < end), "")
-
-    return planned
 
 
 def _seconds(clock: str) -> float:

@@ -1,4 +1,4 @@
-"""What a dataset says of each of its episodes: a row of ``episodes.parquet``, and its statistics.
+"""Facts of each episode of a dataset: a row of ``episodes.parquet``, and its statistics.
 
 Statistics are exact, of vectors and of pictures, for an episode and for all, as formats of trainers want them.
 """
@@ -137,17 +137,9 @@ class Tally:
         return found
 
 
-def vectors_of(demonstration: Demonstration) -> dict[str, NDArray[Any]]:
-    """Return what statistics are told of, by the name that trainers know it by."""
-    found: dict[str, NDArray[Any]] = {"observation.state": demonstration.state, "action": demonstration.action}
-    if demonstration.goal is not None:
-        found["observation.environment_state"] = demonstration.goal
-    return found
-
-
 @dataclass(frozen=True)
 class Origin:
-    """Where a demonstration comes from.
+    """Origin of a demonstration.
 
     Attributes
     ----------
@@ -183,12 +175,15 @@ def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -
     """
     manifest = run.manifest
     cast = {entity: {"kind": body.kind, "name": body.name} for entity, body in run.cast.items()}
+    # After how many frames more time passed than a frame lasts, such as at appointments.
+    gaps = int((np.diff(run.times[demonstration.steps]) > 1.0 / demonstration.fps + 1e-6).sum())
+    name = run.source("world").name if world is None or world.path is None else world.path.name
     return Origin(
-        {"name": _world_name(run, world), "digest": manifest["world"]["digest"]},
+        {"name": name, "digest": manifest["world"]["digest"]},
         [] if world is None else [source.model_dump(mode="json") for source in world.manifest.sources],
         manifest["state_hash"],
         manifest["producer"],
-        _gaps(demonstration, run),
+        gaps,
         [cast] if world is None else [cast, world.entities],
     )
 
@@ -196,6 +191,14 @@ def origin_of_run(demonstration: Demonstration, run: Run, world: World | None) -
 def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -> dict[str, Any]:
     """Return what is said of a demonstration, as JSON."""
     facts = demonstration.facts
+    columns = {"observation.state": demonstration.state, "action": demonstration.action}
+    if demonstration.goal is not None:
+        columns["observation.environment_state"] = demonstration.goal
+    unknown = {"kind": "unknown", "name": ""}
+    entities: list[dict[str, Any]] = []
+    for entity in tally.entities:
+        known = next((one[entity] for one in origin.names if entity in one), unknown)
+        entities.append({"entity": entity, "kind": known["kind"], "name": known["name"]})
     return {
         "frames": len(demonstration),
         "fps": demonstration.fps,
@@ -220,26 +223,6 @@ def episode_record(demonstration: Demonstration, tally: Tally, origin: Origin) -
         "goal": demonstration.goal is not None,
         "gaps": origin.gaps,
         "tally": tally.record(),
-        "statistics": {name: vector_statistics(values) for name, values in vectors_of(demonstration).items()},
-        "entities": _names(tally.entities, origin.names),
+        "statistics": {name: vector_statistics(values) for name, values in columns.items()},
+        "entities": entities,
     }
-
-
-def _world_name(run: Run, world: World | None) -> str:
-    return run.source("world").name if world is None or world.path is None else world.path.name
-
-
-def _gaps(demonstration: Demonstration, run: Run) -> int:
-    """Return after how many frames more time passed than a frame lasts, such as at appointments."""
-    times = run.times[demonstration.steps]
-    return int((np.diff(times) > 1.0 / demonstration.fps + 1e-6).sum())
-
-
-def _names(entities: Sequence[int], names: Sequence[Mapping[int, Mapping[str, str]]]) -> list[dict[str, Any]]:
-    """Return kind and name of entities, as far as they are known."""
-    unknown = {"kind": "unknown", "name": ""}
-    found: list[dict[str, Any]] = []
-    for entity in entities:
-        known = next((one[entity] for one in names if entity in one), unknown)
-        found.append({"entity": entity, "kind": known["kind"], "name": known["name"]})
-    return found

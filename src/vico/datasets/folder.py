@@ -1,4 +1,4 @@
-"""What a dataset holds beside what its format wants: ``dataset.json``, ``episodes.parquet``, ``entities.parquet``.
+"""Files of a dataset beside those of its format: ``dataset.json``, ``episodes.parquet``, ``entities.parquet``.
 
 And its card in ``README.md``: what a person who finds the folder wants to know.
 """
@@ -17,7 +17,7 @@ from vico.datasets.formats.registry import FORMATS
 from vico.datasets.layout import IMAGES, STATUSES, Layout
 from vico.datasets.vectors import SPACE, VectorForm, action_form_of
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.io.files import FolderKind, files_of_manifest, read_json, sha256_of, write_json
+from vico.io.files import FolderKind, files_of_manifest, read_json, sha256_of
 from vico.version import __version__
 
 _UNITS = {
@@ -61,9 +61,10 @@ def _summary(layout: Layout, record: Mapping[str, Any], size: int) -> str:
     judged = record["judged"]
     success = f"{record['successes']} of {judged} judged ones did all that was asked for" if judged else "nobody judged"
     hours = layout.frames / layout.fps / 3600.0
-    rows = [
-        f"| {name} | {end - first} | {_frames(layout, first, end):,} |" for name, (first, end) in layout.splits.items()
-    ]
+    rows = []
+    for name, (first, end) in layout.splits.items():
+        frames = sum(episode.frames for episode in layout.episodes[first:end])
+        rows.append(f"| {name} | {end - first} | {frames:,} |")
     return "\n".join(
         [
             f"# Demonstrations of {what}",
@@ -80,10 +81,6 @@ def _summary(layout: Layout, record: Mapping[str, Any], size: int) -> str:
             f"Split by {made['split_by']}: no {made['split_by']} is in two splits.",
         ]
     )
-
-
-def _frames(layout: Layout, first: int, end: int) -> int:
-    return sum(episode.frames for episode in layout.episodes[first:end])
 
 
 def _contents(layout: Layout, record: Mapping[str, Any]) -> str:
@@ -270,7 +267,7 @@ class Dataset:
 
     @property
     def form(self) -> VectorForm:
-        """How its action vectors are read."""
+        """Form of its action vectors."""
         return action_form_of(**self.about.action)
 
     def episodes(self) -> list[dict[str, Any]]:
@@ -326,6 +323,12 @@ class Dataset:
         if layout.goal_names:
             features["observation.environment_state"] = layout.goal_names
         form = layout.form
+        worlds: dict[str, dict[str, Any]] = {}
+        for episode in layout.episodes:
+            about = episode.about["world"]
+            sources = list(episode.about["sources"])
+            known = worlds.setdefault(about["digest"], {**about, "episodes": 0, "sources": sources})
+            known["episodes"] += 1
         return {
             "schema_name": SCHEMA,
             "version": VERSION,
@@ -343,19 +346,10 @@ class Dataset:
             "features": features,
             "action": {"robot": form.robot, "width": form.width, "space": form.space},
             "statuses": {str(value): name for value, name in STATUSES.items()},
-            "worlds": _worlds(layout),
+            "worlds": sorted(worlds.values(), key=lambda world: (world["name"], world["digest"])),
             "made": dict(made),
             "missing": list(missing),
         }
-
-
-def _worlds(layout: Layout) -> list[dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = {}
-    for episode in layout.episodes:
-        world = episode.about["world"]
-        known = found.setdefault(world["digest"], {**world, "episodes": 0, "sources": list(episode.about["sources"])})
-        known["episodes"] += 1
-    return sorted(found.values(), key=lambda world: (world["name"], world["digest"]))
 
 
 def write_tables(folder: Path, layout: Layout) -> None:
@@ -374,8 +368,3 @@ def write_tables(folder: Path, layout: Layout) -> None:
     ]
     schema = pa.schema({"episode_index": pa.int64(), "entity": pa.int64(), "kind": pa.string(), "name": pa.string()})
     pq.write_table(pa.Table.from_pylist(rows, schema), folder / ENTITIES, compression="zstd")
-
-
-def write_dataset_record(folder: Path, record: Mapping[str, Any]) -> None:
-    """Write ``dataset.json``, the last file of a dataset."""
-    write_json(folder / RECORD, record)

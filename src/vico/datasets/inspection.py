@@ -23,7 +23,6 @@ from vico.datasets.worker import world_of_run
 from vico.errors import InputError, MissingExtraError, VicoError
 from vico.io.files import new_file
 from vico.sim.recording import Run, read_run
-from vico.world.world import World
 
 Report = Callable[[int, int], None]
 
@@ -87,14 +86,9 @@ def _check_frame(dataset: Dataset, frame: Mapping[str, Any], place: int, *, last
         dataset.form.decode(frame["action"], (0.0, 0.0, 0.0, 0.0), frame.get("action.text") or "")
     except InputError as error:
         return str(error)
-    return _check_pictures(dataset, frame["pictures"])
-
-
-def _check_pictures(dataset: Dataset, pictures: Mapping[str, Any]) -> str:
-    size = dataset.about.size
-    for output in dataset.about.outputs:
-        picture, (kind, colours) = pictures.get(output), PICTURES[output]
-        shape = (size, size, colours) if colours > 1 else (size, size)
+    for output in about.outputs:
+        picture, (kind, colours) = frame["pictures"].get(output), PICTURES[output]
+        shape = (about.size, about.size, colours) if colours > 1 else (about.size, about.size)
         if picture is None:
             return f"has no {output}"
         if picture.shape != shape:
@@ -106,7 +100,10 @@ def _check_pictures(dataset: Dataset, pictures: Mapping[str, Any]) -> str:
 
 #: Depth is drawn bright near and dark far, up to so many metres.
 FARTHEST = 50.0
-_SIDE, _GAP, _LINE, _COLUMNS = 192, 8, 15, 4
+_SIDE = 192  # pixels of a picture's side
+_GAP = 8  # pixels between pictures
+_LINE = 15  # pixels of a line of text
+_COLUMNS = 4  # frames beside each other
 _PAPER, _INK, _FAINT = (255, 255, 255), (20, 20, 20), (110, 110, 110)
 _CAPTION_LINES = 2
 
@@ -130,7 +127,10 @@ def write_contact_sheet(path: Path, dataset: Dataset, episode: int, *, frames: i
         raise InputError(f"dataset show: {frames} frames; give 1 to 200")
     if path.suffix.lower() != ".png":
         raise InputError(f"dataset show: {path.name}: pictures are written as .png; give such a name")
-    length = _length(dataset, episode)
+    rows = dataset.episodes()
+    if not 0 <= episode < len(rows):
+        raise InputError(f"{dataset.path}: no episode {episode}; there are 0 to {len(rows) - 1}")
+    length = int(rows[episode]["frames"])
     wanted = set(np.unique(np.linspace(0, length - 1, min(frames, length)).round().astype(int)).tolist())
     chosen = [frame for k, frame in enumerate(dataset.frames(episode)) if k in wanted]
     sheet = _draw_sheet(dataset, episode, chosen, length)
@@ -142,13 +142,6 @@ def write_contact_sheet(path: Path, dataset: Dataset, episode: int, *, frames: i
     ]
 
 
-def _length(dataset: Dataset, episode: int) -> int:
-    rows = dataset.episodes()
-    if not 0 <= episode < len(rows):
-        raise InputError(f"{dataset.path}: no episode {episode}; there are 0 to {len(rows) - 1}")
-    return int(rows[episode]["frames"])
-
-
 def _draw_sheet(dataset: Dataset, episode: int, chosen: Sequence[Mapping[str, Any]], length: int) -> Image.Image:
     row = dataset.episodes()[episode]
     outputs = dataset.about.outputs or ["none"]
@@ -156,7 +149,17 @@ def _draw_sheet(dataset: Dataset, episode: int, chosen: Sequence[Mapping[str, An
     cell_width = _SIDE + _GAP
     cell_height = len(outputs) * (_SIDE + 2) + _CAPTION_LINES * _LINE + _GAP
     width = max(columns * cell_width + _GAP, 640)
-    heading = _heading(row, length, dataset.about.fps, width // 7)
+    fps = dataset.about.fps
+    letters = width // 7
+    verdict = {True: "done", False: "not done", None: "not judged"}[row["success"]]
+    method = f", method {row['method']}" if row["method"] else ""
+    about = (
+        f"Episode {row['episode_index']} ({row['split']}): {row['agent']} in {row['world']}, seed {row['seed']}{method}"
+        f"; {length} frames at {fps} a second; {verdict}"
+    )
+    heading = textwrap.wrap(about, letters)
+    for instruction in row["instructions"][:3]:
+        heading += textwrap.wrap(f"\u201c{instruction}\u201d", letters)
     top = _GAP + _LINE * len(heading) + _GAP
     rows = -(-len(chosen) // columns)
     sheet = Image.new("RGB", (width, top + rows * cell_height), _PAPER)
@@ -175,19 +178,6 @@ def _draw_sheet(dataset: Dataset, episode: int, chosen: Sequence[Mapping[str, An
             (x, below + _LINE), textwrap.shorten(_frame_caption(dataset, frame), 30, placeholder="..."), _INK, font
         )
     return sheet
-
-
-def _heading(row: Mapping[str, Any], length: int, fps: int, letters: int) -> list[str]:
-    verdict = {True: "done", False: "not done", None: "not judged"}[row["success"]]
-    method = f", method {row['method']}" if row["method"] else ""
-    about = (
-        f"Episode {row['episode_index']} ({row['split']}): {row['agent']} in {row['world']}, seed {row['seed']}{method}"
-        f"; {length} frames at {fps} a second; {verdict}"
-    )
-    lines = textwrap.wrap(about, letters)
-    for instruction in row["instructions"][:3]:
-        lines += textwrap.wrap(f"\u201c{instruction}\u201d", letters)
-    return lines
 
 
 def _frame_caption(dataset: Dataset, frame: Mapping[str, Any]) -> str:
@@ -254,7 +244,15 @@ def write_rerun(out: Path, path: Path, *, world: Path | None = None, report: Rep
         stream = rerun.RecordingStream("vico", recording_id=run.manifest["state_hash"])
         stream.save(temporary)
         if place is not None:
-            _log_world(rerun, stream, place)
+            # What stands still: outlines of buildings, at the ground and at the top of the roof.
+            lines: list[NDArray[np.float64]] = []
+            for building in place.buildings:
+                for ring in building.footprint[:1]:
+                    outline = np.array([*ring, ring[0]], np.float64)[:, :2]
+                    for height in (building.base, building.base + building.height):
+                        lines.append(np.column_stack([outline, np.full(len(outline), height)]))
+            stream.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+            stream.log("world/buildings", rerun.LineStrips3D(lines, colors=[(120, 120, 120)]), static=True)
         for first in range(0, run.last + 1, _STEPS):
             last = min(first + _STEPS - 1, run.last)
             _log_steps(rerun, stream, run, first, last)
@@ -283,18 +281,6 @@ def _set_time(stream: Any, step: int, time: float) -> None:
     stream.set_time("time", duration=time)
 
 
-def _log_world(rerun: ModuleType, stream: Any, world: World) -> None:
-    """Log what stands still: outlines of buildings, at the ground and at the top of the roof."""
-    lines: list[NDArray[np.float64]] = []
-    for building in world.buildings:
-        for ring in building.footprint[:1]:
-            outline = np.array([*ring, ring[0]], np.float64)[:, :2]
-            for height in (building.base, building.base + building.height):
-                lines.append(np.column_stack([outline, np.full(len(outline), height)]))
-    stream.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    stream.log("world/buildings", rerun.LineStrips3D(lines, colors=[(120, 120, 120)]), static=True)
-
-
 def _log_steps(rerun: ModuleType, stream: Any, run: Run, first: int, last: int) -> None:
     tracks = run.tracks(first, last)
     members = [run.cast[int(entity)] for entity in tracks.entity]
@@ -309,12 +295,14 @@ def _log_steps(rerun: ModuleType, stream: Any, run: Run, first: int, last: int) 
         there = np.isfinite(tracks.position[k, :, 0])
         for kind in dict.fromkeys(kinds.tolist()):
             mine = np.flatnonzero(there & (kinds == kind))
+            yaw = tracks.yaw[k, mine]
+            zero = np.zeros(len(yaw))
             stream.log(
                 f"world/bodies/{kind}",
                 rerun.Boxes3D(
                     centers=tracks.position[k, mine] + half[mine] * (0.0, 0.0, 1.0),
                     half_sizes=half[mine],
-                    quaternions=_yaw_quaternions(tracks.yaw[k, mine]),
+                    quaternions=np.column_stack([zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)]),
                     labels=[members[i].agent or "" for i in mine],
                     show_labels=False,
                     colors=[_COLOURS.get(kind, _OTHER_COLOUR)],
@@ -337,9 +325,3 @@ def _actions(run: Run, first: int, last: int) -> Iterator[tuple[int, list[tuple[
                 outcome = "" if record.status == "ok" else f" ({record.status}: {record.reason})"
                 words.append((name, action_caption(record.action) + outcome))
         yield step, words
-
-
-def _yaw_quaternions(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return turns about the vertical as quaternions x, y, z, w."""
-    zero = np.zeros(len(yaw))
-    return np.column_stack([zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)])

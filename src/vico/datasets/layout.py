@@ -1,4 +1,4 @@
-"""What all formats have in common: the episodes in their order, the splits, the names of what vectors hold.
+"""Layout that all formats have in common: the episodes in their order, the splits, the names of what vectors hold.
 
 A part is what came of one episode, in a folder that appears whole or not at all; a layout puts parts together.
 """
@@ -35,7 +35,7 @@ _PART = "part.json"
 
 @dataclass(frozen=True)
 class Contents:
-    """What a dataset holds of every frame.
+    """Contents of every frame of a dataset.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class PartEpisode:
 
     @property
     def frames(self) -> int:
-        """How many it has."""
+        """Number of frames."""
         return int(self.about["frames"])
 
     def table(self) -> pa.Table:
@@ -223,22 +223,22 @@ class Layout:
 
     @property
     def body(self) -> str:
-        """What acts: ``person``, or a robot's model."""
+        """Kind of body that acts: ``person``, or a robot's model."""
         return str(self.episodes[0].about["body"])
 
     @property
     def state_names(self) -> list[str]:
-        """What the numbers of ``observation.state`` are."""
+        """Names of the numbers of ``observation.state``."""
         return list(self.episodes[0].about["state_names"])
 
     @property
     def goal_names(self) -> list[str]:
-        """What the numbers of ``observation.environment_state`` are; empty without tasks."""
+        """Names of the numbers of ``observation.environment_state``; empty without tasks."""
         return list(GOAL) if self.episodes[0].about["goal"] else []
 
     @property
     def form(self) -> VectorForm:
-        """How actions are made of vectors, and vectors of actions."""
+        """Form that makes actions of vectors, and vectors of actions."""
         about = self.episodes[0].about
         return action_form_of(robot=self.body != "person", width=about["width"], space=about["space"])
 
@@ -276,7 +276,7 @@ class Layout:
         before = 0
         for index, episode in enumerate(self.episodes):
             columns = EpisodeColumns.of(index, before, episode, number, goal=bool(self.goal_names))
-            yield columns if self.action_bounds is None else columns.clipped(*self.action_bounds)
+            yield columns if self.action_bounds is None else columns.with_clipped_actions(*self.action_bounds)
             before += episode.frames
 
     def statistics(self) -> dict[str, Statistics]:
@@ -373,7 +373,7 @@ class EpisodeColumns:
         """Seconds since the episode's first frame, by the frames."""
         return (np.arange(len(self)) / self.fps).astype(np.float32)
 
-    def clipped(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> EpisodeColumns:
+    def with_clipped_actions(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> EpisodeColumns:
         """Return them with actions held within bounds."""
         return replace(self, vectors={**self.vectors, "action": np.clip(self.vectors["action"], low, high)})
 

@@ -43,7 +43,7 @@ class PictureWriter(Protocol):
 
 @dataclass(frozen=True)
 class PictureFiles:
-    """Where a demonstration's encoded pictures lie."""
+    """Files of a demonstration's encoded pictures."""
 
     folder: Path
     stem: str
@@ -211,7 +211,7 @@ Pictures = Mapping[str, NDArray[Any]]
 
 
 class PictureSource(Protocol):
-    """Where an agent's pictures come from."""
+    """Source of an agent's pictures."""
 
     def of(self, agent: str, steps: Sequence[int], *, size: int, outputs: Sequence[str]) -> Iterator[Pictures]:
         """Yield an agent's pictures at steps, in their order: by output, ``(size, size)``, rgb ``(size, size, 3)``.

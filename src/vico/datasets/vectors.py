@@ -186,7 +186,7 @@ _TEXTS = ("text", "name")
 
 @dataclass(frozen=True)
 class ActionForm:
-    """How actions of one kind of agent become vectors.
+    """Form in which actions of one kind of agent become vectors.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ class ActionForm:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """What each number of a vector is."""
+        """Names of the numbers of a vector."""
         vector = (f"vector.{k}" for k in range(self.width))
         return (*(f"type.{name}" for name in self.types), *_SLOTS, *vector)
 
@@ -370,7 +370,7 @@ class IncrementForm:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each number of a vector is, rad and metres."""
+        """Names of the numbers of a vector, rad and metres."""
         return INCREMENTS
 
     def decode(self, vector: Sequence[float] | NDArray[Any], pose: Sequence[float], text: str = "") -> dict[str, Any]:

@@ -18,7 +18,7 @@ import numpy as np
 from vico.challenges.assistant.challenge import ASSISTANT, EpisodeProgress, play_task, world_and_people
 from vico.challenges.assistant.tasks import Task
 from vico.challenges.episodes import code_digest
-from vico.challenges.pick_place.episode import FPS, METHOD, STATE, DemonstratedEpisode, demonstrate
+from vico.challenges.pick_place.episode import FPS, METHOD, STATE, demonstrate
 from vico.challenges.pick_place.tasks import ENTITY_TABLE, SECONDS, level_field
 from vico.challenges.records import Job
 from vico.datasets.demonstrations import Demonstration, EpisodeFacts, demonstrations_of, facts_of_episode, facts_of_run
@@ -68,7 +68,7 @@ class PickPlaceJob:
 
     @property
     def label(self) -> str:
-        """What it is called in messages."""
+        """Name in messages."""
         return f"{CHALLENGE}, {Path(self.world).name or FIELD}, seed {self.seed}"
 
 
@@ -89,7 +89,8 @@ def demonstrate_job(
     EmptyInputError
         If nothing was done in it.
     """
-    world = _pick_place_world(job["world"])
+    path = job["world"]
+    world = _read_world(Path(path)) if path else None
     keeper = PictureKeeper(work / "pictures", [_ROBOT], size=contents.size, outputs=contents.outputs)
     made = demonstrate(
         job["seed"],
@@ -101,49 +102,38 @@ def demonstrate_job(
     )
     if not len(made.kept):
         raise EmptyInputError(f"{CHALLENGE}: seed {job['seed']}: nothing was done in it ({made.played.why})")
-    return _demonstration(made), keeper.close(), _origin(made, world or level_field(0))
-
-
-def _demonstration(made: DemonstratedEpisode) -> Demonstration:
     kept, played, task = made.kept, made.played, made.task
-    return Demonstration(
-        agent=_ROBOT,
-        kind="robot",
-        body="manipulator",
-        person="",
-        steps=kept,
-        fps=FPS,
-        state_names=STATE,
-        form=IncrementForm(),
-        state=played.states[kept],
-        action=played.actions[kept],
-        goal=None,
-        text=[""] * len(kept),
-        status=np.full(len(kept), ActionStatus.OK.value, np.int64),
-        instructions=[task.instruction] * len(kept),
-        success=played.success,
-        facts=EpisodeFacts(CHALLENGE, task.source + " to " + task.destination, METHOD, task.seed, played.success),
-    )
-
-
-def _origin(made: DemonstratedEpisode, world: World) -> Origin:
-    return Origin(
-        {"name": world.manifest.name if world.path is None else world.path.name, "digest": world.digest},
-        [source.model_dump(mode="json") for source in world.manifest.sources],
+    stage = world or level_field(0)
+    origin = Origin(
+        {"name": stage.manifest.name if stage.path is None else stage.path.name, "digest": stage.digest},
+        [source.model_dump(mode="json") for source in stage.manifest.sources],
         "",
         f"vico {__version__}",
-        int((np.diff(made.kept) > 1).sum()),
-        [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, world.entities],
+        int((np.diff(kept) > 1).sum()),
+        [{ENTITY_TABLE: {"kind": "table", "name": "table"}}, stage.entities],
     )
-
-
-def _pick_place_world(path: str) -> World | None:
-    return _read_pick_place_world(Path(path)) if path else None
-
-
-@lru_cache(maxsize=2)
-def _read_pick_place_world(path: Path) -> World:
-    return read_world(path)
+    return (
+        Demonstration(
+            agent=_ROBOT,
+            kind="robot",
+            body="manipulator",
+            person="",
+            steps=kept,
+            fps=FPS,
+            state_names=STATE,
+            form=IncrementForm(),
+            state=played.states[kept],
+            action=played.actions[kept],
+            goal=None,
+            text=[""] * len(kept),
+            status=np.full(len(kept), ActionStatus.OK.value, np.int64),
+            instructions=[task.instruction] * len(kept),
+            success=played.success,
+            facts=EpisodeFacts(CHALLENGE, task.source + " to " + task.destination, METHOD, task.seed, played.success),
+        ),
+        keeper.close(),
+        origin,
+    )
 
 
 Tell = Callable[[Mapping[str, Any]], None]
@@ -249,10 +239,10 @@ def _play_episode(
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
     keeper = PictureKeeper(work / "pictures", names, size=contents.size, outputs=contents.outputs)
 
-    def told(label: str, step: int, limit: int) -> None:
+    def tell_step(label: str, step: int, limit: int) -> None:
         tell({"label": label, "step": step, "limit": limit})
 
-    hooks: list[Hook] = [keeper, EpisodeProgress(told, task)]
+    hooks: list[Hook] = [keeper, EpisodeProgress(tell_step, task)]
     record = play_task(
         world,
         people,

@@ -1,4 +1,4 @@
-"""How other people's code drives the simulation: PettingZoo and Gymnasium environments, their spaces and checks."""
+"""PettingZoo and Gymnasium environments of the simulation, their spaces and checks."""
 
 from vico.envs.check import EnvFinding, check_env
 from vico.envs.parallel import CommunityEnv, SingleAgentEnv, make

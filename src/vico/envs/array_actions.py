@@ -104,11 +104,6 @@ class ActionTable:
         """Type, level, choice, hand."""
         return spaces.MultiDiscrete([len(self.kinds), LEVEL_COUNT, CHOICE_COUNT, 2])
 
-    @property
-    def flat_space(self) -> spaces.Discrete:
-        """The number of an entry of `menu`."""
-        return spaces.Discrete(len(self.menu))
-
     def action_of(self, entry: Entry, around: Surroundings, *, riding: bool = False) -> dict[str, Any]:
         """Return what numbers stand for, as the short form has it.
 
@@ -231,7 +226,17 @@ class ActionTable:
             return entry.choice if entry.choice < REPORTS else None
         if field.slot == "text":
             return self.phrases[entry.choice] if entry.choice < len(self.phrases) else None
-        return _choice_value(field, entry.choice, around)
+        choice = entry.choice
+        if field.slot == "where":
+            return around.things[choice - 1].entity if 0 < choice <= len(around.things) else None
+        found = {"entity": around.things, "target": around.things, "agent": around.people, "place": around.places}
+        options = found[str(field.slot)]
+        if choice >= len(options):
+            return None
+        one = options[choice]
+        if field.slot == "entity":
+            return one.entity
+        return [float(value) for value in one.position] if field.slot == "target" else one.name or None
 
     def _choice_of(self, kind: str, name: str, field: Field, value: Any, around: Surroundings) -> int:
         for choice in range(_CHOICES[str(field.slot)]):
@@ -253,17 +258,3 @@ def _levels(kind: str, field: Field) -> tuple[float, ...]:
     if kind in LEVELS:
         return LEVELS[kind]
     return tuple(field.scale * (k + 1) / LEVEL_COUNT for k in range(LEVEL_COUNT))
-
-
-def _choice_value(field: Field, choice: int, around: Surroundings) -> Any:
-    """Return what a choice names; None where there is nothing."""
-    if field.slot == "where":
-        return around.things[choice - 1].entity if 0 < choice <= len(around.things) else None
-    found = {"entity": around.things, "target": around.things, "agent": around.people, "place": around.places}
-    options = found[str(field.slot)]
-    if choice >= len(options):
-        return None
-    one = options[choice]
-    if field.slot == "entity":
-        return one.entity
-    return [float(value) for value in one.position] if field.slot == "target" else one.name or None

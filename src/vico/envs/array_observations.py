@@ -60,7 +60,7 @@ class NearbyEntity:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is around an agent, nearest first.
+    """Surroundings of an agent, nearest first.
 
     Attributes
     ----------
@@ -95,7 +95,14 @@ def surroundings_of(observation: Mapping[str, Any], info: Mapping[str, Any], pub
         known = public_map.place_by_id.get(name)
         point = behind.get(name) if known is None else np.asarray(known.entrance or known.position, np.float64)
         places.append(NearbyEntity(name, "place", here if point is None else point))
-    seen = _visible_entities(observation, info)
+    if "segmentation" in observation and "depth" in observation:
+        seen = _entities_in_pictures(observation, info.get("entities", {}))
+    else:
+        view = info.get("in_view", ())
+        seen = [
+            NearbyEntity(body.agent or body.name, body.kind, np.asarray(body.position, np.float64), body.entity)
+            for body in view
+        ]
     people = [one for one in seen if one.kind in PERSON_KINDS]
     things = [one for one in seen if one.kind not in PERSON_KINDS]
     return Surroundings(
@@ -110,16 +117,6 @@ def _nearest(found: list[NearbyEntity], here: NDArray[np.float64], most: int) ->
     """Return the nearest; those as near as each other in the order of entity and name."""
     order = sorted(found, key=lambda one: (math.dist(one.position, here), one.entity, one.name))
     return tuple(order[:most])
-
-
-def _visible_entities(observation: Mapping[str, Any], info: Mapping[str, Any]) -> list[NearbyEntity]:
-    if "segmentation" in observation and "depth" in observation:
-        return _entities_in_pictures(observation, info.get("entities", {}))
-    view = info.get("in_view", ())
-    return [
-        NearbyEntity(body.agent or body.name, body.kind, np.asarray(body.position, np.float64), body.entity)
-        for body in view
-    ]
 
 
 def _entities_in_pictures(
@@ -259,7 +256,8 @@ def observation_arrays(
 ) -> dict[str, Array]:
     """Return an observation as arrays; see `PARTS`. Rows that nothing is told of are zeros."""
     pose = np.asarray(observation["pose"], np.float64)
-    heading = math.atan2(pose[4], pose[3])
+    ahead = pose[3:]
+    heading = math.atan2(ahead[1], ahead[0])
     state = observation["state"]
     inside = bool(state["room"])
     free = (

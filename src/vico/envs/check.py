@@ -113,6 +113,10 @@ def _check_snapshot(env: ParallelEnv[str, Any, Any], seed: int) -> Iterator[EnvF
         yield EnvFinding("snapshot", f"step {_SOME + at + 1}", what)
 
 
+# What a step returns.
+_PARTS = ("observations", "rewards", "terminations", "truncations", "infos")
+
+
 def _episode(env: ParallelEnv[str, Any, Any], seed: int, max_steps: int, digests: list[str]) -> Iterator[EnvFinding]:
     observations, infos = env.reset(seed=seed)
     yield from _check_agents(env)
@@ -130,9 +134,18 @@ def _episode(env: ParallelEnv[str, Any, Any], seed: int, max_steps: int, digests
         # Once, everybody asks for what there is not: it has to be refused, and told.
         bad = step == 1
         actions = {name: dict(_BAD_ACTION) if bad else env.action_space(name).sample() for name in agents}
-        result = env.step(actions)
-        yield from _check_step(env, agents, result, step)
-        observations, _, ended, cut, infos = result
+        observations, rewards, ended, cut, infos = env.step(actions)
+        for part, content in zip(_PARTS, (observations, rewards, ended, cut, infos), strict=True):
+            if set(content) != set(agents):
+                yield EnvFinding("contract", f"{part}, step {step}", "not those who acted; give one for each of them")
+        for name, reward in rewards.items():
+            if not np.isfinite(reward):
+                yield EnvFinding("contract", f"{name}, step {step}", f"its reward is {reward}; give a finite number")
+        for name in ended:
+            flags = (ended[name], cut.get(name))
+            if not all(isinstance(flag, (bool, np.bool_)) for flag in flags):
+                yield EnvFinding("contract", f"{name}, step {step}", f"its flags are {flags}; give True or False")
+        yield from _check_observations(env, observations, f"step {step}")
         if bad:
             yield from _check_refusals(observations)
         gone |= {name for name in agents if ended.get(name) or cut.get(name)}
@@ -153,23 +166,6 @@ def _check_agents(env: ParallelEnv[str, Any, Any]) -> Iterator[EnvFinding]:
         same = env.observation_space(name) is env.observation_space(name)
         if not same or env.action_space(name) is not env.action_space(name):
             yield EnvFinding("contract", name, "its spaces are made anew each time; return the same objects")
-
-
-def _check_step(
-    env: ParallelEnv[str, Any, Any], agents: list[str], result: tuple[Any, ...], step: int
-) -> Iterator[EnvFinding]:
-    observations, rewards, ended, cut, _ = result
-    for part, content in zip(("observations", "rewards", "terminations", "truncations", "infos"), result, strict=True):
-        if set(content) != set(agents):
-            yield EnvFinding("contract", f"{part}, step {step}", "not those who acted; give one for each of them")
-    for name, reward in rewards.items():
-        if not np.isfinite(reward):
-            yield EnvFinding("contract", f"{name}, step {step}", f"its reward is {reward}; give a finite number")
-    for name in ended:
-        flags = (ended[name], cut.get(name))
-        if not all(isinstance(flag, (bool, np.bool_)) for flag in flags):
-            yield EnvFinding("contract", f"{name}, step {step}", f"its flags are {flags}; give True or False")
-    yield from _check_observations(env, observations, f"step {step}")
 
 
 def _check_observations(

@@ -129,7 +129,9 @@ class ArrayForm:
         self.around = surroundings_of(observation, info, self.public_map)
         self._riding = observation["state"]["vehicle"] == "bike"
         arrays = observation_arrays(observation, self.around, self.public_map, parts=self.parts)
-        return self.joined(arrays) if self._is_flat else arrays
+        if not self._is_flat:
+            return arrays
+        return np.concatenate([arrays[name].reshape(-1) for name in self.numeric]).astype(np.float32)
 
     def decode(self, action: Any) -> Any:
         """Return an element of `action_space` as the short form has it; what already is in the short form stays."""
@@ -168,10 +170,6 @@ class ArrayForm:
         mask = self.table.mask(agent, state, self.around, allows=self.allows, riding=self._riding)
         return mask if isinstance(self.action_space, spaces.Discrete) else self.table.parts_mask(mask)
 
-    def joined(self, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
-        """Return the numbers of all arrays but texts, in their order, float32."""
-        return np.concatenate([arrays[name].reshape(-1) for name in self.numeric]).astype(np.float32)
-
     @property
     def numeric(self) -> list[str]:
         """Names of the arrays that one Box is made of, in its order."""
@@ -198,11 +196,11 @@ class ArrayForm:
     def _actions(self, vector: ActionSpace | None) -> spaces.Space[Any]:
         if vector is not None:
             return spaces.Box(vector.low.astype(np.float32), vector.high.astype(np.float32))
-        return self.table.flat_space if self.options.actions == "discrete" else self.table.space
+        return spaces.Discrete(len(self.table.menu)) if self.options.actions == "discrete" else self.table.space
 
 
 class Form(Protocol):
-    """How one agent is told of what it observes, and how it answers."""
+    """Form of one agent's observations and actions."""
 
     observation_space: spaces.Space[Any]
     action_space: spaces.Space[Any]

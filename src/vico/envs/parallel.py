@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from textwrap import indent
 from typing import Any, Protocol, Unpack
 
 import gymnasium
@@ -20,7 +21,7 @@ from pettingzoo import ParallelEnv
 from vico.community import read_community
 from vico.community.model import Community
 from vico.envs.forms import Form, FormOptions, forms_of
-from vico.envs.spec import EnvOptions, EnvSpec
+from vico.envs.spec import EnvOptions, EnvSpec, option_docs
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.actions import AgentFault
@@ -108,11 +109,11 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's observations; the same object each time."""
-        return self.forms[self._known(agent)].observation_space
+        return self.forms[self._require_agent(agent)].observation_space
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's actions; the same object each time."""
-        return self.forms[self._known(agent)].action_space
+        return self.forms[self._require_agent(agent)].action_space
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -128,7 +129,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             Not used.
         """
         result = self.begin(seed)
-        return self._told(result)
+        return self._observations_of(result)
 
     def step(
         self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None
@@ -140,7 +141,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         agents make tensors of them.
         """
         result = self.advance(actions, agent_faults)
-        observations, infos = self._told(result)
+        observations, infos = self._observations_of(result)
         over = not self.agents
         return (
             observations,
@@ -191,7 +192,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         """
         if not self.agents:
             raise InputError("env: the episode is over (or has not begun); call reset() before step()")
-        short = {name: self.forms[self._known(name)].decode(action) for name, action in actions.items()}
+        short = {name: self.forms[self._require_agent(name)].decode(action) for name, action in actions.items()}
         result = self.sim.step(short, agent_faults)
         if self.sim.metrics.steps >= self.max_steps:
             if len(result.observations) < len(self.agents):
@@ -229,7 +230,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             raise InputError("env: one of a world in memory cannot go to another process; write the world first")
         return _rebuild_env, (self.world.path, self.community, self.spec, self._setup)
 
-    def _told(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    def _observations_of(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         observations: dict[str, Any] = {}
         infos: dict[str, dict[str, Any]] = {}
         for name in result.observations:
@@ -273,7 +274,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             self._setup(simulation)
         return simulation
 
-    def _known(self, agent: str) -> str:
+    def _require_agent(self, agent: str) -> str:
         if agent not in self.forms:
             raise InputError(f"env: no agent is called {agent!r}; there are {', '.join(self.possible_agents)}")
         return agent
@@ -295,47 +296,7 @@ def make(
     setup
         Called with the fresh `Simulation` at each reset.
     options
-        Each with its default; `vico.sim.config.SimSettings` and `vico.envs.spec.EnvSpec` say more.
-
-        Who takes part:
-
-        - ``residents=None``: how many of the community's residents, in its order; None for all.
-        - ``assistants=0``: how many avatars under test, without home or schedule.
-        - ``assistant_places={}``: where they start, by name: x, y (ENU metres) and yaw (radians); else by seed.
-        - ``robots=()``: model names, such as ``("husky", "go2")``; robot ``i`` is the agent ``robot_i``.
-        - ``robot_places={}``: where they start, as `assistant_places`.
-        - ``physics='mujoco'``: engine that moves robots; also ``"genesis"``.
-        - ``errands=False``: whether robots that nobody controls go from place to place.
-        - ``oracle_grasp=False``: whether robots' hands never lose what they closed on.
-        - ``cars=0``, ``cyclists=0``, ``pedestrians=0``: how many of whom nobody plays.
-        - ``junctions='one'``: who may be in a junction: ``"one"``, ``"shared"``, ``"signals"`` or ``"both"``.
-        - ``traffic='none'``: cars and pedestrians placed by hand: the content of a file of docs/traffic.md.
-        - ``transit=True``: whether buses, trams and bicycles are there.
-
-        When, and what the city is like:
-
-        - ``seed=0``: decides whatever is left to chance in the first episode.
-        - ``start='08:00'``: time of day, ``HH:MM`` or ``HH:MM:SS``.
-        - ``date=None``: first day, YYYY-MM-DD; None for the community's day.
-        - ``utc_offset=None``: hours that clocks are ahead of UTC; None for those of the longitude.
-        - ``weather='fair'``: a kind of weather, ``"changing"``, or the content of a weather file.
-        - ``events='none'``: ``"changing"``, or the content of a file of docs/events.md.
-        - ``opening_hours=False``: whether places keep the hours that the map says.
-
-        What agents are given, and how:
-
-        - ``observe='all'``: whose views are rendered: ``"all"``, ``"none"``, or names.
-        - ``image=256``: side of the square pictures, pixels.
-        - ``outputs=('rgb', 'depth', 'segmentation')``: what pictures show; also normals, flow, semantic.
-        - ``cameras={}``: other lenses, by agent's name, robot's model, or group (docs/pictures.md).
-        - ``worn={}``: files (.glb) of heads and bodies that people wear, by agent's name.
-        - ``quality='plain'``: how carefully pictures are made; also ``"fine"``, or switches by name.
-        - ``renderer='cpu'``: what makes pictures; also ``"gl"`` for OpenGL.
-        - ``memory=2.0``: of cities, gigabytes that the scenes of all who look may take.
-        - ``periods={}``: seconds from one action of an agent to the next, by name; 1 s without.
-        - ``max_steps=1500``: length of an episode, steps: seconds, unless `periods` ask for others.
-        - ``form='rich'``: in which observations and actions are given: ``"rich"``, ``"arrays"``, or fields of
-          `vico.envs.forms.FormOptions`.
+        The fields of `vico.envs.spec.EnvSpec`, each with its default:
 
     Raises
     ------
@@ -344,6 +305,11 @@ def make(
     """
     spec = EnvSpec.of(world, community, options)
     return CommunityEnv(_world(world), _community(community), spec=spec, setup=setup)
+
+
+make.__doc__ = (make.__doc__ or "").replace(
+    "each with its default:\n", f"each with its default:\n\n{indent(option_docs(), ' ' * 8)}\n"
+)
 
 
 def _rebuild_env(world: Path, community: Community | None, spec: EnvSpec, setup: Setup | None) -> CommunityEnv:

@@ -104,7 +104,10 @@ def observation_space(
         "state": state,
     }
     if readings is not None:
-        parts["sensors"] = sensor_space(readings)
+        boxes: dict[str, spaces.Space[Any]] = {
+            name: spaces.Box(r.low, r.high, r.shape, r.dtype) for name, r in readings.items()
+        }
+        parts["sensors"] = spaces.Dict(boxes)
     if lens is not None:
         parts |= {name: picture_space(name, lens) for name in outputs}
         parts["extrinsics"] = _number(-np.inf, np.inf, 4, 4)
@@ -162,11 +165,6 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
 def robot_space(space: ActionSpace) -> spaces.Dict:
     """Return the space of a robot's actions: vectors of one of its action spaces, in that one's units and bounds."""
     return spaces.Dict({"vector": spaces.Box(space.low.astype(np.float32), space.high.astype(np.float32))})
-
-
-def sensor_space(readings: Mapping[str, Reading]) -> spaces.Dict:
-    """Return the space of what a robot feels of itself."""
-    return spaces.Dict({name: spaces.Box(r.low, r.high, r.shape, r.dtype) for name, r in readings.items()})
 
 
 def short_form(action: Any, places: Sequence[str], people: Sequence[str]) -> Any:
@@ -261,7 +259,10 @@ def escape_text(text: str, longest: int) -> str:
         return text
     length, parts = 0, []
     for character in text:
-        part = character if character in _PLAIN else _escape_character(character)
+        part = character
+        if character not in _PLAIN:
+            code = ord(character)
+            part = f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
         length += len(part)
         if length > longest:
             break
@@ -272,8 +273,3 @@ def escape_text(text: str, longest: int) -> str:
 def unescape_text(text: str) -> str:
     """Return what `escape_text` was given, as far as it was not cut off."""
     return _ESCAPED.sub(lambda found: chr(int(found[1] or found[2], 16)), text)
-
-
-def _escape_character(character: str) -> str:
-    code = ord(character)
-    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

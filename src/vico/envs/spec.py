@@ -1,4 +1,4 @@
-"""What an environment is made from, as a record that goes to JSON and back, and environments by id.
+"""Specification of an environment, a record that goes to JSON and back, and environments by id.
 
 ``gymnasium.make("vico/Community-v0", ...)`` works once `register_ids` has run, and PettingZoo's registry where it has
 one.
@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
+from inspect import cleandoc
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, TypedDict
 
 import gymnasium
@@ -26,7 +29,7 @@ VERSION = 1
 
 
 class EnvOptions(TypedDict, total=False):
-    """Options of an environment, beside its world and community; see `EnvSpec`."""
+    """Options of an environment: the fields of `EnvSpec`, which describes them, but for the world and community."""
 
     seed: int
     start: str
@@ -64,7 +67,7 @@ class EnvOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class EnvSpec(SimSettings):
-    """What an environment is made from, beside the settings of its simulation.
+    """Specification of an environment: its options beside the settings of its simulation.
 
     Attributes
     ----------
@@ -90,7 +93,8 @@ class EnvSpec(SimSettings):
 
     def __post_init__(self) -> None:
         check_types(self, "env")
-        if not isinstance(self.observe, str) and not _are_names(self.observe):
+        names = isinstance(self.observe, tuple | list) and all(isinstance(one, str) for one in self.observe)
+        if not isinstance(self.observe, str) and not names:
             raise InputError(f"env: observe is {self.observe!r}; it has to be 'all', 'none', or names of agents")
 
     @classmethod
@@ -154,8 +158,20 @@ class EnvSpec(SimSettings):
             raise SchemaError(f"env spec: {where}: {first['msg']}") from None
 
 
-def _are_names(value: Any) -> bool:
-    return isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)
+def option_docs() -> str:
+    """Return what the options of an environment mean, with their defaults, as the docs of `EnvSpec`'s fields say it."""
+    defaults = {
+        field.name: field.default if field.default_factory is MISSING else field.default_factory()
+        for field in fields(EnvSpec)
+    }
+    found: list[str] = []
+    for record in (SimSettings, EnvSpec):
+        listed = cleandoc(record.__doc__ or "").partition("Attributes\n----------\n")[2]
+        for names, text in re.findall(r"^(\w.*)\n((?:    .*\n?)+)", listed, re.MULTILINE):
+            if names != "world, community":
+                options = ", ".join(f"``{name}={defaults[name]!r}``" for name in names.split(", "))
+                found += wrap(f"- {options}: {' '.join(text.split())}", 112, subsequent_indent="  ")
+    return "\n".join(found)
 
 
 def _folder(source: Any) -> str | None:

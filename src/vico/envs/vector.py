@@ -42,7 +42,7 @@ def boxes_of(space: spaces.Space[Any], where: SpacePath = ()) -> Iterator[tuple[
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the arrays of several environments lie in a block of memory.
+    """Layout of the arrays of several environments in a block of memory.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class SharedArrays:
         assert self._memory is not None
         return self._memory.name
 
-    def batched(self, rest: Sequence[Any]) -> Any:
+    def batch(self, rest: Sequence[Any]) -> Any:
         """Return the observations of all environments as one element of the batched space; arrays are copies.
 
         Parameters
@@ -97,7 +97,7 @@ class SharedArrays:
         rest
             What the workers sent: observations without their arrays.
         """
-        return self._batched(self.space, (), rest)
+        return self._batch_space(self.space, (), rest)
 
     def single(self, k: int, rest: Any) -> Any:
         """Return one environment's observation; arrays are copies."""
@@ -111,12 +111,14 @@ class SharedArrays:
             self._memory.unlink()
             self._memory = None
 
-    def _batched(self, space: spaces.Space[Any], where: SpacePath, rest: Sequence[Any]) -> Any:
+    def _batch_space(self, space: spaces.Space[Any], where: SpacePath, rest: Sequence[Any]) -> Any:
         if where in self._rows:
             return self._rows[where].copy()
         if isinstance(space, spaces.Dict):
             return {
-                name: self._batched(one, (*where, name), [None if part is None else part.get(name) for part in rest])
+                name: self._batch_space(
+                    one, (*where, name), [None if part is None else part.get(name) for part in rest]
+                )
                 for name, one in space.spaces.items()
             }
         empty: Any = create_empty_array(space, len(rest))
@@ -147,20 +149,17 @@ class Sharing:
     def reset(self, *arguments: Any, **options: Any) -> tuple[Any, Any]:
         """Reset the environment; return what is not in the block."""
         observation, info = self.env.reset(*arguments, **options)
-        return self._taken(observation), info
+        return _take_out(observation, (), self._rows), info
 
     def step(self, action: Any) -> tuple[Any, ...]:
         """Step the environment; return what is not in the block."""
         observation, *rest = self.env.step(action)
-        return (self._taken(observation), *rest)
+        return (_take_out(observation, (), self._rows), *rest)
 
     def call(self, name: str, *arguments: Any) -> Any:
         """Return what a method of the environment returns, or an attribute."""
         found = getattr(self.env, name)
         return found(*arguments) if callable(found) else found
-
-    def _taken(self, observation: Any) -> Any:
-        return _take_out(observation, (), self._rows)
 
 
 def _take_out(observation: Any, where: SpacePath, rows: Mapping[SpacePath, NDArray[Any]]) -> Any:
@@ -237,7 +236,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
         calls = [Call("reset", (), {"seed": one, "options": options}) for one in _seeds(seed, self.num_envs)]
         observations, infos = zip(*self._workers.ask(calls), strict=True)
         self._over[:] = False
-        return self._batched(observations), _batch_infos(infos)
+        return self._arrays.batch(observations), _batch_infos(infos)
 
     def step(
         self, actions: Any
@@ -267,7 +266,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
         terminations, truncations = np.array(ended, bool), np.array(cut, bool)
         self._over = terminations | truncations
         return (
-            self._batched(observations),
+            self._arrays.batch(observations),
             np.array(rewards, np.float64),
             terminations,
             truncations,
@@ -291,9 +290,6 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
     def pids(self) -> list[int | None]:
         """Numbers of the processes."""
         return self._workers.pids
-
-    def _batched(self, rest: Sequence[Any]) -> Any:
-        return self._arrays.batched(rest)
 
 
 class ParallelVectorEnv:
@@ -329,7 +325,7 @@ class ParallelVectorEnv:
 
     def reset(self, seed: int | Sequence[int | None] | None = None) -> list[Reset]:
         """Start an episode in each environment; seeds as for `VectorAgentEnv.reset`."""
-        return self._told(self._workers.ask([Call("reset", (one,)) for one in _seeds(seed, self.num_envs)]))
+        return self._with_arrays(self._workers.ask([Call("reset", (one,)) for one in _seeds(seed, self.num_envs)]))
 
     def step(self, actions: Sequence[Mapping[str, Any]]) -> list[Step]:
         """Step each environment with its agents' actions; what `CommunityEnv.step` returns, of each.
@@ -341,12 +337,12 @@ class ParallelVectorEnv:
         WorkerError
             If an environment fails; all are closed then.
         """
-        return self._told(self._workers.ask([Call("step", (dict(one),)) for one in actions]))
+        return self._with_arrays(self._workers.ask([Call("step", (dict(one),)) for one in actions]))
 
     def reset_some(self, which: Sequence[int]) -> dict[int, Reset]:
         """Start the next episode in some environments; the others stay as they are."""
         calls = [Call("reset") if k in which else None for k in range(self.num_envs)]
-        found = self._told(self._workers.ask(calls))
+        found = self._with_arrays(self._workers.ask(calls))
         return {k: found[k] for k in which}
 
     def close(self) -> None:
@@ -364,7 +360,7 @@ class ParallelVectorEnv:
         calls = [Call("call", (name, *arguments)), *[None] * (self.num_envs - 1)]
         return self._workers.ask(calls)[0]
 
-    def _told(self, answers: Sequence[Any]) -> list[Any]:
+    def _with_arrays(self, answers: Sequence[Any]) -> list[Any]:
         """Put the arrays back into what environments returned."""
         return [
             None if answer is None else (self._arrays.single(k, answer[0]), *answer[1:])

@@ -125,18 +125,18 @@ class Workers:
         try:
             self._pipes[k].send(call)
         except (BrokenPipeError, ConnectionError):
-            raise self._ended(k, call) from None
+            raise self._exit_error(k, call) from None
 
     def _receive(self, k: int, call: Call) -> Any:
         try:
             good, value = self._pipes[k].recv()
         except (EOFError, ConnectionError):
-            raise self._ended(k, call) from None
+            raise self._exit_error(k, call) from None
         if not good:
             raise WorkerError(f"{self._name(k)} failed in {call.method}: {value}")
         return value
 
-    def _ended(self, k: int, call: Call) -> WorkerError:
+    def _exit_error(self, k: int, call: Call) -> WorkerError:
         self._processes[k].join(_PATIENCE)
         code = self._processes[k].exitcode
         if code is not None and code < 0:
@@ -167,19 +167,15 @@ def _serve(maker: Callable[[], Any], pipe: Connection, threads: str) -> None:
             made = maker() if made is None else made
             found = getattr(made, call.method)
             answer = True, found(*call.arguments, **call.keywords) if callable(found) else found
+        except VicoError as error:
+            answer = False, str(error)
         except Exception as error:
-            answer = False, _error_text(error)
+            where = "".join(traceback.format_tb(error.__traceback__))
+            answer = False, f"{type(error).__name__}: {error}\n{where}".rstrip()
         try:
             pipe.send(answer)
         except OSError:
             return
-
-
-def _error_text(error: Exception) -> str:
-    """Say what went wrong: our own errors in their sentence, others with where they came from."""
-    if isinstance(error, VicoError):
-        return str(error)
-    return f"{type(error).__name__}: {error}\n{''.join(traceback.format_tb(error.__traceback__))}".rstrip()
 
 
 def _end_with_parent() -> None:

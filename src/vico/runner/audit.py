@@ -1,4 +1,4 @@
-"""What an isolated agent reaches for and is not given: refused in its process, and reported.
+"""Audit of an isolated agent: what it reaches for and is not given is refused in its process, and reported.
 
 Python tells audit hooks (PEP 578) of files that are opened and of looks at frames and at the garbage collector's list
 of objects, and finders of the modules that are imported. This is a lock for honest people and lazy cheats, not a
@@ -53,17 +53,20 @@ class AuditHook:
         self.noticed: list[str] = []
         self._world = os.path.realpath(world)
         self._own = None if own is None else os.path.realpath(own)
-        self._libraries = _library_folders()
+        paths = {sysconfig.get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+        paths |= {*site.getsitepackages(), site.getusersitepackages()}
+        folders = {folder + os.sep for path in paths for folder in (path, os.path.realpath(path))}
+        self._libraries = tuple(sorted(folders))
         self._local = threading.local()
         self._paused = False
         self._rules: dict[str, Callable[[FrameType | None, tuple[Any, ...]], str | None]] = {
-            "open": self._opened,
-            "os.listdir": self._opened,
-            "os.scandir": self._opened,
-            "os.kill": self._killed,
-            "os.killpg": self._killed,
-            **dict.fromkeys(("gc.get_objects", "gc.get_referrers", "gc.get_referents"), self._searched),
-            **dict.fromkeys(("sys._getframe", "sys._current_frames"), self._framed),
+            "open": self._judge_opening,
+            "os.listdir": self._judge_opening,
+            "os.scandir": self._judge_opening,
+            "os.kill": self._judge_signal,
+            "os.killpg": self._judge_signal,
+            **dict.fromkeys(("gc.get_objects", "gc.get_referrers", "gc.get_referents"), self._judge_search),
+            **dict.fromkeys(("sys._getframe", "sys._current_frames"), self._judge_frame),
         }
 
     def start(self) -> None:
@@ -73,12 +76,12 @@ class AuditHook:
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         """Look at the name of a module that is being imported for the first time, as a finder of modules."""
-        if not self._paused and (found := self._imported(sys._getframe(1), name)) is not None:
+        if not self._paused and (found := self._judge_import(sys._getframe(1), name)) is not None:
             self.noticed.append(found)
             raise UnfairError(found)
 
     @contextmanager
-    def paused(self) -> Iterator[None]:
+    def pause(self) -> Iterator[None]:
         """Let vico itself read the world in the block, before the agent is there."""
         self._paused = True
         try:
@@ -86,7 +89,7 @@ class AuditHook:
         finally:
             self._paused = False
 
-    def taken(self) -> str:
+    def take_notices(self) -> str:
         """Return what was noticed, and forget it."""
         said = "; ".join(dict.fromkeys(self.noticed))
         self.noticed.clear()
@@ -105,7 +108,7 @@ class AuditHook:
             self.noticed.append(found)
             raise UnfairError(found)
 
-    def _opened(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
+    def _judge_opening(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
         path = arguments[0] if arguments else None
         if not isinstance(path, str | bytes | os.PathLike):
             return None
@@ -117,21 +120,21 @@ class AuditHook:
             return "looks into another process"
         return None
 
-    def _imported(self, frame: FrameType | None, name: str) -> str | None:
+    def _judge_import(self, frame: FrameType | None, name: str) -> str | None:
         if not any(name == closed or name.startswith(f"{closed}.") for closed in CLOSED):
             return None
         while frame is not None and "importlib" in frame.f_code.co_filename:
             frame = frame.f_back
         return f"imports {name}; put the agent into a module without it" if self._is_agents(frame) else None
 
-    def _killed(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
+    def _judge_signal(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
         # Processes that it started itself it may end.
         return "signals the process that judges it" if arguments and arguments[0] in (os.getppid(), -1) else None
 
-    def _searched(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
+    def _judge_search(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
         return "searches the process's objects (gc)" if self._is_agents(frame) else None
 
-    def _framed(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
+    def _judge_frame(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
         if frame is not None and frame.f_code.co_filename.endswith(f"{os.sep}inspect.py"):
             frame = frame.f_back
         return "looks at the frames that call it" if self._is_agents(frame) else None
@@ -144,9 +147,3 @@ class AuditHook:
         if self._own is not None and os.path.realpath(path).startswith(self._own):
             return True
         return not path.startswith((_PACKAGE, "<frozen", *self._libraries))
-
-
-def _library_folders() -> tuple[str, ...]:
-    paths = {sysconfig.get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib")}
-    paths |= {*site.getsitepackages(), site.getusersitepackages()}
-    return tuple(sorted({folder + os.sep for path in paths for folder in (path, os.path.realpath(path))}))

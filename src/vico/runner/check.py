@@ -45,7 +45,7 @@ class AgentFinding:
 
 @dataclass
 class AgentCheck:
-    """What a check came to.
+    """Result of a check.
 
     Attributes
     ----------
@@ -130,7 +130,9 @@ def check_agent(
             return check
         config = SimConfig(seed=seed, assistants=1, cars=traffic, pedestrians=traffic, image=128)
         _play(check, Simulation(world, None, config), agent, twin, another, steps=steps, deadline=deadline)
-        _usage(check, agent)
+        tokens, cost = getattr(agent, "tokens", 0), getattr(agent, "cost", 0.0)
+        if not isinstance(tokens, int) or tokens < 0 or not isinstance(cost, (int, float)) or not cost >= 0:
+            check.add("usage", 0, f"tokens {tokens!r:.40} and cost {cost!r:.40} have to be numbers of 0 or more")
     return check
 
 
@@ -215,9 +217,3 @@ def _restored_agent(check: AgentCheck, agent: Agent, another: Callable[[], Agent
     else:
         return fresh
     return None
-
-
-def _usage(check: AgentCheck, agent: Agent) -> None:
-    tokens, cost = getattr(agent, "tokens", 0), getattr(agent, "cost", 0.0)
-    if not isinstance(tokens, int) or tokens < 0 or not isinstance(cost, (int, float)) or not cost >= 0:
-        check.add("usage", 0, f"tokens {tokens!r:.40} and cost {cost!r:.40} have to be numbers of 0 or more")

@@ -67,7 +67,7 @@ class _Served:
 
     def unfair(self) -> str:
         """Return what the agent reached for and is not given, since this was last asked; empty if nothing."""
-        return "" if self._watch is None else self._watch.taken()
+        return "" if self._watch is None else self._watch.take_notices()
 
     def answer(self, message: dict[str, Any]) -> Any:
         """Do what is asked."""
@@ -95,17 +95,16 @@ class _Served:
         watch.start()
 
         def public_map() -> PublicMap:
-            with watch.paused():
+            with watch.pause():
                 return PublicMap.from_world(read_world(world))
 
         thing = load_agent(spec)
         # Without a seat it is only asked whether there is such an agent.
         seat = message["seat"]
-        self._agent = FunctionAgent(_wait) if seat is None else make_agent(thing, AgentSeat(**seat), public_map)
-
-
-def _wait(observation: Observation, info: Info) -> Action:
-    return {"type": "wait"}
+        if seat is None:
+            self._agent = FunctionAgent(lambda observation, info: {"type": "wait"})
+        else:
+            self._agent = make_agent(thing, AgentSeat(**seat), public_map)
 
 
 def _limit_memory(megabytes: int) -> None:

@@ -172,7 +172,7 @@ class _Waiting:
 
 
 class Control:
-    """Directs a run (`vico.runner.loop.Director`); its methods may be called from any thread.
+    """Directs a run by `before_step`, a `vico.runner.loop.Director`; its methods may be called from any thread.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ class Control:
 
         The errors that the reply may be are `InputError`.
         """
-        return self.ask(lambda runner: self._commanded(runner, name, arguments))
+        return self.ask(lambda runner: self._run_command(runner, name, arguments))
 
     def ask(self, do: Callable[[Runner], T]) -> Future[T]:
         """Have something done between two steps, in the thread that simulates."""
@@ -361,14 +361,16 @@ class Control:
                 else:
                     self.switch = result._replace(told=one.told)
 
-    def _commanded(self, runner: Runner, name: str, arguments: Mapping[str, Any]) -> Any:
+    def _run_command(self, runner: Runner, name: str, arguments: Mapping[str, Any]) -> Any:
         if name not in self._can():
             raise InputError(f"{name!r} is no command here; there are {', '.join(self._can())}")
         if name in COMMANDS:
-            return self._intervened(runner, InterventionLine(after=self.step, command=name, arguments=dict(arguments)))
+            return self._apply_intervention(
+                runner, InterventionLine(after=self.step, command=name, arguments=dict(arguments))
+            )
         return _COMMANDS[name](self, runner, CommandArguments(name, arguments))
 
-    def _intervened(self, runner: Runner, line: InterventionLine) -> dict[str, Any]:
+    def _apply_intervention(self, runner: Runner, line: InterventionLine) -> dict[str, Any]:
         told, actions = intervene(runner.sim, intervention_of(line.command, line.arguments))
         self._pending |= actions
         append_intervention(self.out, line)
@@ -379,7 +381,7 @@ class Control:
         while self._script and self._script[0].after <= self.step:
             line = self._script.popleft()
             if line.after == self.step:
-                self._intervened(runner, line)
+                self._apply_intervention(runner, line)
 
     def pause(self, runner: Runner, given: CommandArguments) -> dict[str, Any]:
         """Hold the run up."""

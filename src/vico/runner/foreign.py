@@ -169,10 +169,10 @@ class IsolatedAgent:
         if "error" in reply:
             raise _ERRORS.get(str(reply["kind"]), AgentProcessError)(str(reply["error"])[:1000])
         self.left = reply["left"] is True
-        self._spent(reply["tokens"], reply["cost"])
+        self._note_usage(reply["tokens"], reply["cost"])
         return reply["answer"]
 
-    def _spent(self, tokens: Any, cost: Any) -> None:
+    def _note_usage(self, tokens: Any, cost: Any) -> None:
         if type(tokens) is int and 0 <= tokens < 2**53:
             self.tokens = tokens
         if type(cost) in (int, float) and 0 <= cost < 1e12:
@@ -215,10 +215,6 @@ def _has_descriptor(stream: Any) -> bool:
     except (AttributeError, OSError, ValueError):
         return False
     return True
-
-
-#: Seconds agents from elsewhere have for an action unless a run says otherwise.
-DEADLINE = 60.0
 
 
 @dataclass(frozen=True, kw_only=True)

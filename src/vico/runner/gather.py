@@ -61,7 +61,7 @@ class Failure:
 
     @property
     def outcome(self) -> AgentFault:
-        """What the simulation is told of it."""
+        """Outcome for the simulation: a status and a reason."""
         return (ActionStatus.LATE if self.kind == "late" else ActionStatus.FAILED), self.reason
 
 
@@ -92,7 +92,7 @@ class FaultLog:
 
     @property
     def count(self) -> int:
-        """How many there were."""
+        """Number of faults."""
         return self.counts.total()
 
     def add(self, step: int, agent: str, kind: FaultKind, reason: str) -> None:
@@ -100,7 +100,8 @@ class FaultLog:
         new = not self.counts[agent, kind]
         self.counts[agent, kind] += 1
         if new or len(self.first) < FAULTS_LISTED:
-            self.first.append(Fault(step, agent, kind, _shorten(reason)))
+            text = reason if len(reason) <= _LONGEST else reason[: _LONGEST - 3] + "..."
+            self.first.append(Fault(step, agent, kind, text))
 
     def by_kind(self) -> dict[str, int]:
         """Return how many there were of each kind there was."""
@@ -132,10 +133,6 @@ class FaultLog:
 def is_malformed(code: str) -> bool:
     """Whether a refusal (``action_code`` of an observation) says that the action had no form that could be right."""
     return code in _MALFORMED_CODES
-
-
-def _shorten(reason: str) -> str:
-    return reason if len(reason) <= _LONGEST else reason[: _LONGEST - 3] + "..."
 
 
 _Task = tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]
@@ -189,7 +186,7 @@ class Gathered:
 
     @property
     def agent_faults(self) -> dict[str, AgentFault]:
-        """What `vico.sim.loop.simulation.Simulation.step` is told of those who failed."""
+        """Faults of those who failed, for `vico.sim.loop.simulation.Simulation.step`."""
         return {name: failure.outcome for name, failure in self.failures.items()}
 
 
@@ -309,7 +306,7 @@ class Gatherer:
                 answers = dict.fromkeys(names, error)
             for name in names:
                 if isinstance(answer := answers[name], Exception):
-                    self._failed(name, answer, gathered)
+                    self._note_failure(name, answer, gathered)
                 else:
                     gathered.actions[name] = answer
         for name in self._alone:
@@ -329,9 +326,9 @@ class Gatherer:
         try:
             gathered.actions[name] = answer()
         except BaseException as error:
-            self._failed(name, error, gathered)
+            self._note_failure(name, error, gathered)
 
-    def _failed(self, name: str, error: BaseException, gathered: Gathered) -> None:
+    def _note_failure(self, name: str, error: BaseException, gathered: Gathered) -> None:
         gathered.failures[name] = failure_of(error)
         log.info("agent %s failed and waits", name, exc_info=error)
 

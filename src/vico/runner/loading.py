@@ -19,7 +19,7 @@ from vico.world.public import PublicMap
 
 @dataclass(frozen=True)
 class AgentSeat:
-    """What an agent may be told when it is made: its constructor names what it wants of it as arguments.
+    """Facts that an agent may have when it is made: its constructor names those that it wants as arguments.
 
     Attributes
     ----------
@@ -54,7 +54,13 @@ def load(spec: str) -> Any:
     if not place or not name:
         raise InputError(f"agent {spec!r}: give my_module:MyAgent, or path/to/file.py:MyAgent")
     try:
-        module = _module_of_file(Path(place)) if place.endswith(".py") else _module_of_name(place)
+        if place.endswith(".py"):
+            module = _module_of_file(Path(place))
+        else:
+            here = str(Path.cwd())
+            if here not in sys.path and "" not in sys.path:
+                sys.path.insert(0, here)
+            module = importlib.import_module(place)
     except (InputError, MissingFileError):
         raise
     except BaseException as error:
@@ -151,13 +157,6 @@ def make_agent(thing: Any, seat: AgentSeat, public_map: Callable[[], PublicMap])
             raise
         raise InputError(f"agent {thing.__name__}: cannot be made: {sentence_of(error)} at {line_of(error)}") from None
     return as_agent(made, name=f"agent {thing.__name__}")
-
-
-def _module_of_name(name: str) -> Any:
-    here = str(Path.cwd())
-    if here not in sys.path and "" not in sys.path:
-        sys.path.insert(0, here)
-    return importlib.import_module(name)
 
 
 def _module_of_file(path: Path) -> Any:

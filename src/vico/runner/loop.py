@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from vico.agents.base import Action, AgentState
 from vico.envs.spaces import short_form
@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Step:
-    """What a step was.
+    """Record of a step.
 
     Attributes
     ----------
@@ -68,11 +68,9 @@ class Hook:
         """Save what every agent remembers, together with the simulation as it stands now."""
 
 
-class Director(Protocol):
-    """Reaches into a run from outside: holds it up, changes the simulation, has agents do something else."""
-
-    def before_step(self, runner: Runner) -> Mapping[str, Action]:
-        """Do what is due between two steps; return what agents do in the next one in place of their own actions."""
+#: Reaches into a run from outside, between two steps: holds it up, changes the simulation. Returns what agents do in
+#: the next step in place of their own actions.
+Director = Callable[["Runner"], Mapping[str, Action]]
 
 
 class Runner:
@@ -91,7 +89,7 @@ class Runner:
     faults
         Where to note what agents do wrong; where a run is resumed, with what they did before.
     director
-        Who reaches into the run; nobody if None.
+        Called before each step; nobody reaches into the run if None.
     """
 
     def __init__(
@@ -128,13 +126,15 @@ class Runner:
         places, people = [place.id for place in sim.world.places], sim.state.people.names
         names = set(sim.agents)
         if self.states_every:
-            self._check_states()
+            _, failures = self.agents.states()
+            for name, failure in failures.items():
+                raise InputError(f"{name}: {failure.reason}")
         sim.look_away = self.agents.look_away()
         observations, infos = sim.observe(sim.due)
         for hook in self.hooks:
             hook.begin(observations)
         while sim.metrics.steps < steps and not until():
-            directed = {} if self.director is None else self.director.before_step(self)
+            directed = {} if self.director is None else self.director(self)
             if until():
                 break
             if sim.defer_pictures and self._looked_at:
@@ -188,8 +188,3 @@ class Runner:
         if not self.faults.counts[name, failure.kind]:
             log.warning("%s: %s at step %d, and waits: %s", name, failure.kind, number, failure.reason)
         self.faults.add(number, name, failure.kind, failure.reason)
-
-    def _check_states(self) -> None:
-        _, failures = self.agents.states()
-        for name, failure in failures.items():
-            raise InputError(f"{name}: {failure.reason}")

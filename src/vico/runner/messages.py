@@ -1,4 +1,4 @@
-"""What passes between a run and its agents: copies of observations, answers as plain data, messages to a process.
+"""Messages between a run and its agents: copies of observations, answers as plain data, messages to a process.
 
 Agents are given copies, through which nothing of the simulation can be reached or changed. An action is a small dict
 of text and numbers, whatever came. A message to an agent's process is plain data with its length before it, nothing
@@ -74,7 +74,10 @@ def _plain_scalar(value: Any, name: str) -> Any:
     if isinstance(value, str):
         if len(value) > _LONGEST_TEXT:
             raise MalformedError(f"{name} is a text of {len(value)} characters")
-        return _checked_unicode(value, name)
+        try:
+            return value.encode().decode()
+        except UnicodeEncodeError:
+            raise MalformedError(f"{name} is no Unicode text") from None
     if isinstance(value, int):
         if abs(value) >= 2**63:
             raise MalformedError(f"{name} is a number out of all range")
@@ -86,15 +89,8 @@ def _plain_scalar(value: Any, name: str) -> Any:
     raise MalformedError(f"{name} is of type {type(value).__name__}; give text, numbers or a list of them")
 
 
-def _checked_unicode(value: str, name: str) -> str:
-    try:
-        return value.encode().decode()
-    except UnicodeEncodeError:
-        raise MalformedError(f"{name} is no Unicode text") from None
-
-
 class ListedInView:
-    """What an agent has in view, as `vico.sim.perception.InView` tells it, in a list of its own.
+    """Bodies that an agent has in view, as `vico.sim.perception.InView` tells it, in a list of its own.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What one run is asked to be: a frozen record; change a copy with `dataclasses.replace`.
+"""Configuration of a run: a frozen record; change a copy with `dataclasses.replace`.
 
 `find_by_name` finds agents, things and vehicles by what people call them: ``resident_3``, ``Ann Lee``, ``husky``.
 """
@@ -37,7 +37,7 @@ LIMITS = {"robots": 100, "assistants": 1_000, "cars": 2_000, "cyclists": 1_000, 
 
 @dataclass(frozen=True, kw_only=True)
 class SimSettings:
-    """What a simulation's configuration and an environment's spec have in common: who and what is there.
+    """Settings that a simulation's configuration and an environment's spec share: who and what is there.
 
     Attributes
     ----------
@@ -46,21 +46,21 @@ class SimSettings:
     residents
         How many of the community's residents take part, in the community's order; None for all.
     assistants
-        Avatars under test, without home or schedule.
+        How many avatars under test, without home or schedule.
     assistant_places
-        Where assistants start, by name, as `robot_places`; the others start where the seed says.
+        Where assistants start, by name: x, y (ENU metres) and yaw (radians); the others start where the seed says.
     robots
-        Model names; robot ``i`` is the agent ``robot_i``.
+        Model names, such as ``("husky", "go2")``; robot ``i`` is the agent ``robot_i``.
     physics
         Engine that moves them: ``"mujoco"``, or ``"genesis"`` (an extra, see docs/physics.md).
     robot_places
         Where robots start, by name: x, y (ENU metres) and yaw (radians); the others start where the seed says.
     errands
-        Robots that nobody controls go from place to place.
+        Whether robots that nobody controls go from place to place.
     oracle_grasp
         Whether robots' hands never lose what they closed on; see docs/robot_challenge.md.
     cars, cyclists, pedestrians
-        Vehicles and people nobody plays.
+        How many vehicles and people that nobody plays.
     junctions
         Who may be in a junction: ``"one"``, ``"shared"``, ``"signals"`` or ``"both"``
         (`vico.sim.traffic.junctions.JunctionRule`).
@@ -68,12 +68,12 @@ class SimSettings:
         Cars and pedestrians placed by hand, beside those: ``"none"``, or the content of a file of traffic
         (docs/traffic.md).
     transit
-        Whether buses and bicycles are there.
+        Whether buses, trams and bicycles are there.
     image
-        Side of the square images, pixels, of whom `cameras` say nothing about.
+        Side of the square pictures, pixels, of those whose lenses `cameras` does not give.
     outputs
-        What those who see are given, some of `vico.render.viewers.OUTPUTS`: colour, depth and segmentation
-        unless told; also normals, optical flow and classes.
+        What pictures show, some of `vico.render.viewers.OUTPUTS`: colour, depth and segmentation, also normals,
+        optical flow and classes.
     cameras
         Lenses that are not the usual one: records of `vico.render.cameras.Lens` by agent's name, by model for
         robots, or for all ``"residents"``, ``"assistants"`` or ``"robots"``; the first of these that is there holds.
@@ -87,9 +87,9 @@ class SimSettings:
         Of cities: gigabytes that the scenes of all who look may take, or the least that one takes; others are made anew
         when somebody looks from there again. Decides nothing else.
     date
-        On which the first day is, YYYY-MM-DD; None: the community's day, or `NO_DAY` where nobody has a schedule.
+        Of the first day, YYYY-MM-DD; None for the community's day, or `NO_DAY` where nobody has a schedule.
     utc_offset
-        Hours that clocks are ahead of UTC there; None: as the time zone of 15 degrees the world lies in.
+        Hours that clocks are ahead of UTC there; None for the time zone of 15 degrees that the world lies in.
     weather
         A kind of weather (`vico.sim.environment.weather_kinds`), ``"changing"``, or the content of a weather file.
     events

@@ -1,4 +1,4 @@
-"""What agents are given after each step: their own state, what they heard, who is in view, and pictures.
+"""Observations of agents after each step: their own state, what they heard, who is in view, and pictures.
 
 `ObservationBuilder` makes all but the pictures from a state. Observations are made when somebody asks for them
 (`Observations`), and wait for their pictures then.
@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import partial
@@ -22,7 +21,7 @@ from vico.sim.bodies.arrays import RESIDENT, Bodies
 from vico.sim.bodies.seats import Rests, find_rest
 from vico.sim.bodies.state_arrays import Posture, Vehicle
 from vico.sim.cameras import Views
-from vico.sim.people.hearing import ANNOUNCED, has_news, known_events
+from vico.sim.people.hearing import ANNOUNCED, known_events
 from vico.sim.people.placement import eye_height, has_room_to_sit, place_in_line
 from vico.sim.perception import OUTDOORS, AllInView, Viewpoints, in_view, opaque_grid
 from vico.sim.state.simulation_state import SimulationState
@@ -168,7 +167,7 @@ def _closed_to(state: SimulationState, i: int) -> list[str]:
 
 
 class ObservationBuilder:
-    """What agents are told of a moment, but for pictures.
+    """Builder of the observations of a moment, but for pictures.
 
     Parameters
     ----------
@@ -211,7 +210,7 @@ class ObservationBuilder:
         return sensors | {
             "pose": self.poses[i].copy(),
             "events": [message.record() for message in self._heard.get(name, ())],
-            "state": self._state_of(i),
+            "state": self._robots[i] if i in self._robots else agent_state(i, self._state),
         }
 
     def info(self, name: str) -> dict[str, Any]:
@@ -250,9 +249,11 @@ class ObservationBuilder:
             return Rests(lambda lies: None)
         here = p.position[i], p.room.item(i)
         clear = partial(has_room_to_sit, i=i, state=state)
-        return Rests(lambda lies: find_rest(state.seats, state.indoor, here, self._taken(), lies=lies, has_room=clear))
+        return Rests(
+            lambda lies: find_rest(state.seats, state.indoor, here, self._occupied_seats(), lies=lies, has_room=clear)
+        )
 
-    def _taken(self) -> NDArray[np.bool_]:
+    def _occupied_seats(self) -> NDArray[np.bool_]:
         if self._seats_taken is None:
             self._seats_taken = self._state.seats_taken()
         return self._seats_taken
@@ -263,7 +264,8 @@ class ObservationBuilder:
         heard = np.zeros(n, bool)
         heard[[self._index[name] for name in self._heard]] = True
         # What is going on in the city may concern them, too.
-        if has_news(self._state):
+        agenda = self._state.environment.agenda
+        if len(agenda) > 0 and agenda.has_news:
             heard[:] = True
         heard[list(self._closed)] = True
         heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
@@ -284,9 +286,6 @@ class ObservationBuilder:
             distance=view.distance[people],
         )
 
-    def _state_of(self, i: int) -> dict[str, Any]:
-        return self._robots[i] if i in self._robots else agent_state(i, self._state)
-
 
 def _pad(values: NDArray[Any], length: int, value: int | bool) -> NDArray[Any]:
     """Return values of people with one for each robot behind them."""
@@ -296,7 +295,11 @@ def _pad(values: NDArray[Any], length: int, value: int | bool) -> NDArray[Any]:
 def bodies_in_view(state: SimulationState, stances: NDArray[np.float64], residents: NDArray[np.int64]) -> AllInView:
     """Return what residents, given by their indices, have in view; `stances` as from `poses`."""
     p = state.people
-    feet, mine = stances[residents], _spaces(state)
+    # The space of each avatar: outdoors, its room, or its bus.
+    mine = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
+    in_bus = p.vehicle == Vehicle.BUS
+    mine[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
+    feet = stances[residents]
     eyes = Viewpoints(
         feet[:, :3] + np.column_stack([np.zeros((len(residents), 2)), eye_height(state)[residents]]),
         p.yaw[residents],
@@ -308,15 +311,6 @@ def bodies_in_view(state: SimulationState, stances: NDArray[np.float64], residen
     spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
     sight = state.environment.sight_of(bodies.position, spaces >= 0)
     return in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities, sight=sight)
-
-
-def _spaces(state: SimulationState) -> NDArray[np.int64]:
-    """Return in which space each avatar is, as `Eyes.space`: outdoors, its room, or its bus."""
-    p = state.people
-    spaces = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
-    in_bus = p.vehicle == Vehicle.BUS
-    spaces[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
-    return spaces
 
 
 def _where_robot_is(robot: int, state: SimulationState) -> dict[str, Any]:
@@ -372,7 +366,7 @@ def agent_state(i: int, state: SimulationState) -> dict[str, Any]:
         "room": room.id if room else "",
         "place": place.id if place else "",
         "accessible_places": state.accessible_places(i),
-        "doors": state.doors_of(i),
+        "doors": state.doors_in(p.room.item(i)),
         "posture": _POSTURES[p.posture.item(i)],
         "action_status": _STATUSES[p.status.item(i)],
         "action_code": code_name(p.reason_code.item(i)),
@@ -424,12 +418,6 @@ def agent_poses(state: SimulationState) -> NDArray[np.float64]:
     return np.vstack([mine, np.column_stack([robots.position, ahead])])
 
 
-def camera_heights(state: SimulationState) -> NDArray[np.float64]:
-    """Return the height of every agent's camera above its position, metres."""
-    mine = eye_height(state)
-    return mine if state.robots is None else np.concatenate([mine, state.robots.camera_heights()])
-
-
 def observe(
     state: SimulationState,
     seeing: Sequence[int],
@@ -479,7 +467,7 @@ def observe(
 
 
 class _Pictures:
-    """What some agents see, by their names in the order of the views."""
+    """Pictures of some agents, by their names in the order of the views."""
 
     def __init__(self, views: Views, renderer: ObservationRenderer, names: Sequence[str]) -> None:
         self._views, self._renderer = views, renderer
@@ -510,9 +498,10 @@ def _render_views(
     """Return views of some agents."""
     order = list(seeing)
     cameras = stances.copy()
-    cameras[:, 2] += camera_heights(state)
+    people = len(state.people)
+    cameras[:people, 2] += eye_height(state)
     if state.robots is not None:
-        cameras[len(state.people) :] = state.robots.cameras()
+        cameras[people:] = state.robots.cameras()
     cameras = cameras[order]
     own = state.people.entity
     if state.robots is not None:
@@ -544,8 +533,3 @@ def distinct_entities(image: NDArray[np.int32]) -> list[int]:
 def _mark_corners(here, left, above, marks):  # type: ignore[no-untyped-def]
     for i in range(len(marks)):
         marks[i] = (here[i] != left[i]) & (here[i] != above[i])
-
-
-def gaze_vector(yaw: float, pitch: float) -> tuple[float, float, float]:
-    """Return the unit vector of a gaze, ENU; radians."""
-    return math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)

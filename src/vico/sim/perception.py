@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -64,23 +65,19 @@ _GRIDS: WeakKeyDictionary[World, OpaqueGrid] = WeakKeyDictionary()
 def opaque_grid(world: World) -> OpaqueGrid:
     """Return the tops of a world's buildings; found once a world."""
     if world not in _GRIDS:
-        _GRIDS[world] = _rasterise(world)
+        n = math.ceil(2 * world.half / _CELL)
+        highest = np.array([building.base + building.height for building in world.buildings], np.float32)
+        tops = np.concatenate([np.array([-np.inf], np.float32), np.unique(highest)])
+        level = np.zeros((n, n), np.uint16 if len(tops) <= np.iinfo(np.uint16).max else np.uint32)
+        of_building = np.searchsorted(tops, highest)
+        # The highest are written last.
+        for k in np.argsort(of_building, kind="stable").tolist():
+            rings = [np.asarray(ring, np.float64) for ring in world.buildings[k].footprint]
+            starts = np.cumsum([0, *map(len, rings)])
+            x, y = np.ascontiguousarray(np.concatenate(rings).T)
+            fill_polygon(level, x, y, starts, float(world.half), _CELL, level.dtype.type(of_building[k]))
+        _GRIDS[world] = OpaqueGrid(level, tops, world.half)
     return _GRIDS[world]
-
-
-def _rasterise(world: World) -> OpaqueGrid:
-    n = math.ceil(2 * world.half / _CELL)
-    highest = np.array([building.base + building.height for building in world.buildings], np.float32)
-    tops = np.concatenate([np.array([-np.inf], np.float32), np.unique(highest)])
-    level = np.zeros((n, n), np.uint16 if len(tops) <= np.iinfo(np.uint16).max else np.uint32)
-    of_building = np.searchsorted(tops, highest)
-    # The highest are written last.
-    for k in np.argsort(of_building, kind="stable").tolist():
-        rings = [np.asarray(ring, np.float64) for ring in world.buildings[k].footprint]
-        starts = np.cumsum([0, *map(len, rings)])
-        x, y = np.ascontiguousarray(np.concatenate(rings).T)
-        fill_polygon(level, x, y, starts, float(world.half), _CELL, level.dtype.type(of_building[k]))
-    return OpaqueGrid(level, tops, world.half)
 
 
 #: The space of all that is in no room and no bus.
@@ -162,7 +159,7 @@ class InView:
         for k, far in zip(self._chosen.tolist(), self.distance.tolist(), strict=True):
             if far > reach:
                 return
-            yield self._seen(k, far)
+            yield self._body_in_view(k, far)
 
     def agents_within(self, reach: float) -> Iterator[str]:
         """Yield the names of the agents that are no farther away than `reach` metres, nearest first."""
@@ -179,7 +176,7 @@ class InView:
         first = int(wanted.argmax()) if len(wanted) else 0
         return float(self.distance[first]) if len(wanted) and wanted[first] else math.inf
 
-    def _seen(self, k: int, distance: float) -> SeenBody:
+    def _body_in_view(self, k: int, distance: float) -> SeenBody:
         entity = int(self._bodies.entity[k])
         about = self._entities.get(entity, {})
         x, y, z = self._bodies.position[k].tolist()
@@ -275,14 +272,16 @@ def in_view(
         How far off bodies are noticed outdoors, metres, one for all or one each; at most `SIGHT`.
     """
     looked_at = bodies.position + np.column_stack([np.zeros((len(bodies), 2)), _LOOKED_AT * bodies.height])
-    keys = _keys(looked_at, spaces)
+    # By the space each point is in, outdoors by its cell: only those of near ones see each other.
+    cells = np.floor(looked_at[:, :2] / SIGHT).astype(np.int64)
+    keys = np.where(spaces == OUTDOORS, _cell_key(cells[:, 0], cells[:, 1]), spaces)
     by_key = np.argsort(keys, kind="stable")
     who, what, far = _pairs(
         np.column_stack([eyes.position, np.cos(eyes.yaw), np.sin(eyes.yaw)]),
         np.column_stack([eyes.entity, eyes.space]).astype(np.int64),
         np.column_stack([looked_at, np.broadcast_to(sight, len(bodies))]),
         np.column_stack([bodies.entity, spaces]).astype(np.int64),
-        np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell]),
+        _Limits(SIGHT, math.cos(_HALF_ANGLE), _FREE_END, float(opaque.half), float(opaque.cell)),
         (opaque.level, opaque.tops),
         keys[by_key],
         by_key,
@@ -297,16 +296,38 @@ def is_clear(one: NDArray[np.float64], other: NDArray[np.float64], opaque: Opaqu
     return bool(_is_clear(one, other, away, _FREE_END, opaque.half, opaque.cell, (opaque.level, opaque.tops)))
 
 
-def _keys(points: NDArray[np.float64], spaces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a number for the space each point is in, outdoors for the cell: only those of near ones see each other."""
-    cells = np.floor(points[:, :2] / SIGHT).astype(np.int64)
-    return np.where(spaces == OUTDOORS, _cell_key(cells[:, 0], cells[:, 1]), spaces)
-
-
 @compiled
 def _cell_key(column, row):  # type: ignore[no-untyped-def]
     """Return the key of a cell as wide as one sees; below those of all spaces indoors."""
     return -1 - (((column + _HALF_KEYS) << 20) | (row + _HALF_KEYS))
+
+
+class _Limits(NamedTuple):
+    """What limits sight.
+
+    Attributes
+    ----------
+    farthest
+        Metres that anybody sees.
+    cosine
+        Of half the angle of view.
+    free_end
+        Metres at either end of a line of sight on which nothing hides.
+    half, cell
+        Of the grid of buildings, see `OpaqueGrid`.
+    """
+
+    farthest: float
+    cosine: float
+    free_end: float
+    half: float
+    cell: float
+
+
+# Columns of `eyes` after the position: the gaze over the ground; of `targets`, metres from which each is noticed.
+_GAZE_X = 3
+_GAZE_Y = 4
+_NOTICED = 3
 
 
 @compiled
@@ -314,9 +335,9 @@ def _pairs(eyes, mine, targets, theirs, limits, heights, keys, order):  # type: 
     """Return who has what in view, and how far away it is; indices of agents and bodies, metres.
 
     `eyes` holds position and gaze (a unit vector over the ground), `mine` and `theirs` entity and space; `keys` are the
-    targets' (`_keys`) in ascending order, `order` whose each is.
+    targets' spaces and cells in ascending order, `order` whose each is.
     """
-    sight = limits[0]
+    sight = limits.farthest
     who, what, far = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
     for i in range(len(eyes)):
         outdoors = mine[i, 1] < 0
@@ -340,12 +361,13 @@ def _pairs(eyes, mine, targets, theirs, limits, heights, keys, order):  # type: 
 @compiled
 def _distance_in_view(eye, target, outdoors, limits, heights):  # type: ignore[no-untyped-def]
     """Return how far away a point in the same space is, metres; -1 if it is out of view."""
-    farthest, cosine, free_end, half, cell = limits
     dx, dy = target[0] - eye[0], target[1] - eye[1]
     away = math.sqrt(dx * dx + dy * dy)
-    if away > (target[3] if outdoors else farthest) or dx * eye[3] + dy * eye[4] < cosine * away:
+    if away > (target[_NOTICED] if outdoors else limits.farthest):
         return -1.0
-    if outdoors and not _is_clear(eye, target, away, free_end, half, cell, heights):
+    if dx * eye[_GAZE_X] + dy * eye[_GAZE_Y] < limits.cosine * away:
+        return -1.0
+    if outdoors and not _is_clear(eye, target, away, limits.free_end, limits.half, limits.cell, heights):
         return -1.0
     return away
 

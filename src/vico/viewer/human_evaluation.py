@@ -109,7 +109,8 @@ class BrowserPerformance(Hook):
     """
 
     def __init__(self, control: Control, *, waits: float) -> None:
-        self.director = control
+        self.director = control.before_step
+        self._control = control
         self.hooks: Sequence[Hook] = ()
         self._waits = waits
         self._gone = False
@@ -120,7 +121,7 @@ class BrowserPerformance(Hook):
     @property
     def over(self) -> bool:
         """Whether it is to end before its time."""
-        return self.director.over
+        return self._control.over
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Wait for the person from now on: the scene is set, which takes a while."""
@@ -131,7 +132,7 @@ class BrowserPerformance(Hook):
         """Go on when the person comes, and wait for them when they leave."""
         self._there = there
         self._cancel()
-        self.director.command("resume" if there else "pause", {})
+        self._control.command("resume" if there else "pause", {})
         if not there:
             self._wait()
 
@@ -144,7 +145,7 @@ class BrowserPerformance(Hook):
             If the person left and did not come back.
         """
         if self._gone:
-            step = self.director.step
+            step = self._control.step
             raise InputError(f"nobody played: after {step * PERIOD:g} s the page was gone for {self._waits:g} s")
 
     def close(self) -> None:
@@ -166,7 +167,7 @@ class BrowserPerformance(Hook):
     def _give_up(self) -> None:
         self._gone = True
         with suppress(InputError):
-            self.director.command("stop", {})
+            self._control.command("stop", {})
 
 
 class HumanChallenge(AssistantChallenge):

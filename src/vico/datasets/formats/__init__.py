@@ -1,1 +1,1 @@
-"""How a dataset lies on the disk: one module a format."""
+"""Formats of datasets on the disk: one module a format."""

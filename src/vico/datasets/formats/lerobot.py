@@ -15,7 +15,7 @@ Depth and entities are exact: arrays in the data files, of shape ``(size, size)`
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +24,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from vico.datasets.episodes import Statistics, vector_statistics
+from vico.datasets.episodes import vector_statistics
 from vico.datasets.layout import IMAGES, STATUSES, EpisodeColumns, Layout, PartEpisode, vectors
 from vico.datasets.pictures import frames_of_video, joined_video
 from vico.io.files import write_json
 
 VERSION = "v3.0"
-#: Files are filled up to these sizes, MB, as LeRobot does it; a chunk has so many files.
-DATA_MB, VIDEO_MB, CHUNK = 100, 200, 1000
+# Files are filled up as LeRobot does it.
+DATA_MB = 100  # MB of a data file
+VIDEO_MB = 200  # MB of a video
+CHUNK = 1000  # files of a chunk
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
@@ -49,25 +51,24 @@ def assemble(out: Path, layout: Layout) -> None:
     _write_tasks(out / TASKS, layout.instructions)
     _write_episodes(out / EPISODES, layout, places, videos)
     write_json(out / "meta" / "stats.json", layout.statistics())
-    write_json(out / "meta" / "info.json", _info(layout, features))
-
-
-def _info(layout: Layout, features: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "codebase_version": VERSION,
-        "robot_type": f"vico_{layout.body}",
-        "total_episodes": len(layout.episodes),
-        "total_frames": layout.frames,
-        "total_tasks": len(layout.instructions),
-        "chunks_size": CHUNK,
-        "data_files_size_in_mb": DATA_MB,
-        "video_files_size_in_mb": VIDEO_MB,
-        "fps": layout.fps,
-        "splits": {name: f"{first}:{end}" for name, (first, end) in layout.splits.items()},
-        "data_path": DATA,
-        "video_path": VIDEO if "rgb" in layout.contents.outputs else None,
-        "features": features,
-    }
+    write_json(
+        out / "meta" / "info.json",
+        {
+            "codebase_version": VERSION,
+            "robot_type": f"vico_{layout.body}",
+            "total_episodes": len(layout.episodes),
+            "total_frames": layout.frames,
+            "total_tasks": len(layout.instructions),
+            "chunks_size": CHUNK,
+            "data_files_size_in_mb": DATA_MB,
+            "video_files_size_in_mb": VIDEO_MB,
+            "fps": layout.fps,
+            "splits": {name: f"{first}:{end}" for name, (first, end) in layout.splits.items()},
+            "data_path": DATA,
+            "video_path": VIDEO if "rgb" in layout.contents.outputs else None,
+            "features": features,
+        },
+    )
 
 
 def _features(layout: Layout, *, texts: bool) -> dict[str, Any]:
@@ -229,13 +230,11 @@ def _write_episodes(path: Path, layout: Layout, places: Sequence[int], videos: S
                 f"{prefix}/to_timestamp": (start + n) / layout.fps,
             }
         statistics = {name: vector_statistics(values) for name, values in columns.numbers().items()}
-        rows.append(row | _flat(statistics | layout.picture_statistics([episode])))
+        statistics |= layout.picture_statistics([episode])
+        row |= {f"stats/{name}/{key}": value for name, one in statistics.items() for key, value in one.items()}
+        rows.append(row)
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(pa.Table.from_pylist(rows), path, compression="zstd")
-
-
-def _flat(statistics: Mapping[str, Statistics]) -> dict[str, Any]:
-    return {f"stats/{name}/{key}": value for name, one in statistics.items() for key, value in one.items()}
 
 
 def episode_frames(folder: Path, index: int, outputs: Sequence[str], fps: int) -> Iterator[dict[str, Any]]:

@@ -14,7 +14,7 @@ from vico.datasets.pictures import BlobWriter, PictureWriter, VideoWriter
 
 @dataclass(frozen=True)
 class Format:
-    """How a dataset lies on the disk.
+    """Format of a dataset on the disk.
 
     Attributes
     ----------

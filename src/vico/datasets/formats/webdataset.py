@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 
-from vico.datasets.layout import EpisodeColumns, Layout
+from vico.datasets.layout import Layout
 from vico.datasets.pictures import array_of_blob, npy_of
 from vico.io.files import read_json, write_json
 
@@ -52,34 +52,28 @@ def assemble(out: Path, layout: Layout) -> None:
             pictures = pq.read_table(episode.pictures.blobs, memory_map=False) if layout.contents.outputs else None
             for frame in range(len(columns)):
                 blobs = {} if pictures is None else {n: pictures[n][frame].as_py() for n in layout.contents.outputs}
-                _add_sample(tar, columns, frame, layout, blobs)
+                key = f"ep{columns.index:06d}_{frame:05d}"
+                about = {
+                    "episode_index": columns.index,
+                    "frame_index": frame,
+                    "timestamp": float(columns.timestamp[frame]),
+                    "step": int(columns.step[frame]),
+                    "task": layout.instructions[int(columns.task[frame])],
+                    "action.text": columns.text[frame],
+                    "action.status": int(columns.status[frame]),
+                    "next.done": bool(columns.done[frame]),
+                    "next.success": bool(columns.success[frame]),
+                }
+                _add(tar, f"{key}.json", json.dumps(about, sort_keys=True, ensure_ascii=False).encode())
+                for name, values in columns.vectors.items():
+                    _add(tar, f"{key}.{_VECTORS[name]}.npy", npy_of(values[frame]))
+                for output, blob in blobs.items():
+                    _add(tar, f"{key}.{_ENDINGS[output]}", blob)
     finally:
         if tar is not None:
             tar.close()
     write_json(out / INDEX, shards)
     write_json(out / "stats.json", layout.statistics())
-
-
-def _add_sample(
-    tar: tarfile.TarFile, columns: EpisodeColumns, frame: int, layout: Layout, blobs: Mapping[str, bytes]
-) -> None:
-    key = f"ep{columns.index:06d}_{frame:05d}"
-    about = {
-        "episode_index": columns.index,
-        "frame_index": frame,
-        "timestamp": float(columns.timestamp[frame]),
-        "step": int(columns.step[frame]),
-        "task": layout.instructions[int(columns.task[frame])],
-        "action.text": columns.text[frame],
-        "action.status": int(columns.status[frame]),
-        "next.done": bool(columns.done[frame]),
-        "next.success": bool(columns.success[frame]),
-    }
-    _add(tar, f"{key}.json", json.dumps(about, sort_keys=True, ensure_ascii=False).encode())
-    for name, values in columns.vectors.items():
-        _add(tar, f"{key}.{_VECTORS[name]}.npy", npy_of(values[frame]))
-    for output, blob in blobs.items():
-        _add(tar, f"{key}.{_ENDINGS[output]}", blob)
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:

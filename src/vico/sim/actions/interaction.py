@@ -13,7 +13,7 @@ from vico.geometry import distance, distances
 from vico.rules import EARSHOT, REACH, ReasonCode, reach_up
 from vico.sim.actions.model import ActionType, Actors, Field, Refusal, Situation, Values, short
 from vico.sim.bodies.arrays import RESIDENT
-from vico.sim.bodies.collisions import DeckPose, box_gap, free_place_on_deck, lay_on_deck
+from vico.sim.bodies.collisions import box_gap, free_place_on_deck, lay_on_deck
 from vico.sim.bodies.seats import AT_SPOT, PRICE, SERVICE
 from vico.sim.bodies.state_arrays import Posture, Vehicle
 from vico.sim.people.hearing import listeners_of_person, listeners_of_robot
@@ -76,12 +76,8 @@ def check_pick(values: Values, i: int, state: SimulationState) -> Refusal | None
         return Refusal(ReasonCode.NOT_PORTABLE, f"pick: {values['object']} is nothing that can be carried")
     if objects.hand[k] >= 0:
         return Refusal(ReasonCode.HELD_ALREADY, f"pick: {objects.names[k]} is in somebody's hand")
-    return _refuse_out_of_reach(k, i, state)
-
-
-def _refuse_out_of_reach(k: int, i: int, state: SimulationState) -> Refusal | None:
-    p, what, point = state.people, state.objects.names[k], state.objects.position[k]
-    if int(state.objects.room[k]) != p.room[i]:
+    what, point = objects.names[k], objects.position[k]
+    if int(objects.room[k]) != p.room[i]:
         return Refusal(ReasonCode.ELSEWHERE, f"pick: {what} is not in here")
     away = math.hypot(point[0] - p.position[i, 0], point[1] - p.position[i, 1])
     if away > REACH:
@@ -208,7 +204,13 @@ def put_down(target: Any, i: int, hand: int, state: SimulationState) -> Placemen
                 return _on(container, i, k, state)
     deck = state.deck(target)
     if deck is not None:
-        return _on_deck(target, deck, i, k, state)
+        away = deck.gap(state.people.position[i])
+        if state.people.room[i] >= 0 or away > REACH:
+            return Refusal(ReasonCode.TOO_FAR, f"put: the deck is {away:.1f} m away; reach is {REACH} m")
+        place = free_place_on_deck(deck, target, k, state.objects)
+        if isinstance(place, str):
+            return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {place}")
+        return PlacementPoint(deck.world(place), carrier=target, offset=place)
     return Refusal(ReasonCode.UNKNOWN_TARGET, f"put: {target} is nothing here that a thing can be put on")
 
 
@@ -253,18 +255,10 @@ def _at_point(
     on_another = object_top_below(thing, point, room, state)
     if on_another is not None and on_another[0][2] > height:
         return PlacementPoint(on_another[0], on=on_another[1])
-    return _on_surface(surface, i, thing, state)
-
-
-def _on_surface(
-    spot: NDArray[np.float64], i: int, thing: ObjectBox, state: SimulationState
-) -> PlacementPoint | Refusal:
-    """Return a spot of a surface, or one beside it where something is there."""
-    p, room = state.people, int(state.people.room[i])
-    other = overlapping_entity(thing, spot, room, state)
+    other = overlapping_entity(thing, surface, room, state)
     if other == 0:
-        return PlacementPoint(spot)
-    beside = free_spot_on_surface(thing, spot, room, state, within=_BESIDE)
+        return PlacementPoint(surface)
+    beside = free_spot_on_surface(thing, surface, room, state, within=_BESIDE)
     if beside is None or math.hypot(beside[0] - p.position[i, 0], beside[1] - p.position[i, 1]) > REACH:
         name = state.entity(other)["name"]
         return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {name} is at that point, and there is no room beside it")
@@ -300,16 +294,6 @@ def _on(container: Container, i: int, k: int, state: SimulationState) -> Placeme
         if clear.all() and not on_floor_below:
             return PlacementPoint(np.array([*spots[index], z]))
     return Refusal(ReasonCode.NO_FREE_SPOT, f"put: no free spot on the {container.kind} within reach")
-
-
-def _on_deck(entity: int, deck: DeckPose, i: int, k: int, state: SimulationState) -> PlacementPoint | Refusal:
-    away = deck.gap(state.people.position[i])
-    if state.people.room[i] >= 0 or away > REACH:
-        return Refusal(ReasonCode.TOO_FAR, f"put: the deck is {away:.1f} m away; reach is {REACH} m")
-    place = free_place_on_deck(deck, entity, k, state.objects)
-    if isinstance(place, str):
-        return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {place}")
-    return PlacementPoint(deck.world(place), carrier=entity, offset=place)
 
 
 _HAND = Field("hand", slot="hand")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vico.clock import DAY, clock_of
 from vico.rules import (
@@ -156,7 +155,10 @@ def _seat_for(posture: Posture, values: Values, i: int, state: SimulationState) 
     p, seats = state.people, state.seats
     lies, asked = posture == Posture.LYING, values.get("target")
     verb, what = ("sleep", "bed") if lies else ("sit", "seat")
-    near = seats.near(_feet(i, state), int(p.room[i]), lies=lies)
+    # Who sits may lie down at once: they are looked for from the floor.
+    x, y, z = p.position[i]
+    feet = np.array([x, y, z if p.seat[i] < 0 else seats.floor[p.seat[i]]])
+    near = seats.near(feet, int(p.room[i]), lies=lies)
     if asked is not None:
         near = near[seats.entity[near] == asked]
         what = f"{what} with the number {asked}"
@@ -173,13 +175,6 @@ def _seat_for(posture: Posture, values: Values, i: int, state: SimulationState) 
     if seat is None:
         return Refusal(ReasonCode.NO_SEAT, f"{verb}: somebody stands at every free {what} within {REACH} m")
     return seat
-
-
-def _feet(i: int, state: SimulationState) -> NDArray[np.float64]:
-    """Return where a person is on the floor: who sits may lie down at once."""
-    p = state.people
-    x, y, z = p.position[i]
-    return np.array([x, y, z if p.seat[i] < 0 else state.seats.floor[p.seat[i]]])
 
 
 def _check_getting_up(verb: str, i: int, state: SimulationState) -> Refusal | None:
@@ -280,9 +275,13 @@ def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | Non
     """Judge going in: through an entrance from the street, through a door from a room."""
     p, name = state.people, values["place"]
     if p.at_door().item(i):
-        return _refuse_at_door(name, i, state)
+        if p.room[i] < 0 and state.place_index.get(name) == p.door[i]:
+            return None  # on the way in
+        return Refusal(ReasonCode.MOVING, "enter: on the way through a door; wait until you are through")
     if p.lift_left[i] > 0.0:
-        return _refuse_in_lift(name, i, state)
+        if state.indoor.index.get(name) == p.lift_room[i]:
+            return None  # on the way there
+        return Refusal(ReasonCode.MOVING, f"enter: the lift is moving; it is there in {p.lift_left[i]:.1f} s")
     refusal = _refuse_inner_door(name, i, state) if p.room[i] >= 0 else _refuse_entrance(name, i, state)
     if refusal is not None:
         return refusal
@@ -291,20 +290,6 @@ def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | Non
     if state.indoor.free_spot(room, anchor, state.taken_in(room)) is None:
         return Refusal(ReasonCode.FULL, "enter: it is full")
     return None
-
-
-def _refuse_at_door(name: str, i: int, state: SimulationState) -> Refusal | None:
-    p = state.people
-    if p.room[i] < 0 and state.place_index.get(name) == p.door[i]:
-        return None  # on the way in
-    return Refusal(ReasonCode.MOVING, "enter: on the way through a door; wait until you are through")
-
-
-def _refuse_in_lift(name: str, i: int, state: SimulationState) -> Refusal | None:
-    p = state.people
-    if state.indoor.index.get(name) == p.lift_room[i]:
-        return None  # on the way there
-    return Refusal(ReasonCode.MOVING, f"enter: the lift is moving; it is there in {p.lift_left[i]:.1f} s")
 
 
 def _refuse_inner_door(name: str, i: int, state: SimulationState) -> Refusal | None:

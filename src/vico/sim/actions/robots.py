@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
 from vico.sim.actions.model import ActionType, Actors, Field, Refusal, Situation, Values, short
 from vico.sim.people.doors import closed_reason, place_of_room
-from vico.sim.robots.population import RobotPopulation
 from vico.sim.state.simulation_state import SimulationState
+
+if TYPE_CHECKING:
+    from vico.sim.robots.population import RobotPopulation
 
 
 def check_control(values: Values, robot: int, state: SimulationState) -> Refusal | None:
@@ -28,7 +30,9 @@ def check_control(values: Values, robot: int, state: SimulationState) -> Refusal
     width, given = len(spaces[name]), len(values["vector"])
     if given == width:
         return None
-    sentence = f"control: {given} numbers; this robot takes {width} for {name!r}: {_describe(spaces[name])}"
+    units = ", ".join(dict.fromkeys(spaces[name].units))
+    entries = ", ".join(spaces[name].entries[:4]) + (", ..." if width > 4 else "")
+    sentence = f"control: {given} numbers; this robot takes {width} for {name!r}: {entries} ({units})"
     return Refusal(ReasonCode.WRONG_SIZE, sentence)
 
 
@@ -227,12 +231,6 @@ def _refuse_without_velocities(action: str, robot: int, state: SimulationState) 
         return _refuse_without_power(action, robot, state)
     sentence = f"{action}: this robot follows no velocities; it takes control ({', '.join(spaces)})"
     return Refusal(ReasonCode.NOT_ABLE, sentence)
-
-
-def _describe(space: ActionSpace) -> str:
-    units = dict.fromkeys(space.units)
-    entries = ", ".join(space.entries[:4]) + (", ..." if len(space) > 4 else "")
-    return f"{entries} ({', '.join(units)})"
 
 
 def _robots(state: SimulationState) -> RobotPopulation:

@@ -189,7 +189,11 @@ def apply_actions(actions: Mapping[str, Any], faults: Mapping[str, AgentFault], 
     refused = 0
     for agent, name in enumerate(state.names):
         if name in faults:
-            _note_fault(faults[name], agent, state)
+            status, reason = faults[name]
+            late = status is ActionStatus.LATE
+            state.set_outcome(agent, status, ReasonCode.AGENT_LATE if late else ReasonCode.AGENT_FAILED, reason)
+            kind = "agent_late" if late else "agent_failed"
+            state.events.add(kind, name, reason[:REASON_LENGTH], state.position_of(agent))
         elif (action := actions.get(name)) is not None and not _is_wait(action):
             verdict = check(action, agent, state)
             if isinstance(verdict, Command):
@@ -215,11 +219,3 @@ def perform(command: Command, agent: int, state: SimulationState) -> None:
     people = len(state.people)
     robot = agent >= people
     form_of(command.kind, robot=robot).perform(command.values, agent - people if robot else agent, state)
-
-
-def _note_fault(fault: AgentFault, agent: int, state: SimulationState) -> None:
-    status, reason = fault
-    late = status is ActionStatus.LATE
-    state.set_outcome(agent, status, ReasonCode.AGENT_LATE if late else ReasonCode.AGENT_FAILED, reason)
-    kind = "agent_late" if late else "agent_failed"
-    state.events.add(kind, state.names[agent], reason[:REASON_LENGTH], state.position_of(agent))

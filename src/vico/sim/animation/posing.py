@@ -282,7 +282,7 @@ def ground_under_feet(
     ground = np.zeros((len(people), 2, 2, 4))
     ground[..., LEVEL] = np.where(edge, found.max(axis=-1), heel + rise * behind / run)
     ground[..., TILT] = np.where(edge, 0.0, -each(math.atan2, rise, run))
-    steps = edge & _walks(numbers)[:, None, None]
+    steps = edge & np.isin(numbers, GAITS)[:, None, None]
     if roughly is not None:
         steps &= ~roughly[:, None, None]
     if steps.any():
@@ -295,10 +295,6 @@ def ground_under_feet(
         ground[who, side, when, AHEAD], ground[who, side, when, LEVEL] = ahead, level - position[who, 2]
         ground[who, side, when, OVER] = over
     return ground
-
-
-def _walks(clip: NDArray[np.int64]) -> NDArray[np.bool_]:
-    return np.isin(clip, GAITS)
 
 
 def _off_the_edge(

@@ -114,10 +114,10 @@ class DoorsListed:
         """Return the doors of all rooms."""
         rows = np.frombuffer(self._rows, np.float64).reshape(-1, 8) if self._rows else np.zeros((0, 8))
         if self._others:
-            rows = np.concatenate([rows, self._linked(rooms, places)])
+            rows = np.concatenate([rows, self._doors_between(rooms, places)])
         return RoomDoors(rows, len(rooms))
 
-    def _linked(self, rooms: Sequence[Room], places: Iterable[Place]) -> NDArray[np.float64]:
+    def _doors_between(self, rooms: Sequence[Room], places: Iterable[Place]) -> NDArray[np.float64]:
         """Return the doors of the rooms that list none."""
         found: dict[int, dict[int, Point3]] = {k: {} for k in self._others}
         rank = {}
@@ -248,7 +248,7 @@ class Indoor:
         found: NDArray[np.float64] = _free_room(np.ascontiguousarray(points), self.boxes[room], furniture)
         return found
 
-    def joined(self, room: int, spots: ArrayLike, *, within: float) -> bool:
+    def are_connected(self, room: int, spots: ArrayLike, *, within: float) -> bool:
         """Return whether a person can walk between some spots of a room, shape ``(k, >= 2)``.
 
         Only ways are looked for that leave the square around the spots by no more than `within` metres.

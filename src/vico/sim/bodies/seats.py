@@ -136,10 +136,10 @@ class Seats:
         floor[~outdoors] = indoor.floors_at(room[~outdoors], rows[~outdoors, 1:3])
         return cls(
             np.asarray(objects.entity[owner], np.int32),
-            rows[:, 5] > 0,
+            rows[:, _LIES] > 0,
             np.ascontiguousarray(rows[:, 1:4]),
             floor,
-            np.ascontiguousarray(rows[:, 4]),
+            np.ascontiguousarray(rows[:, _YAW]),
             room,
         )
 
@@ -225,6 +225,11 @@ class Seats:
         yaw = self.yaw[seat] + (0.5 * math.pi if self.lies[seat] else 0.0)
         away = STEP_OFF + (0.3 if self.lies[seat] else 0.0)
         return np.array([x + away * math.cos(yaw), y + away * math.sin(yaw), self.floor[seat]])
+
+
+# Columns of `_places_of`: radians, and whether one lies.
+_YAW = 4
+_LIES = 5
 
 
 def _places_of(objects: Objects, name: str, seat: Seat) -> NDArray[np.float64]:
@@ -381,7 +386,7 @@ class Till:
             spot = x - (depth + away) * math.cos(yaw), y - (depth + away) * math.sin(yaw)
             if self._indoor.gap(self.room, spot) <= RADIUS + _AIR:
                 continue
-            if self._indoor.joined(self.room, np.array([spot, self.spots[0]]), within=_AROUND):
+            if self._indoor.are_connected(self.room, np.array([spot, self.spots[0]]), within=_AROUND):
                 return *spot, yaw
         return None
 

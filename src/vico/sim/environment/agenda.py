@@ -216,7 +216,7 @@ class Agenda:
         return self._going_on
 
     @property
-    def announced(self) -> Sequence[Occurrence]:
+    def announced_events(self) -> Sequence[Occurrence]:
         """The events that everybody knows of and that are not over, by id."""
         return [
             one
@@ -225,7 +225,7 @@ class Agenda:
         ]
 
     @property
-    def changed(self) -> bool:
+    def has_news(self) -> bool:
         """Whether an event has begun or ended within the last second."""
         return any(0 <= self._second - when <= 1 for event in self._events for when in (event.begin, event.end))
 

@@ -161,8 +161,8 @@ class CityEvent:
 
     def record(self) -> dict[str, Any]:
         """Return the event as JSON has it; an end that nobody knows is None."""
-        found = asdict(self)
-        return found | {"region": list(self.region) if self.region else None, "end": _finite(self.end)}
+        region = list(self.region) if self.region else None
+        return asdict(self) | {"region": region, "end": self.end if math.isfinite(self.end) else None}
 
     @classmethod
     def of(cls, record: Mapping[str, Any]) -> CityEvent:
@@ -217,10 +217,6 @@ def _event(line: _Line, where: str) -> CityEvent:
         return CityEvent(begin=begin, end=end, **given)
     except InputError as error:
         raise InputError(f"{where}: {str(error).removeprefix('events: ')}") from None
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 @dataclass(frozen=True)

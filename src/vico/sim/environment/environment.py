@@ -51,8 +51,12 @@ from vico.sim.environment.weather import (
 #: How far anybody is noticed by daylight in clear air, metres.
 CLEAR_SIGHT = 40.0
 
-_DRY, _WET, _SNOW, _ICE = 0.9, 0.55, 0.25, 0.1
-_GRAVITY = 9.81
+# Friction of tyres on the ground.
+_DRY = 0.9
+_WET = 0.55
+_SNOW = 0.25
+_ICE = 0.1
+_GRAVITY = 9.81  # m/s²
 # Bodies are told from what is behind them as far as this share of meteorological visibility.
 _NOTICED = 0.4
 # In the dark, people are noticed this far off where no lamps are lit, metres.

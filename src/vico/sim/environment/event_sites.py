@@ -165,7 +165,8 @@ class EventSites:
             return np.array(self.place(event.place).position, np.float64)
         shape = self.street(event) if event.street else self.ground(event)
         if event.street:
-            point = shapely.get_coordinates(shapely.line_interpolate_point(_longest(shape), 0.5, normalized=True))[0]
+            longest = max(shapely.get_parts(shapely.line_merge(shape)), key=lambda line: float(line.length))
+            point = shapely.get_coordinates(shapely.line_interpolate_point(longest, 0.5, normalized=True))[0]
         else:
             point = shapely.get_coordinates(shape.centroid)[0]
         return np.array([*point, float(self._world.height(point))])
@@ -205,17 +206,13 @@ class EventSites:
         return roads
 
 
-def _longest(lines: shapely.Geometry) -> shapely.Geometry:
-    """Return the longest line of several, joined where they meet."""
-    return max(shapely.get_parts(shapely.line_merge(lines)), key=lambda line: float(line.length))
-
-
 # A barrier stands so far within its lane, metres, or in its middle if that is nearer.
 _INTO_LANE = 4.0
 #: What stands across closed lanes.
 BARRIER = "road_barrier"
-# Stalls stand so far apart, with so much free ground around the middle of each, and of a stage, metres.
-_STALLS_APART, _STALL_ROOM, _STAGE_ROOM = 5.0, 2.2, 5.0
+_STALLS_APART = 5.0  # m between stalls
+_STALL_ROOM = 2.2  # m of free ground around the middle of a stall
+_STAGE_ROOM = 5.0  # m of free ground around the middle of a stage
 # Directions in which it is asked what is there.
 _AROUND = np.array([(np.cos(a), np.sin(a)) for a in np.arange(12) * np.pi / 6])
 # Cars that have run into each other: metres between their middles, and radians that the one behind is askew.
@@ -238,7 +235,17 @@ def spots_of(one: Occurrence, sites: EventSites) -> list[Spot]:
     models = list(one.kind.things)
     if models == [BARRIER]:
         return _before_lanes(BARRIER, one, sites)
-    return _on_a_lane(models, one, sites)
+    # One behind the other in the middle of the longest closed lane that no bus takes, askew.
+    lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
+    usable = [k for k in np.flatnonzero(closed).tolist() if k not in _lanes_of_buses(sites)]
+    if not usable or not models:
+        return []
+    lane = max(usable, key=lambda k: (float(lanes.length[k]), -k))
+    found = []
+    for k, model in enumerate(models):
+        x, y, yaw = lanes.at(lane, max(float(lanes.length[lane]) / 2 - _CAR_APART * k, 0.0)).tolist()
+        found.append(Spot(model, x, y, yaw + _ASKEW * k))
+    return found
 
 
 def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
@@ -261,20 +268,6 @@ def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
     return [Spot(model, float(x), float(y), 0.0) for model, (x, y) in zip(models, chosen, strict=False)]
 
 
-def _on_a_lane(models: list[str], one: Occurrence, sites: EventSites) -> list[Spot]:
-    """Return spots one behind the other in the middle of the longest closed lane that no bus takes, askew."""
-    lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
-    usable = [k for k in np.flatnonzero(closed).tolist() if k not in _lanes_of_buses(sites)]
-    if not usable or not models:
-        return []
-    lane = max(usable, key=lambda k: (float(lanes.length[k]), -k))
-    found = []
-    for k, model in enumerate(models):
-        x, y, yaw = lanes.at(lane, max(float(lanes.length[lane]) / 2 - _CAR_APART * k, 0.0)).tolist()
-        found.append(Spot(model, x, y, yaw + _ASKEW * k))
-    return found
-
-
 def _lanes_of_buses(sites: EventSites) -> set[int]:
     index = sites.world.lanes.index
     return {index[lane] for line in sites.world.transit.lines for lane in line.lanes if lane in index}
@@ -295,10 +288,15 @@ def _before_lanes(model: str, one: Occurrence, sites: EventSites) -> list[Spot]:
 
 Floats = NDArray[np.float64]
 
-#: Metres that a march goes a second, between its rows, and between two beside each other.
-MARCH_SPEED, ROW_APART, BESIDE_APART = 0.6, 1.4, 0.95
+MARCH_SPEED = 0.6  # m/s of a march
+ROW_APART = 1.4  # m between its rows
+BESIDE_APART = 0.95  # m between two beside each other
 _ROOM = 0.35  # m around who stands
-_NEAREST, _ROWS, _ROW_DEPTH, _VISITORS_APART, _WIDEST = 5.5, 7, 1.2, 1.1, 1.3  # m, rows, m, m and rad of a half circle
+_NEAREST = 5.5  # m from a stage to the first row before it
+_ROWS = 7  # rows before a stage
+_ROW_DEPTH = 1.2  # m from a row to the next
+_VISITORS_APART = 1.1  # m between two of a row
+_WIDEST = 1.3  # rad to either side that a row goes round a stage
 _BEFORE_STALL = 2.0  # m from a stall's middle to who looks at it
 _ENTRY_WITHIN, _ENTRY_EVERY = 70.0, 3.0  # m from the middle to where people come from, and between points tried
 _NO_PLACES: Floats = np.zeros((0, 3))

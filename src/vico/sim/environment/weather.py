@@ -316,7 +316,7 @@ class Changing:
 
     def __init__(self, site: WeatherSite, seed: int) -> None:
         self._site, self._seed = site, seed
-        self._of_day = lru_cache(maxsize=8)(self._drawn)
+        self._of_day = lru_cache(maxsize=8)(self._draw_day)
 
     def at(self, seconds: float) -> NDArray[np.float64]:
         """Return the weather at a moment."""
@@ -335,7 +335,7 @@ class Changing:
             before = kinds_before[-1 if day > 0 else 0].weather(temperature, winds_before[-1 if day > 0 else 0])
         return blend_weather(before.array(), now, passed)
 
-    def _drawn(self, day: int) -> tuple[NDArray[np.float64], list[WeatherKind], list[float]]:
+    def _draw_day(self, day: int) -> tuple[NDArray[np.float64], list[WeatherKind], list[float]]:
         """Return when the weather of a day changes, seconds, to what, and where the wind comes from."""
         generator = rng(self._seed, "weather", day)
         noon = self._site.temperature(day * DAY + DAY / 2)

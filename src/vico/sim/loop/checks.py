@@ -1,32 +1,26 @@
-"""Checks and reports of a run: overlaps, jams, and physics that diverges.
+"""Checks and reports of a run: overlaps and jams.
 
 `OverlapCheck` looks at every pair of bodies, exactly, after every sub-step. Counted is what `docs/bodies.md` rules out:
 two bodies of one space deeper in each other than `TOLERANCE`; a person inside a wall, furniture or another solid; two
-passengers in one seat. `run_reports` says beside it who got stuck and who was taken out of a jam. Where the physics of
-a step has no finite solution, the state before it is kept for a report.
+passengers in one seat. `run_reports` says beside it who got stuck and who was taken out of a jam.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.clock import DAY, clock_of
-from vico.errors import OutputError
-from vico.io.cache import cache_folder
 from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTIONS
 from vico.sim.bodies.arrays import OBJECT, Bodies
 from vico.sim.bodies.collisions import WALL, SolidMap, gap_to, map_gap, room_gap
 from vico.sim.bodies.footprints import BODY, IN_BUS, OUTDOORS, body_gap, can_touch, neighbour_grid, records_of, search
 from vico.sim.bodies.state_arrays import FIRST_TRAM, FIRST_UMBRELLA, RADIUS
-from vico.sim.physics.records import PhysicsError
-from vico.sim.state.snapshot import state_hash, write_snapshot
 from vico.sim.traffic.jams import Jam
 from vico.world.heights import HeightField
 
@@ -344,48 +338,3 @@ def _jam_record(jam: Jam, began: float, state: SimulationState) -> dict[str, Any
         "seconds": round(jam.stood),
         "why": why or ("no way past" if kind == "pedestrian" else "waits for a junction or room on its way"),
     }
-
-
-class Restorable(Protocol):
-    """What has a state that can be kept and gone back to."""
-
-    @property
-    def identity(self) -> str:
-        """Version, configuration, world, community and objects in one hash."""
-
-    def snapshot(self) -> dict[str, NDArray[Any]]:
-        """Return a copy of the whole state."""
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to a snapshot."""
-
-
-@contextmanager
-def keep_state_if_diverged(sim: Restorable, seconds: float) -> Iterator[None]:
-    """Let a block move robots; if their motion diverges, write the state before it and go back to that.
-
-    Parameters
-    ----------
-    seconds
-        That the block takes, for the report.
-
-    Raises
-    ------
-    PhysicsError
-        If it diverged, with the path of the snapshot and how to see it again.
-    """
-    before = sim.snapshot()
-    try:
-        yield
-    except PhysicsError as error:
-        sim.restore(before)
-        path = cache_folder() / "diverged" / f"{state_hash(before)}.npz"
-        told = str(error).removesuffix("; report it with the snapshot")
-        try:
-            write_snapshot(path, before, owner=sim.identity)
-        except OutputError as failure:
-            raise PhysicsError(f"{told}; the state before it could not be kept: {failure}") from error
-        raise PhysicsError(
-            f"{told}; the state before it is in {path}: report it with that file, the world, the community and the "
-            f"configuration. Simulation.load({path.name!r}) and advance({seconds:g}) show it again"
-        ) from error

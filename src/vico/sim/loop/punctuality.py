@@ -35,7 +35,7 @@ EARLIEST, _LATEST = -300, 1800
 
 @dataclass
 class Punctuality(ArrayState):
-    """Who is due where next, and how it went so far.
+    """Next appointments of everybody, and how it went so far.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a task's author may do to a simulation before its first step, and what its evaluator may ask of it after."""
+"""Changes of a simulation by a task's author before its first step, and answers to its evaluator after."""
 
 from __future__ import annotations
 

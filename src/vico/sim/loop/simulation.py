@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.clock import clock_of
-from vico.errors import InputError, some_of
+from vico.errors import InputError, OutputError, some_of
+from vico.io.cache import cache_folder
 from vico.sim.actions import AgentFault, apply_actions
 from vico.sim.config import SimConfig, find_by_name
-from vico.sim.loop.checks import OverlapCheck, keep_state_if_diverged, run_reports
+from vico.sim.loop.checks import OverlapCheck, run_reports
 from vico.sim.loop.punctuality import Punctuality
 from vico.sim.loop.scenario import GroundTruth, Scenario
 from vico.sim.loop.start import initial_state
@@ -24,9 +25,10 @@ from vico.sim.loop.substeps import Metrics, StopWatch, advance_ticks
 from vico.sim.observations import ByAgent, ObservationRenderer, Observations, observe
 from vico.sim.people.hearing import follow_city_events
 from vico.sim.people.placement import advance_lines
+from vico.sim.physics.records import PhysicsError
 from vico.sim.state.base import SimulationBase
 from vico.sim.state.simulation_state import SimulationState
-from vico.sim.state.snapshot import arrays_of, copy_arrays, identity, read_snapshot, state_hash, write_snapshot
+from vico.sim.state.snapshot import arrays_of, identity, read_snapshot, state_hash, write_snapshot
 from vico.sim.state.steps import TICKS_PER_SECOND, ControlPeriods, Event, ticks_of
 from vico.world.mesh import Surface
 from vico.world.world import World
@@ -42,7 +44,7 @@ _PAGES_EVERY = 60
 
 @dataclass(frozen=True)
 class StepResult:
-    """What a step brought.
+    """Result of a step.
 
     Attributes
     ----------
@@ -133,7 +135,9 @@ class Simulation:
         days = self.base.days(community)[: len(self.residents)] if community is not None else []
         self.state = initial_state(self.base, self.residents, days, self.config, day)
         self._dressed_for = self.state.environment.weather
-        self.periods = _periods(self.state, self.config)
+        robots = self.state.robots
+        models = {} if robots is None else {name: robots.control_period(k) for k, name in enumerate(robots.names)}
+        self.periods = ControlPeriods.of(self.state.people.names, models, self.config.periods, start=self.state.tick)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
         self.look_away: Collection[str] = ()
@@ -179,7 +183,7 @@ class Simulation:
         """Return what finds the hash of the state as it is now, after a step."""
         tick = self.state.tick
 
-        def found() -> str:
+        def current_hash() -> str:
             if (self.metrics.steps, self.state.tick) != (step, tick):
                 raise InputError(
                     f"hash: the simulation has gone on since step {step}; ask a result before the next step"
@@ -189,7 +193,7 @@ class Simulation:
             watch.lap("hash")
             return digest
 
-        return found
+        return current_hash
 
     def act(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> None:
         """Let the agents that are due begin what they ask for, without any time passing; see `step`."""
@@ -233,7 +237,7 @@ class Simulation:
         while state.tick < end:
             until = min(end, state.tick - state.tick % TICKS_PER_SECOND + TICKS_PER_SECOND)
             ticks_now = until - state.tick
-            with self._guarded(ticks_now):
+            with self._keep_state_if_diverged(ticks_now / TICKS_PER_SECOND):
                 self.metrics.collisions += advance_ticks(state, ticks_now, self.periods, watch)
             if state.tick % TICKS_PER_SECOND == 0:
                 state.environment.advance(1.0)
@@ -245,9 +249,33 @@ class Simulation:
                     self.world.drop_pages()
             watch.lap("bookkeeping")
 
-    def _guarded(self, ticks: int) -> AbstractContextManager[None]:
-        """Return a context in which physics may diverge: the state before it is kept then."""
-        return nullcontext() if self.state.robots is None else keep_state_if_diverged(self, ticks / TICKS_PER_SECOND)
+    @contextmanager
+    def _keep_state_if_diverged(self, seconds: float) -> Iterator[None]:
+        """Let a block of some seconds move robots; if their motion diverges, write the state before and restore it.
+
+        Raises
+        ------
+        PhysicsError
+            If it diverged, with the path of the snapshot and how to see it again.
+        """
+        if self.state.robots is None:
+            yield
+            return
+        before = self.snapshot()
+        try:
+            yield
+        except PhysicsError as error:
+            self.restore(before)
+            path = cache_folder() / "diverged" / f"{state_hash(before)}.npz"
+            told = str(error).removesuffix("; report it with the snapshot")
+            try:
+                write_snapshot(path, before, owner=self.identity)
+            except OutputError as failure:
+                raise PhysicsError(f"{told}; the state before it could not be kept: {failure}") from error
+            raise PhysicsError(
+                f"{told}; the state before it is in {path}: report it with that file, the world, the community and the "
+                f"configuration. Simulation.load({path.name!r}) and advance({seconds:g}) show it again"
+            ) from error
 
     # What agents see.
 
@@ -340,7 +368,7 @@ class Simulation:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Return a copy of the whole state; `restore` goes back to it."""
-        return copy_arrays(self.arrays())
+        return {name: np.array(array, copy=True) for name, array in self.arrays().items()}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to a snapshot of a simulation made in the same way."""
@@ -375,13 +403,6 @@ class Simulation:
         """Version, configuration, world, community and objects in one hash: equal ones run equally."""
         residents = [resident.id for resident in self.residents]
         return identity(self.config.record(), self.world.digest, residents, self.state.objects.names)
-
-
-def _periods(state: SimulationState, config: SimConfig) -> ControlPeriods:
-    """Return how often each agent acts."""
-    robots = state.robots
-    models = {} if robots is None else {name: robots.control_period(k) for k, name in enumerate(robots.names)}
-    return ControlPeriods.of(state.people.names, models, config.periods, start=state.tick)
 
 
 def _seeing(state: SimulationState, observe: Sequence[str] | None) -> list[int]:

@@ -40,7 +40,6 @@ from vico.sim.state.steps import TICKS_PER_SECOND, Events
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.placement import placed_traffic
 from vico.sim.transit import BusPlan, TransitSystem
-from vico.world.world import World
 
 if TYPE_CHECKING:
     from vico.community.model import Resident
@@ -100,7 +99,21 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
         return None
     world = base.world
     names = [f"robot_{i}" for i in range(len(config.robots))]
-    places = _given_places(config.robot_places, names, world)
+    places: dict[str, NDArray[np.float64]] = {}
+    for name, values in config.robot_places.items():
+        if name not in names:
+            raise InputError(f"robot_places: nobody is called {name!r}; there are {', '.join(names)}")
+        place = np.array(values)
+        if not world.walkable.is_connected(place[:2]) or float(world.walkable.clearance_at(place[:2])) < _ROBOT_RADIUS:
+            raise InputError(
+                f"robot_places: {name}: at ({place[0]:.1f}, {place[1]:.1f}) there is no free ground that one gets away "
+                "from; give another place"
+            )
+        near = [other for other, at in places.items() if np.hypot(*(at - place)[:2]) < 2 * _ROBOT_RADIUS]
+        if near:
+            apart = 2 * _ROBOT_RADIUS
+            raise InputError(f"robot_places: {name} would stand in {near[0]}; give them places {apart} m apart")
+        places[name] = place
     for i, kind in enumerate(config.robots):
         if names[i] in places:
             continue
@@ -125,28 +138,6 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
     if config.oracle_grasp:
         robots.give_oracle_grasp()
     return robots
-
-
-def _given_places(
-    given: Mapping[str, Sequence[float]], names: Sequence[str], world: World
-) -> dict[str, NDArray[np.float64]]:
-    """Return where robots start that a run gives places, by name: x, y, yaw."""
-    found: dict[str, NDArray[np.float64]] = {}
-    for name, values in given.items():
-        if name not in names:
-            raise InputError(f"robot_places: nobody is called {name!r}; there are {', '.join(names)}")
-        place = np.array(values)
-        if not world.walkable.is_connected(place[:2]) or float(world.walkable.clearance_at(place[:2])) < _ROBOT_RADIUS:
-            raise InputError(
-                f"robot_places: {name}: at ({place[0]:.1f}, {place[1]:.1f}) there is no free ground that one gets away "
-                "from; give another place"
-            )
-        near = [other for other, at in found.items() if np.hypot(*(at - place)[:2]) < 2 * _ROBOT_RADIUS]
-        if near:
-            apart = 2 * _ROBOT_RADIUS
-            raise InputError(f"robot_places: {name} would stand in {near[0]}; give them places {apart} m apart")
-        found[name] = place
-    return found
 
 
 _PASSAGE_KINDS = ("hall", "corridor", "stairs", "lift", "storage", "bathroom", "washroom", "shower_room")
@@ -235,6 +226,7 @@ def place_assistants(first: int, places: Mapping[str, Sequence[float]], state: S
     InputError
         If nobody is called so, or there is no free ground within a metre.
     """
+    walkable = state.world.walkable
     names = state.people.names[first:]
     unknown = [name for name in places if name not in names]
     if unknown:
@@ -243,7 +235,6 @@ def place_assistants(first: int, places: Mapping[str, Sequence[float]], state: S
         if name not in places:
             continue
         x, y, yaw = places[name]
-        walkable = state.world.walkable
         spot = free_ground(walkable, np.array([x, y]), state.obstacles(), within=1.0)
         if spot is None or not walkable.is_connected(spot):
             raise InputError(
@@ -252,20 +243,16 @@ def place_assistants(first: int, places: Mapping[str, Sequence[float]], state: S
             )
         put_outdoors(i, spot, yaw, state)
     for i, name in enumerate(names, first):
-        if name not in places:
-            place_anywhere(i, state, rng(seed, "spawn", name))
-
-
-def place_anywhere(i: int, state: SimulationState, stream: np.random.Generator) -> None:
-    """Put someone on a random reachable sidewalk or open ground."""
-    for _ in range(100):
-        spot = free_ground(
-            state.world.walkable, state.world.walkable.random_point(stream), state.obstacles(), within=5.0
-        )
-        if spot is not None:
-            put_outdoors(i, spot, float(stream.uniform(-math.pi, math.pi)), state)
-            return
-    raise InputError(f"{state.people.names[i]}: found no free ground to start on; let fewer people take part")
+        if name in places:
+            continue
+        stream = rng(seed, "spawn", name)
+        for _ in range(100):
+            spot = free_ground(walkable, walkable.random_point(stream), state.obstacles(), within=5.0)
+            if spot is not None:
+                put_outdoors(i, spot, float(stream.uniform(-math.pi, math.pi)), state)
+                break
+        else:
+            raise InputError(f"{name}: found no free ground to start on; let fewer people take part")
 
 
 _NOWHERE = 2**30
@@ -296,11 +283,14 @@ def initial_state(
     avatars = Avatars(people, base.indoor, base.world.walkable, base.world.height)
     events = Events(people.names)
     tick = config.start * TICKS_PER_SECOND
-    environment = _environment(base, config)
+    origin = base.world.manifest.origin
+    sky = Sky.over(origin.lat, origin.lon, config.date or NO_DAY.isoformat(), config.utc_offset)
+    second = float(config.start)
+    agenda = Agenda(base.event_sites, config.events, seed=config.seed, second=second)
+    environment = Environment(sky, config.weather, seed=config.seed, second=second, agenda=agenda)
     state = SimulationState(base, people, MovableObjects.none(), avatars, events, environment, tick=tick)
     state.lines = Lines.of(len(people))
     if config.opening_hours:
-        origin = base.world.manifest.origin
         opened = day or state.environment.sky.first_day
         state.openings = OpeningHours(base.world.places, opened, (origin.lat, origin.lon), residents, days)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
@@ -324,14 +314,6 @@ def initial_state(
     state.clothes_at_start = state.weather_to_dress_for()
     people.clothes[:] = state.clothes_at_start
     return state
-
-
-def _environment(base: SimulationBase, config: SimConfig) -> Environment:
-    origin = base.world.manifest.origin
-    sky = Sky.over(origin.lat, origin.lon, config.date or NO_DAY.isoformat(), config.utc_offset)
-    second = float(config.start)
-    agenda = Agenda(base.event_sites, config.events, seed=config.seed, second=second)
-    return Environment(sky, config.weather, seed=config.seed, second=second, agenda=agenda)
 
 
 def _people(residents: Sequence[Resident], config: SimConfig) -> People:

@@ -9,7 +9,6 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim.bodies.arrays import ROBOT, Bodies, HasBodies, Subsystem
@@ -82,21 +81,14 @@ def advance_ticks(state: SimulationState, ticks: int, periods: ControlPeriods, w
             state.robots.advance(dt, bodies.but(state.robots), since=since, substep=SUBSTEP)
             bodies.refresh(state.robots)
             bodies.refresh(state.objects)
-            report_robots(state)
+            for note in state.robots.events():
+                state.events.add("robot", state.robots.names[note.robot], note.kind, note.position)
             watch.lap("robots")
         state.tick += ticks_now
         if state.on_substep is not None and state.tick % SUBSTEP_TICKS == 0:
             state.on_substep()
     placement.move_held_objects(state)
     return stopped
-
-
-def report_robots(state: SimulationState) -> None:
-    """Say what happened to robots, as events."""
-    robots = state.robots
-    for note in robots.events() if robots is not None else ():
-        name = robots.names[note.robot] if robots is not None else ""
-        state.events.add("robot", name, note.kind, note.position)
 
 
 def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _AllBodies, watch: StopWatch) -> int:
@@ -118,7 +110,13 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     gone = periods.since_begun(state.tick)[: len(state.people)]
     share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
     doors.walk_to_doors(state, share, SUBSTEP)
-    obstacles = _held_off(bodies.but(state.avatars))
+    # Avatars are kept off robots with some room to yield.
+    others = bodies.but(state.avatars)
+    obstacles, robots = records_of(others), (others.kind == ROBOT).nonzero()[0]
+    if len(robots):
+        for name in ("half_length", "half_width"):
+            obstacles[name][robots] += ROBOT_MARGIN
+        obstacles["radius"][robots] += 2 * ROBOT_MARGIN
     lying = state.objects.in_rooms()
     if len(lying):
         in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
@@ -139,16 +137,6 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     stopped = _report_collisions(state)
     watch.lap("avatars")
     return stopped
-
-
-def _held_off(others: Bodies) -> NDArray[np.void]:
-    """Return bodies as avatars are kept off them, dtype `footprints.BODY`: robots with some room to yield."""
-    records, robots = records_of(others), (others.kind == ROBOT).nonzero()[0]
-    if len(robots):
-        for name in ("half_length", "half_width"):
-            records[name][robots] += ROBOT_MARGIN
-        records["radius"][robots] += 2 * ROBOT_MARGIN
-    return records
 
 
 def _report_collisions(state: SimulationState) -> int:

@@ -40,9 +40,10 @@ TURN_RATE = 2.0 * math.pi
 #: Seconds for which a door stays open after somebody was in it.
 DOOR_HOLD = 0.4
 _NEAR_GOAL = 0.03  # metres within which nobody turns to where they go
-# Metres behind the closed leaf from which on one is in the room, and where one comes from who leaves it; where one who
-# goes out turns to where they want to go, metres before it; how far before it the step begins.
-_INSIDE, _FROM, _CLEAR, _STEP = 0.75, 0.8, 0.35, 0.45
+_INSIDE = 0.75  # m behind the closed leaf from which on one is in the room
+_FROM = 0.8  # m behind the closed leaf where one comes from who leaves the room
+_CLEAR = 0.35  # m before the closed leaf where one who goes out turns to where they want to go
+_STEP = 0.45  # m before the closed leaf where the step begins
 _PACE = 1.25  # m/s at which people walk through doors
 _PATIENCE = 2.0  # s for which one waits in a door for others
 _IN_LINE = 20.0  # s for which one waits at an open door until nobody is in it
@@ -251,8 +252,10 @@ def _go_out(i: int, number: int, state: SimulationState) -> None:
     state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
 
 
-# Up to the door one takes this long at most, seconds, to so far from it, metres, between these speeds, m/s.
-_WAY_UP, _ARM, _SLOWEST, _FASTEST = 1.0, 0.5, 0.6, 1.55
+_WAY_UP = 1.0  # s that one takes up to the door at most
+_ARM = 0.5  # m from the door to where one stands before it
+_SLOWEST = 0.6  # m/s up to the door at least
+_FASTEST = 1.55  # m/s up to the door at most
 # People walk to the door as soon as they nearly face it, radians.
 _AHEAD, _FACING = 0.6, 0.05
 _NEAR_DOOR = 0.03  # nearer to where one stands at the door nobody walks, metres
@@ -393,7 +396,10 @@ def advance_robots_at_doors(state: SimulationState, dt: float) -> None:
         return
     for robot, room in robots.at_doors():
         origin = int(robots.rooms[robot])
-        place = _place_entered(robot, room, state) if origin < 0 else None
+        place = None
+        if origin < 0:  # it enters the place that it is going to, behind whichever door that is
+            goal = robots.trip_room(robot)
+            place = place_of_room(goal if goal >= 0 else room, state)
         if place is not None and closed_reason(place, state):
             robots.give_up(robot)
             continue
@@ -401,21 +407,29 @@ def advance_robots_at_doors(state: SimulationState, dt: float) -> None:
             rooms = state.indoor.rooms
             if robots.ride(robot, dt) < lift_seconds(rooms[room].centre[2] - rooms[origin].centre[2]) - 1e-6:
                 continue
-        if -1 in (origin, room) and not _is_open(room if origin < 0 else origin, state):
-            continue
+        if -1 in (origin, room):
+            inside = room if origin < 0 else origin
+            entrance = state.world.places[int(state.indoor.place[inside])].entrance
+            if entrance is not None:
+                number = state.base.entrance_index[entrance]
+                state.leaves.hold(number, _ROBOT_DOOR_HOLD)
+                if state.leaves.share_of(number) < 1.0 - 1e-6:  # it opens
+                    continue
         if robots.pass_door(robot, room, _occupied_discs(robot, room, state)):
-            _log_passing(robot, origin, room, place, state)
-    _keep_on_decks(state)
-
-
-def _is_open(room: int, state: SimulationState) -> bool:
-    """Open the entrance to a room; return whether it is open."""
-    entrance = state.world.places[int(state.indoor.place[room])].entrance
-    if entrance is None:
-        return True
-    number = state.base.entrance_index[entrance]
-    state.leaves.hold(number, _ROBOT_DOOR_HOLD)
-    return state.leaves.share_of(number) >= 1.0 - 1e-6
+            name, position = robots.names[robot], robots.bodies().position[robot]
+            if origin < 0 and place is not None:
+                state.events.add("enter", name, f"enters {place.name}", position, place=place.id)
+            left = place_of_room(origin, state)
+            if room < 0 and left is not None:
+                state.events.add("exit", name, f"leaves {left.name}", position, place=left.id)
+    # Things on decks are in the rooms that the robots are in.
+    objects = state.objects
+    carried = np.flatnonzero((objects.holder != 0) & (objects.hand < 0))
+    if not len(carried):
+        return
+    room_of = dict(zip(robots.bodies().entity.tolist(), robots.rooms.tolist(), strict=True))
+    for k in carried.tolist():
+        objects.room[k] = room_of.get(int(objects.holder[k]), int(objects.room[k]))
 
 
 def closed_reason(place: Place, state: SimulationState) -> str:
@@ -434,12 +448,6 @@ def place_of_room(room: int, state: SimulationState) -> Place | None:
     return state.world.places[index] if index >= 0 else None
 
 
-def _place_entered(robot: int, room: int, state: SimulationState) -> Place | None:
-    assert state.robots is not None
-    goal = state.robots.trip_room(robot)
-    return place_of_room(goal if goal >= 0 else room, state)
-
-
 def _occupied_discs(robot: int, room: int, state: SimulationState) -> NDArray[np.float64]:
     """Discs (x, y, radius) in which the middle of a robot that comes into a room (-1: outdoors) cannot be."""
     assert state.robots is not None
@@ -450,25 +458,3 @@ def _occupied_discs(robot: int, room: int, state: SimulationState) -> NDArray[np
         return np.column_stack([bodies.position[:, :2], reach + own])
     points = state.taken_in(room)
     return np.column_stack([points[:, :2], np.full(len(points), RADIUS + own)])
-
-
-def _log_passing(robot: int, origin: int, room: int, place: Place | None, state: SimulationState) -> None:
-    assert state.robots is not None
-    name, position = state.robots.names[robot], state.robots.bodies().position[robot]
-    if origin < 0 and place is not None:
-        state.events.add("enter", name, f"enters {place.name}", position, place=place.id)
-    left = place_of_room(origin, state)
-    if room < 0 and left is not None:
-        state.events.add("exit", name, f"leaves {left.name}", position, place=left.id)
-
-
-def _keep_on_decks(state: SimulationState) -> None:
-    """Have things on decks be in the rooms that the robots are in."""
-    robots, objects = state.robots, state.objects
-    assert robots is not None
-    carried = np.flatnonzero((objects.holder != 0) & (objects.hand < 0))
-    if not len(carried):
-        return
-    room_of = dict(zip(robots.bodies().entity.tolist(), robots.rooms.tolist(), strict=True))
-    for k in carried.tolist():
-        objects.room[k] = room_of.get(int(objects.holder[k]), int(objects.room[k]))

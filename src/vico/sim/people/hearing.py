@@ -35,12 +35,16 @@ _NORMAL_RANGE = 3.0
 # What a building on the line takes away: sound goes round its corner, dB.
 _CORNER = 20.0
 
-# Noise where nothing else is to be heard, dB: in a street, in a room, in a bus.
-_STREET, _ROOM, _BUS = 45.0, 40.0, 62.0
-# A car at `_PASSING_SPEED`, heard from `_PASSING` metres away, dB; its noise grows with the third power of its speed,
-# and is never less than its engine's.
-_CAR, _ENGINE, _BUS_MORE = 68.0, 50.0, 6.0
-_PASSING, _PASSING_SPEED = 7.5, 50 / 3.6
+# Noise where nothing else is to be heard.
+_STREET = 45.0  # dB
+_ROOM = 40.0  # dB
+_BUS = 62.0  # dB
+# The noise of a car grows with the third power of its speed, and is never less than its engine's.
+_CAR = 68.0  # dB at `_PASSING_SPEED`, heard from `_PASSING` metres away
+_ENGINE = 50.0  # dB at that distance
+_BUS_MORE = 6.0  # dB that a bus or tram is louder than a car
+_PASSING = 7.5  # m
+_PASSING_SPEED = 50 / 3.6  # m/s
 _FAR = 60.0  # metres; vehicles farther away are part of the street's noise
 _NEAREST = 2.0
 
@@ -199,17 +203,11 @@ def follow_city_events(state: SimulationState) -> None:
     if state.traffic is not None:
         state.traffic.gatherings.follow(agenda.gatherings(None if state.transit is None else state.transit.on_tracks))
         state.traffic.gatherings.advance(state.second)
-    state.things.follow(state)
+    state.things.follow(state.base, agenda, state.traffic, state.obstacles)
     for one, what in news:
         told = {name: value for name, value in one.event.record().items() if name != "kind" and value}
         told |= {"event": one.id, "event_kind": one.event.kind}
         state.events.add("city", "", f"{one.event.title} {what}", one.middle, **told)
-
-
-def has_news(state: SimulationState) -> bool:
-    """Return whether an event has begun or ended within the last second."""
-    agenda = state.environment.agenda
-    return len(agenda) > 0 and agenda.changed
 
 
 def known_events(state: SimulationState, i: int, pose: NDArray[np.float64]) -> list[dict[str, Any]]:
@@ -226,7 +224,7 @@ def known_events(state: SimulationState, i: int, pose: NDArray[np.float64]) -> l
     if not len(agenda):
         return []
     outdoors = i >= len(state.people) or state.people.room.item(i) < 0
-    found = {one.id: _event_record(one, ANNOUNCED, state) for one in agenda.announced}
+    found = {one.id: _event_record(one, ANNOUNCED, state) for one in agenda.announced_events}
     for one in agenda.going_on if outdoors else ():
         how = _how_noticed(one, pose, state)
         if how:

@@ -75,18 +75,14 @@ def place_in_room(i: int, room: int, state: SimulationState, *, near: NDArray[An
     p.room[i] = room
     p.place[i] = indoor.place[room]
     # From the door into the room: that is where people look when they come in.
-    door = next(
-        (d.position for d in indoor.doors[room] if d.inside is not None and _same_point(d.inside, anchor)), None
-    )
+    x, y = float(anchor[0]), float(anchor[1])
+    inner = [(d.position, d.inside) for d in indoor.doors[room] if d.inside is not None]
+    door = next((position for position, inside in inner if math.hypot(inside[0] - x, inside[1] - y) < 1e-6), None)
     ahead = record.centre if door is None else (float(anchor[0]), float(anchor[1]))
     behind = record.door if door is None else door
     p.yaw[i] = math.atan2(ahead[1] - behind[1], ahead[0] - behind[0])
     p.pitch[i] = LEVEL_GAZE
     move_held_objects(state)
-
-
-def _same_point(point: tuple[float, float, float], other: NDArray[np.float64]) -> bool:
-    return math.hypot(point[0] - float(other[0]), point[1] - float(other[1])) < 1e-6
 
 
 def spot_outside(i: int, state: SimulationState) -> NDArray[np.float64] | None:

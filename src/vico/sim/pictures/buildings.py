@@ -48,7 +48,7 @@ from vico.sim.state.simulation_state import SimulationState
 from vico.world.city_world import CityPart
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Place
-from vico.world.opening_hours import MINUTES, Coordinates, Span, is_within
+from vico.world.opening_hours import MINUTES, is_within
 from vico.world.world import World
 
 
@@ -80,7 +80,7 @@ class ScenePart:
         low, high = np.array(self.low) - margin, np.array(self.high) + margin
         return np.asarray(((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1), np.bool_)
 
-    def drawn(self, shapes: Drawn) -> Drawn:
+    def shapes_in_tiles(self, shapes: Drawn) -> Drawn:
         """Return those of some shapes that stand in the tiles."""
         here = self.holds(shapes.transforms[:, :2, 3])
         return Drawn(shapes.prototypes, shapes.index[here], shapes.transforms[here], shapes.entity[here])
@@ -104,8 +104,9 @@ def _rows(numbers: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return found
 
 
-# Metres a camera may be outside the walls of its room (in a doorway), below the floor, and above it (on stairs).
-_BESIDE, _BELOW, _ABOVE = 1.0, 1.0, 8.0
+_BESIDE = 1.0  # m that a camera may be outside the walls of its room: in a doorway
+_BELOW = 1.0  # m that it may be below the floor
+_ABOVE = 8.0  # m that it may be above the floor: on stairs
 
 
 class RoomsInSight:
@@ -177,12 +178,16 @@ class RoomLamps:
         self._shared = np.array([room.kind in _SHARED for room in world.rooms], bool) | (self._place < 0)
         origin = world.manifest.origin
         where = (origin.lat, origin.lon)
-        self._hours = [(k, _hours_of(place, date, where)) for k, place in enumerate(world.places) if place.kind != HOME]
+        self._hours = [
+            (k, [(0, MINUTES)] if place.category is Category.ACCOMMODATION else hours_on(place, date, where))
+            for k, place in enumerate(world.places)
+            if place.kind != HOME
+        ]
         self._private = np.array([room.kind in _PRIVATE for room in world.rooms], bool)
         self._looked_up = -1.0
         self._open = np.zeros(len(world.places), bool)
 
-    def lit(self, state: SimulationState) -> NDArray[np.bool_]:
+    def lit_rooms(self, state: SimulationState) -> NDArray[np.bool_]:
         """Return whether each room is lit now, shape ``(rooms,)``."""
         environment = state.environment
         powered = environment.has_power(self._xy)
@@ -208,17 +213,15 @@ class RoomLamps:
         return self._open
 
 
-def _hours_of(place: Place, date: Date, coordinates: Coordinates) -> list[Span]:
-    """Return when a place that is nobody's home is open on a day."""
-    return [(0, MINUTES)] if place.category is Category.ACCOMMODATION else hours_on(place, date, coordinates)
-
-
 # Share of the homes that nobody of the community lives in that are lit, by the hour.
 _HOURS = (0.0, 1.5, 5.0, 7.0, 9.0, 15.0, 17.0, 21.0, 22.5, 24.0)
 _LIT = (0.25, 0.06, 0.06, 0.45, 0.40, 0.40, 0.60, 0.70, 0.60, 0.25)
 # With so many lit, a facade looks as it is painted: not every window of a home that is lit shines.
 _USUAL = 0.6
-_CLOSED_SHOP, _CLOSED_OFFICE, _STAIRS = 0.15, 0.10, 0.04
+# Shares of windows that are lit.
+_CLOSED_SHOP = 0.15
+_CLOSED_OFFICE = 0.10
+_STAIRS = 0.04
 
 
 class WindowLights:

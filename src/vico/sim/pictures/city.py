@@ -19,15 +19,18 @@ from vico.render import Cameras, Scene, render
 from vico.render.materials import Palette
 from vico.sim.cameras import Views
 from vico.sim.pictures.buildings import ScenePart
-from vico.sim.pictures.people import MovingBodies
-from vico.sim.pictures.scene import RenderedSimulation, SceneRenderer
+from vico.sim.pictures.people import MovingBodies, RenderedSimulation
+from vico.sim.pictures.scene import SceneRenderer
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.city_world import CityWorld
 from vico.world.silhouettes import CitySilhouettes
 
 _GIGABYTE = 2**30
-#: Metres around a camera that are drawn in full, at least; who flies above the houses sees so many times that more.
-NEAR, PER_HEIGHT, _HOUSES = 200.0, 2.0, 25.0
+#: Metres around a camera that are drawn in full, at least.
+NEAR = 200.0
+#: Metres that are drawn in full beyond that for each metre of a camera's height above the houses.
+PER_HEIGHT = 2.0
+_HOUSES = 25.0  # m, height of houses
 # Metres beyond that in which others are drawn: as far as cameras of agents see, or from above.
 _SEEN, _SEEN_FROM_ABOVE = 600.0, 3000.0
 # Rings of tiles around that are drawn in full at most: from high up, all is far.

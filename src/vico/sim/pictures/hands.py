@@ -164,7 +164,20 @@ def draw_in_hands(state: SimulationState, who: Holders) -> list[Drawn]:
     """Return what is drawn in everybody's hands, and the movable objects that lie about."""
     drawn = [draw_umbrellas(who, len(state.people)), draw_placards(who), _meals(state, who), draw_phones(who)]
     if len(state.objects):
-        drawn.append(_objects(state, who))
+        # Movable objects are where they lie, or in the hand or the arms that hold them.
+        objects = state.objects
+        names = sorted(set(objects.prototypes))
+        transforms = np.zeros((len(objects), 4, 4))
+        transforms[:, :3, :3] = rotation_matrix(objects.orientation)
+        transforms[:, 3, 3] = 1.0
+        transforms[:, :3, 3] = objects.position
+        for k in np.flatnonzero(objects.hand >= 0).tolist():
+            row = np.flatnonzero(who.entity == objects.holder[k])[:1]
+            if not len(row):
+                continue  # who holds it is not drawn: far from where anybody looks
+            transforms[k, :3, 3] = who.world(row, carried_at(k, int(row[0]), state, who)[None])[0]
+        index = np.array([names.index(name) for name in objects.prototypes], np.int32)
+        drawn.append(Drawn(names, index, transforms.astype(np.float32), objects.entity))
     return [lot for lot in drawn if lot is not None]
 
 
@@ -185,7 +198,8 @@ def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
     wide = size * (0.1 + 0.9 * opened)
     rim = _RIM_HEIGHT * size
     lean = lean_apart(who.world(rows, fist + rim[:, None] * up), _RIM_RADIUS * wide, rim)
-    up[:, :2] += each(math.tan, np.hypot(*lean.T))[:, None] * who.turned_back(rows, _unit(lean))
+    direction = lean / np.maximum(np.linalg.norm(lean, axis=1), 1e-9)[:, None]
+    up[:, :2] += each(math.tan, np.hypot(*lean.T))[:, None] * who.turned_back(rows, direction)
     up /= np.linalg.norm(up, axis=1)[:, None]
     ahead = np.column_stack([up[:, 2], np.zeros(len(rows)), -up[:, 0]])
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
@@ -212,10 +226,6 @@ def draw_placards(who: Holders) -> Drawn | None:
     names, entity = placards(), np.asarray(who.entity[rows], np.int32)
     look = (who.number[rows] * 5 // 2 % len(names)).astype(np.int32)
     return Drawn(names, look, _transforms(who, rows, axes, fist), entity)
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-9)[:, None]
 
 
 def _meals(state: SimulationState, who: Holders) -> Drawn | None:
@@ -273,23 +283,6 @@ def food_of(i: int, state: SimulationState) -> str:
     place = state.world.places[int(p.place[i])] if p.room[i] >= 0 and p.place[i] >= 0 else None
     served = place is not None and (place.kind in ("restaurant", "apartments", "hotel"))
     return "fork" if served and p.seat[i] >= 0 else "sandwich"
-
-
-def _objects(state: SimulationState, who: Holders) -> Drawn:
-    """Return the movable objects: where they lie, or in the hand or the arms that hold them."""
-    objects = state.objects
-    names = sorted(set(objects.prototypes))
-    transforms = np.zeros((len(objects), 4, 4))
-    transforms[:, :3, :3] = rotation_matrix(objects.orientation)
-    transforms[:, 3, 3] = 1.0
-    transforms[:, :3, 3] = objects.position
-    for k in np.flatnonzero(objects.hand >= 0).tolist():
-        row = np.flatnonzero(who.entity == objects.holder[k])[:1]
-        if not len(row):
-            continue  # who holds it is not drawn: far from where anybody looks
-        transforms[k, :3, 3] = who.world(row, carried_at(k, int(row[0]), state, who)[None])[0]
-    index = np.array([names.index(name) for name in objects.prototypes], np.int32)
-    return Drawn(names, index, transforms.astype(np.float32), objects.entity)
 
 
 def carried_at(k: int, i: int, state: SimulationState, who: Holders) -> NDArray[np.float64]:

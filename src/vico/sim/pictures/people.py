@@ -7,7 +7,7 @@ not depend on who looks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property, partial
 from pathlib import Path
@@ -36,6 +36,8 @@ from vico.sim.traffic.drawing import PedestrianGaits
 from vico.sim.traffic.state import STOP, TALK
 from vico.threads import in_order
 from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.world.world import World
 
 # Who talks goes on for so long, then the other does, s.
 _TURN_TO_TALK = 6.0
@@ -172,8 +174,8 @@ _USUAL_HEIGHT = 1.7
 _Detail = Literal["far", "light", "full"]
 
 
-class DrawnPopulation(Protocol):
-    """Who is drawn: what is asked of a simulation."""
+class RenderedSimulation(Protocol):
+    """What renderers ask of a simulation."""
 
     @property
     def config(self) -> SimConfig:
@@ -190,6 +192,17 @@ class DrawnPopulation(Protocol):
     @property
     def looks(self) -> Sequence[Appearance]:
         """How people look at the start, in the order of their avatars, and after them the pedestrians."""
+
+    @property
+    def world(self) -> World:
+        """Where it happens."""
+
+    @property
+    def shapes(self) -> Mapping[str, Sequence[Surface]]:
+        """Shapes of loose things, by name."""
+
+    def entity(self, entity: int) -> dict[str, str]:
+        """Kind and name of an entity."""
 
 
 class DrawnPeople:
@@ -225,7 +238,7 @@ class DrawnPeople:
     """
 
     def __init__(
-        self, sim: DrawnPopulation, *, detail: Literal["light", "full"], far: bool, everybody: bool = True
+        self, sim: RenderedSimulation, *, detail: Literal["light", "full"], far: bool, everybody: bool = True
     ) -> None:
         people, looks = sim.state.people, list(sim.looks)
         walkers = sim.state.traffic.walkers.entity.tolist() if sim.state.traffic is not None else []
@@ -234,7 +247,11 @@ class DrawnPeople:
         # What the looks at the start are for.
         self._clothes = np.tile(sim.state.clothes_at_start, (len(self._own), 1))
         self.looks = looks
-        self._worn = _worn_bodies(sim)
+        for name in sim.config.worn:
+            if name not in people.names:
+                there = ", ".join(people.names) or "none"
+                raise InputError(f"worn: nobody is called {name!r}; there are {there}")
+        self._worn = {name: Path(path) for name, path in sim.config.worn.items()}
         self._names = [*people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
         self._bodies: dict[int, SkinnedBody] = {}
         self._far: dict[int, SkinnedBody] = {}
@@ -265,9 +282,9 @@ class DrawnPeople:
             for i in bodies.keys() - wanted:
                 del bodies[i]
         new = [i for i in rows.tolist() if i not in self._bodies]
-        self._bodies |= self._made(new, self._detail)
+        self._bodies |= self._make_bodies(new, self._detail)
         if self._has_far:
-            self._far |= self._made(new, "far")
+            self._far |= self._make_bodies(new, "far")
         for i in new:
             self._describe(i)
         self.rows = rows.copy()
@@ -320,7 +337,7 @@ class DrawnPeople:
         begun = self._being_made.pop(look, None)
         return self._make(look) if begun is None else begun.result()
 
-    def _made(self, rows: Sequence[int], detail: _Detail) -> dict[int, SkinnedBody]:
+    def _make_bodies(self, rows: Sequence[int], detail: _Detail) -> dict[int, SkinnedBody]:
         """Make bodies, those of a look once; who wears one of their own has it in any detail."""
         kinds = list(dict.fromkeys(self.looks[i] for i in rows))
         made = dict(zip(kinds, in_order(partial(body_of, detail=detail), kinds), strict=True))
@@ -348,22 +365,6 @@ class DrawnPeople:
         self._bodies = {i: self.batch.body(k, self._bodies[i]) for k, i in enumerate(rows)}
         if self._has_far:
             self._far = {i: self.batch.body(k, self._far[i]) for k, i in enumerate(rows, len(rows))}
-
-
-def _worn_bodies(sim: DrawnPopulation) -> dict[str, Path]:
-    """Return the files of those who wear a body of their own, by agent's name.
-
-    Raises
-    ------
-    InputError
-        If there is no such agent.
-    """
-    people = sim.state.people
-    for name in sim.config.worn:
-        if name not in people.names:
-            there = ", ".join(people.names) or "none"
-            raise InputError(f"worn: nobody is called {name!r}; there are {there}")
-    return {name: Path(path) for name, path in sim.config.worn.items()}
 
 
 class PersonMotion(NamedTuple):
@@ -414,28 +415,6 @@ class PersonMotion(NamedTuple):
         return PersonMotion(after=after, hands=hands, **plain)
 
 
-def _motion_of_agents(state: SimulationState, height: HeightField) -> PersonMotion:
-    """Return how residents and assistants move; who sits in a bus sits as the seat stands, wherever they look."""
-    p = state.people
-    in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
-    yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
-    before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
-    on_stairs = (state.indoor.treads_under(p.room) > 0) | ((p.room < 0) & (height.going_at(p.position) > 0))
-    over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
-    after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
-    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)
-    rise = np.zeros(len(p))
-    sitting = np.flatnonzero(p.seat >= 0)
-    if len(sitting):
-        seat = p.seat[sitting]
-        yaw[sitting] = state.seats.yaw[seat]
-        rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
-    # Who gets up comes down from the seat to the floor.
-    rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
-    place = p.position.copy(), yaw, on_ground, p.room.copy(), rise, rise_before, hands_of_agents(state)
-    return PersonMotion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
-
-
 def concatenate_motion(a: PersonMotion, b: PersonMotion) -> PersonMotion:
     """Return how some people move, and after them others."""
     pairs = {name: (getattr(a.after, name), getattr(b.after, name)) for name in Transition._fields if name != "ground"}
@@ -463,7 +442,26 @@ class MovingBodies:
     @cached_property
     def agents(self) -> PersonMotion:
         """How residents and assistants move."""
-        return _motion_of_agents(self.state, self._height)
+        state = self.state
+        p = state.people
+        # Who sits in a bus sits as the seat stands, wherever they look.
+        in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
+        yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
+        before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
+        on_stairs = (state.indoor.treads_under(p.room) > 0) | ((p.room < 0) & (self._height.going_at(p.position) > 0))
+        over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
+        after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
+        on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)
+        rise = np.zeros(len(p))
+        sitting = np.flatnonzero(p.seat >= 0)
+        if len(sitting):
+            seat = p.seat[sitting]
+            yaw[sitting] = state.seats.yaw[seat]
+            rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
+        # Who gets up comes down from the seat to the floor.
+        rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
+        place = p.position.copy(), yaw, on_ground, p.room.copy(), rise, rise_before, hands_of_agents(state)
+        return PersonMotion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
 
     @cached_property
     def shapes(self) -> list[Drawn]:

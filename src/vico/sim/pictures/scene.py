@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,9 @@ from vico.sim.pictures.buildings import DrawnDoors, RoomLamps, RoomsInSight, Sce
 from vico.sim.pictures.hands import Holders, draw_in_hands, hands_of_pedestrians
 from vico.sim.pictures.people import (
     DrawnPeople,
-    DrawnPopulation,
     MovingBodies,
     PersonMotion,
+    RenderedSimulation,
     ViewingCameras,
     concatenate_motion,
     far_from_all,
@@ -38,32 +38,17 @@ from vico.sim.pictures.people import (
 )
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.mesh import Surface
-from vico.world.world import World
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
 # Feet of who sits reach so far below where they would be on a seat of one's own height, and above, metres.
 _FEET_HANG, _FEET_RISE = 0.1, 0.3
 _ICE_SHINES = 0.6  # as much as wet ground does
-# Of parts of a city: metres beside one within which all have bodies, and within which they get them when some come
-# there who have none; and of how many too many bodies it is worth to choose anew.
-_BESIDE, _SOON, _SPARE_BODIES = 2.0, 40.0, 100
+# Of parts of a city.
+_BESIDE = 2.0  # m beside one within which all have bodies
+_SOON = 40.0  # m beside one within which they get bodies when some come there who have none
+_SPARE_BODIES = 100  # bodies too many for which it is worth to choose anew
 _OVERCAST = 0.45  # share of the daylight in rooms that a sky full of clouds takes
-
-
-class RenderedSimulation(DrawnPopulation, Protocol):
-    """What the renderer asks of a simulation."""
-
-    @property
-    def world(self) -> World:
-        """Where it happens."""
-
-    @property
-    def shapes(self) -> Mapping[str, Sequence[Surface]]:
-        """Shapes of loose things, by name."""
-
-    def entity(self, entity: int) -> dict[str, str]:
-        """Kind and name of an entity."""
 
 
 class SceneRenderer:
@@ -85,7 +70,7 @@ class SceneRenderer:
         self._detail, self._part = detail, part
         self._pictures: PictureSet | None = None
         self._doors = DrawnDoors.of(sim.state.base) if part is None else DrawnDoors(sim.state.base, part)
-        self._scene = self._made(sim)
+        self._scene = self._empty_scene(sim)
         self._attach(sim)
 
     def rebind(self, sim: RenderedSimulation) -> SceneRenderer:
@@ -96,7 +81,7 @@ class SceneRenderer:
         self._attach(sim)
         return self
 
-    def _made(self, sim: RenderedSimulation) -> Scene:
+    def _empty_scene(self, sim: RenderedSimulation) -> Scene:
         """Return the scene of a run, with nothing that moves in its place yet."""
         shapes, part = _shapes(sim, self._doors), self._part
         mirrored = sim.state.traffic is not None and sim.state.traffic.lanes.lefthand
@@ -172,7 +157,7 @@ class SceneRenderer:
 
     def picture_waiter(self) -> Callable[[], None]:
         """Return what to call, from any thread, to wait for the pictures of the last `render`."""
-        return self._pictures.wait if self._pictures is not None else _nothing
+        return self._pictures.wait if self._pictures is not None else lambda: None
 
     def show(self, state: SimulationState) -> Scene:
         """Put light and everything that moves where they are in a state; return the scene, for cameras of one's own."""
@@ -206,7 +191,7 @@ class SceneRenderer:
         lit += tuple(value for circle in environment.agenda.effects.dark for value in circle)
         self._scene.moment = state.second
         daylight = (1.0 - environment.dark) * (1.0 - _OVERCAST * weather.clouds**2)
-        self._scene.light_rooms(self._room_lamps.lit(state), round(16.0 * daylight) / 16.0)
+        self._scene.light_rooms(self._room_lamps.lit_rooms(state), round(16.0 * daylight) / 16.0)
         if lit != self._lit:
             self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
@@ -220,7 +205,7 @@ class SceneRenderer:
         state = now.state
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
-            self._scene, self._lit = self._made(self._sim), ()
+            self._scene, self._lit = self._empty_scene(self._sim), ()
             self._viewers.scene = self._scene
             self._set_light(state)
         self._people.follow(state)
@@ -238,7 +223,7 @@ class SceneRenderer:
         self._scene.set_skinned(vertices, normals, *shape, drawn=drawn, limbs=limbs)
         moving = [*now.shapes, *draw_in_hands(state, self._holders(motion, rotations, offsets))]
         if self._part is not None:
-            moving = [self._part.drawn(shapes) for shapes in moving]
+            moving = [self._part.shapes_in_tiles(shapes) for shapes in moving]
         doors = self._doors.draw(state) if len(state.leaves) else None
         moving += [] if doors is None else [doors.shapes]
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in moving]
@@ -385,18 +370,9 @@ def _lighting(environment: Environment, second: float) -> Lighting:
     )
     cover = environment.snow_cover
     wet = max(environment.wet, _ICE_SHINES * environment.ice) * (1.0 - cover)
-    return replace(
-        light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow, unlit=_widest(environment)
-    )
-
-
-def _widest(environment: Environment) -> tuple[float, float, float]:
-    """Return the largest circle of ground on which the power is cut; a radius of 0 for none."""
-    return max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
-
-
-def _nothing() -> None:
-    pass
+    # The largest circle of ground on which the power is cut; a radius of 0 for none.
+    unlit = max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
+    return replace(light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow, unlit=unlit)
 
 
 def _shapes(sim: RenderedSimulation, doors: DrawnDoors) -> dict[str, Sequence[Surface]]:

@@ -165,12 +165,6 @@ def _decode_frames(path: Path, first: int, *, whole_only: bool = False) -> Itera
             yield first + round(frame.time * RATE), frame
 
 
-def views_of(run: Path, names: list[str], last: int) -> dict[str, View]:
-    """Return the films of a run, by agent's name."""
-    folders = {name: run / VIEWS / name for name in names}
-    return {name: View(folder, last) for name, folder in folders.items() if any(folder.glob("*.mp4"))}
-
-
 def drop_views_after(run: Path, step: int) -> None:
     """Delete the parts of films that begin after a step, and arrays of later steps."""
     for pattern in ("*/*.mp4", "*/*.npz"):

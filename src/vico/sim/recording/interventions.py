@@ -1,4 +1,4 @@
-"""What was done to a run from outside, before its first step and while it goes on: data that decides it, like its seed.
+"""Interventions in a run from outside, before its first step and later: data that decides it, like its seed.
 
 ::
 

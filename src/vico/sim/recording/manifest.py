@@ -1,4 +1,4 @@
-"""What a run folder tells of the run as a whole: ``run.json``, ``agents.json`` and ``cast.jsonl``.
+"""Files of a run folder about the run as a whole: ``run.json``, ``agents.json`` and ``cast.jsonl``.
 
 The cast is who and what takes part, and from when to when: a log that grows as bodies come and go. A line of
 ``cast.jsonl`` tells of one body: with ``kind``, ``name``, ``size`` and ``agent``, that it is there from ``step`` on, or
@@ -91,21 +91,17 @@ class _Models:
         """Return the model of an entity; None for people, and for what nothing is drawn of."""
         if entity not in self._known and self._step != self._sim.metrics.steps:
             self._step = self._sim.metrics.steps
-            self._known = _models_of(self._sim) | self._known
+            state, models = self._sim.state, dict[int, str]()
+            if state.robots is not None:
+                models |= dict(zip(state.robots.bodies().entity.tolist(), self._sim.config.robots, strict=True))
+            models |= dict(zip(state.objects.entity.tolist(), state.objects.prototypes, strict=True))
+            systems = [system for system in (state.traffic, state.transit, state.things) if system is not None]
+            for drawn in (system.draw() for system in systems if system is not state.things or len(state.things)):
+                for body, index in zip(drawn.entity.tolist(), drawn.index.tolist(), strict=True):
+                    # Bodies come before their parts: lamps, leaves of doors.
+                    models.setdefault(body, drawn.prototypes[index])
+            self._known = models | self._known
         return self._known.get(entity)
-
-
-def _models_of(sim: Simulation) -> dict[int, str]:
-    state, found = sim.state, dict[int, str]()
-    if state.robots is not None:
-        found |= dict(zip(state.robots.bodies().entity.tolist(), sim.config.robots, strict=True))
-    found |= dict(zip(state.objects.entity.tolist(), state.objects.prototypes, strict=True))
-    systems = [system for system in (state.traffic, state.transit, state.things) if system is not None]
-    for drawn in (system.draw() for system in systems if system is not state.things or len(state.things)):
-        for entity, index in zip(drawn.entity.tolist(), drawn.index.tolist(), strict=True):
-            # Bodies come before their parts: lamps, leaves of doors.
-            found.setdefault(entity, drawn.prototypes[index])
-    return found
 
 
 def describer(sim: Simulation) -> Callable[[int], dict[str, Any]]:
@@ -149,21 +145,17 @@ def read_manifest(path: Path) -> dict[str, Any]:
 
 def _command(path: Path, manifest: Mapping[str, Any]) -> str:
     """Return what to type to make a run again, as far as its manifest tells."""
-    world, community, config = (_mapping(manifest.get(name)) for name in ("world", "community", "config"))
+    parts = [manifest.get(name) for name in ("world", "community", "config")]
+    world, community, config = (part if isinstance(part, dict) else {} for part in parts)
     words = ["vico", "run", world.get("path") or "WORLD", community.get("path") or "COMMUNITY"]
     options = {"seed": manifest.get("seed"), "steps": manifest.get("wanted_steps"), "out": path}
     options |= {name: config.get(name) for name in ("cars", "cyclists", "pedestrians")}
-    options |= {name: ",".join(config[name]) or "none" for name in ("robots", "observe") if _is_names(config.get(name))}
+    for name in ("robots", "observe"):
+        names = config.get(name)
+        if isinstance(names, list) and all(isinstance(one, str) for one in names):
+            options[name] = ",".join(names) or "none"
     words += [word for name, value in options.items() if value is not None for word in (f"--{name}", value)]
     return shlex.join(map(str, [*words, "--force"]))
-
-
-def _mapping(value: object) -> Mapping[str, Any]:
-    return value if isinstance(value, dict) else {}
-
-
-def _is_names(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
 def _person(resident: Any, look: Appearance, places: Mapping[str, str]) -> dict[str, Any]:

@@ -29,12 +29,13 @@ from vico.sim.animation import STYLE, Hands, Hold, Transition, free_hands, pose,
 from vico.sim.animation.motions import CLIPS
 from vico.sim.config import find_by_name
 from vico.sim.pictures.people import looks_of_strangers, manner_of_pedestrian
-from vico.sim.recording.films import View, views_of
+from vico.sim.recording.films import View
 from vico.sim.recording.manifest import CastMember, read_cast, read_manifest
 from vico.sim.recording.schema import (
     AGENTS,
     METRICS,
     TABLES,
+    VIEWS,
     Checkpoint,
     Segment,
     checkpoint_steps,
@@ -61,7 +62,7 @@ _KEPT = 4
 
 @dataclass(frozen=True)
 class Tracks:
-    """Where everything was in a range of steps.
+    """Positions of everything in a range of steps.
 
     Attributes
     ----------
@@ -239,7 +240,8 @@ class Run:
     @property
     def views(self) -> dict[str, View]:
         """Films of what agents saw, by agent's name; a frame for every step at which it observed."""
-        return views_of(self.path, [agent["name"] for agent in self.agents], self.last)
+        folders = {agent["name"]: self.path / VIEWS / agent["name"] for agent in self.agents}
+        return {name: View(folder, self.last) for name, folder in folders.items() if any(folder.glob("*.mp4"))}
 
     @property
     def checkpoints(self) -> list[int]:
@@ -389,7 +391,7 @@ def read_run(path: Path | str) -> Run:
 
 @dataclass(frozen=True)
 class JointPoses:
-    """How people hold themselves at a step.
+    """Poses of people at a step.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a recording takes from a simulation at a step, as rows of the tables.
+"""Samples that a recording takes from a simulation at a step, as rows of the tables.
 
 Actions are kept as text: whatever an agent handed in, good or not, in a bounded line of JSON.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,6 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from vico.sim.bodies.arrays import OBJECT, Bodies
-from vico.sim.bodies.state_arrays import MovableObjects
 from vico.sim.environment.weather import NAMES as WEATHER
 from vico.sim.people.placement import habit_of
 from vico.sim.pictures.hands import hands_of_pedestrians
@@ -61,15 +60,12 @@ def _plain(value: object, depth: int) -> Any:
     if isinstance(value, str):
         return value[:_LONGEST_TEXT]
     if isinstance(value, dict) and depth < _DEEPEST and len(value) <= _LONGEST_LIST:
-        return {_plain_key(key): _plain(item, depth + 1) for key, item in value.items()}
+        keys = [key[:80] if isinstance(key, str) else f"<{type(key).__name__}>" for key in value]
+        return {key: _plain(item, depth + 1) for key, item in zip(keys, value.values(), strict=True)}
     if isinstance(value, list | tuple) and depth < _DEEPEST and len(value) <= _LONGEST_LIST:
         return [_plain(item, depth + 1) for item in value]
     # Not its repr: that is the agent's own code.
     return f"<{type(value).__name__}>"
-
-
-def _plain_key(key: object) -> str:
-    return key[:80] if isinstance(key, str) else f"<{type(key).__name__}>"
 
 
 Rows = Mapping[str, Any]
@@ -128,7 +124,18 @@ class StepSamples:
         sim, step = self._sim, self._sim.metrics.steps
         self.steps.append(step)
         self.latest = {}
-        self._add("steps", {"step": [step], "hash": [digest], **_counts(sim)})
+        self._add(
+            "steps",
+            {
+                "step": [step],
+                "hash": [digest],
+                "time": [sim.state.second],
+                "collisions": [sim.metrics.collisions],
+                "refused": [sim.metrics.refused],
+                "arrivals": [int(sim.punctuality.arrivals.sum())],
+                "late": [int(sim.punctuality.late.sum())],
+            },
+        )
         self._add("weather", _weather(step, sim))
         self._add("bodies", _bodies(step, bodies, sim.state.traffic))
         self._add("people", self._people(step))
@@ -144,7 +151,16 @@ class StepSamples:
 
     def tables(self) -> dict[str, pa.Table]:
         """Return all rows as tables, and wait for others."""
-        tables = {name: _concatenate(name, rows) for name, rows in self._rows.items()}
+        tables: dict[str, pa.Table] = {}
+        for name, parts in self._rows.items():
+            columns: dict[str, Any] = {}
+            for key, column in TABLES[name].items():
+                pieces = [part[key] for part in parts]
+                if column.kind == pa.string():
+                    columns[key] = [value for piece in pieces for value in piece]
+                else:
+                    columns[key] = to_stored(np.concatenate([np.zeros(0), *pieces]), column)
+            tables[name] = table_of(name, columns)
         self._begin()
         return tables
 
@@ -182,12 +198,9 @@ def everybody(sim: Simulation) -> Bodies:
     if state.traffic is not None:
         owners.append(state.traffic.passengers)
     owners.append(state.things.bodies())
-    return Bodies.joined([people, *owners, _objects_as_bodies(state.objects)])
-
-
-def _objects_as_bodies(objects: MovableObjects) -> Bodies:
+    objects = state.objects
     n = len(objects)
-    return Bodies(
+    movable = Bodies(
         objects.entity,
         np.full(n, OBJECT, np.int8),
         objects.position,
@@ -197,16 +210,7 @@ def _objects_as_bodies(objects: MovableObjects) -> Bodies:
         objects.size[:, 2],
         np.zeros((n, 2)),
     )
-
-
-def _counts(sim: Simulation) -> Rows:
-    return {
-        "time": [sim.state.second],
-        "collisions": [sim.metrics.collisions],
-        "refused": [sim.metrics.refused],
-        "arrivals": [int(sim.punctuality.arrivals.sum())],
-        "late": [int(sim.punctuality.late.sum())],
-    }
+    return Bodies.joined([people, *owners, movable])
 
 
 def _weather(step: int, sim: Simulation) -> Rows:
@@ -304,14 +308,3 @@ def _events(step: int, events: Sequence[Event]) -> Rows:
         "z": position[:, 2],
         "data": [_SORTED.encode(event.data) for event in events],
     }
-
-
-def _concatenate(name: str, parts: Sequence[Rows]) -> pa.Table:
-    columns: dict[str, Any] = {}
-    for key, column in TABLES[name].items():
-        pieces: Iterable[Any] = [part[key] for part in parts]
-        if column.kind == pa.string():
-            columns[key] = [value for piece in pieces for value in piece]
-        else:
-            columns[key] = to_stored(np.concatenate([np.zeros(0), *pieces]), column)
-    return table_of(name, columns)

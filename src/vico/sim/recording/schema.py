@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -55,7 +55,6 @@ __all__ = [
     "column_values",
     "drop_checkpoints_after",
     "drop_segments_after",
-    "empty_table",
     "read_checkpoint",
     "read_table",
     "segments_of",
@@ -238,11 +237,6 @@ def table_of(name: str, columns: Mapping[str, Sequence[Any] | NDArray[Any]]) -> 
     return table if len(keys) == 1 else table.take(order)
 
 
-def empty_table(name: str) -> pa.Table:
-    """Return a table of the format without rows."""
-    return table_of(name, {key: [] for key in TABLES[name]})
-
-
 def column_values(table: pa.Table, key: str, column: Column) -> NDArray[Any]:
     """Return a column's values in its quantity: metres, radians, text as objects."""
     if column.absent is not None and key not in table.column_names:
@@ -304,7 +298,7 @@ def read_table(segment: Segment, name: str) -> pa.Table:
     """
     path = segment.path / f"{name}.parquet"
     if not path.exists():
-        return empty_table(name)
+        return table_of(name, {key: [] for key in TABLES[name]})
     try:
         return pq.read_table(path, memory_map=False)
     except (pa.ArrowException, OSError) as error:
@@ -348,7 +342,8 @@ class written_folder:
 
 def _parquet(name: str, table: pa.Table) -> bytes:
     """Return a table as Parquet: whole numbers by their differences, text and flags by dictionary, zstd over all."""
-    differences = dict.fromkeys(_whole_numbers(name), "DELTA_BINARY_PACKED")
+    whole = [key for key, column in TABLES[name].items() if column.kind == pa.int32()]
+    differences = dict.fromkeys(whole, "DELTA_BINARY_PACKED")
     others = [key for key in table.column_names if key not in differences]
     sink = pa.BufferOutputStream()
     pq.write_table(
@@ -362,10 +357,6 @@ def _parquet(name: str, table: pa.Table) -> bytes:
         store_schema=False,
     )
     return bytes(sink.getvalue().to_pybytes())
-
-
-def _whole_numbers(name: str) -> Iterable[str]:
-    return [key for key, column in TABLES[name].items() if column.kind == pa.int32()]
 
 
 _CHECKPOINT_NAME = re.compile(r"\d{8,}")

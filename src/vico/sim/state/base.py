@@ -1,4 +1,4 @@
-"""What never changes about a world, in the form that simulations look it up in: built once, shared by all of them.
+"""Fixed facts of a world, in the form that simulations look them up in: built once, shared by all of them.
 
 Beside the world's own facts these are the residents' schedules as appointments (where each puts them at what time of
 the day), and opening hours (which places are open to whom).
@@ -155,7 +155,7 @@ class SimulationBase:
 
     @cached_property
     def seats(self) -> Seats:
-        """Where people sit and lie."""
+        """Seats and beds."""
         models = street_models() | furniture_models()
         return Seats.of(self.world.objects, models, self.indoor, self.world.height)
 
@@ -184,7 +184,7 @@ class SimulationBase:
 
     @cached_property
     def streets(self) -> TrafficNetwork:
-        """What traffic moves on."""
+        """Network that traffic moves on."""
         world = self.world
         # Of a city that lies on the disk alone: a world of one tile takes a second or two, and may be made up.
         known = world.digest if isinstance(world, CityWorld) else ""
@@ -196,7 +196,7 @@ class SimulationBase:
 
     @cached_property
     def tram_network(self) -> TramNetwork:
-        """Where trams drive, and what is in their way there."""
+        """Network that trams drive on, and what is in their way there."""
         return TramNetwork(self.world.transit.tram_lines, self.streets.lanes, self.streets.walks)
 
     @cached_property
@@ -206,12 +206,12 @@ class SimulationBase:
 
     @cached_property
     def event_sites(self) -> EventSites:
-        """Where events can be."""
+        """Sites where events can be."""
         return EventSites(self.world, lambda: self.streets.walks)
 
     @cached_property
     def event_spots(self) -> dict[CityEvent, list[Spot]]:
-        """Where the things of events stand, of those that were asked for so far."""
+        """Spots of the things of events, of those that were asked for so far."""
         return {}
 
     @cached_property

@@ -1,11 +1,11 @@
-"""What stands in the city while an event goes on: bodies like all others, set up where there is room for them."""
+"""Things that stand in the city while an event goes on: bodies like all others, set up where there is room for them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,37 +16,19 @@ from vico.errors import InputError
 from vico.sim.bodies.arrays import CAR, FIXTURE, Bodies, Drawn
 from vico.sim.bodies.footprints import Rectangle, gaps, records_of
 from vico.sim.bodies.state_arrays import FIRST_THING
-from vico.sim.environment import Environment, Occurrence
-from vico.sim.environment.event_sites import Spot, spots_of
+from vico.sim.environment import Occurrence
+from vico.sim.environment.event_sites import spots_of
 from vico.sim.state.base import SimulationBase
 from vico.world.mesh import Surface
-from vico.world.world import World
 
 if TYPE_CHECKING:
+    from vico.sim.environment.agenda import Agenda
     from vico.sim.traffic import Traffic
 
 #: Entities of an event's things: so many numbers for each event.
 THINGS_EACH = 100
 # Things are set up where this much is free around them, metres.
 _ROOM = 0.5
-
-
-class EventSetting(Protocol):
-    """What things are set up in: the state of a simulation."""
-
-    base: SimulationBase
-    environment: Environment
-
-    @property
-    def world(self) -> World:
-        """Where it is."""
-
-    @property
-    def traffic(self) -> Traffic | None:
-        """Who drives there."""
-
-    def obstacles(self) -> Bodies:
-        """Every body outdoors that somebody on the ground could touch."""
 
 
 class EventThings:
@@ -77,7 +59,7 @@ class EventThings:
         if "entity" in arrays:
             rows = zip(arrays["entity"].tolist(), arrays["pose"].tolist(), arrays["model"].tolist(), strict=True)
             self._standing = {entity: _Thing(model, tuple(pose)) for entity, pose, model in rows}
-        self._bodies = self._joined()
+        self._bodies = self._join_bodies()
 
     def bodies(self) -> Bodies:
         """Return everything that stands."""
@@ -109,43 +91,64 @@ class EventThings:
         kind = "" if thing is None else "car" if _is_vehicle(thing.model) else "fixture"
         return None if thing is None else {"kind": kind, "name": thing.model.replace("_", " ")}
 
-    def follow(self, state: EventSetting) -> None:
-        """Clear away what stands for events that are over, and set up what is missing where there is room by now."""
-        agenda = state.environment.agenda
+    def follow(
+        self, base: SimulationBase, agenda: Agenda, traffic: Traffic | None, obstacles: Callable[[], Bodies]
+    ) -> None:
+        """Clear away what stands for events that are over, and set up what is missing where there is room by now.
+
+        Parameters
+        ----------
+        obstacles
+            Returns every body outdoors that somebody on the ground could touch.
+        """
         going_on = {one.id: one for one in agenda.going_on}
         kept = {e: thing for e, thing in self._standing.items() if (e - FIRST_THING) // THINGS_EACH in going_on}
         if len(kept) != len(self._standing):
             self._stand(kept)
         for one in going_on.values():
             # At once, so that the next event's things keep clear of them.
-            if more := self._missing(one, state):
+            if more := self._missing(one, base, agenda, traffic, obstacles):
                 self._stand(self._standing | more)
 
     def _stand(self, things: dict[int, _Thing]) -> None:
         """Have these things stand, and no others."""
         self._standing = dict(sorted(things.items()))
-        self._bodies = self._joined()
+        self._bodies = self._join_bodies()
 
-    def _missing(self, one: Occurrence, state: EventSetting) -> dict[int, _Thing]:
+    def _missing(
+        self,
+        one: Occurrence,
+        base: SimulationBase,
+        agenda: Agenda,
+        traffic: Traffic | None,
+        obstacles: Callable[[], Bodies],
+    ) -> dict[int, _Thing]:
         """Return what is missing of an event's things and can be set up now, by entity."""
         first = FIRST_THING + THINGS_EACH * one.id
-        spots = _spots(one, state)
+        known = base.event_spots
+        if one.event not in known:
+            known[one.event] = spots_of(one, base.event_sites)[:THINGS_EACH]
+        spots = known[one.event]
         missing = [k for k in range(len(spots)) if first + k not in self._standing]
         if not missing:
             return {}
-        closed = state.environment.agenda.effects.lanes
+        closed = agenda.effects.lanes
         # As long as a car has to drive out of the street, nothing is put in its way.
-        if one.kind.lanes and state.traffic is not None and closed is not None and state.traffic.is_taken(closed):
+        if one.kind.lanes and traffic is not None and closed is not None and traffic.is_taken(closed):
             return {}
-        others = records_of(state.obstacles())
-        things = {first + k: _Thing.at(spots[k], state) for k in missing}
+        others = records_of(obstacles())
+        things = {}
+        for k in missing:
+            x, y, yaw = spots[k].x, spots[k].y, spots[k].yaw
+            z = float(base.world.height(np.array([x, y])))
+            things[first + k] = _Thing(spots[k].model, (x, y, z, yaw))
         return {
             entity: thing
             for entity, thing in things.items()
             if not len(others) or gaps(thing.outline(), others).min() >= _ROOM
         }
 
-    def _joined(self) -> Bodies:
+    def _join_bodies(self) -> Bodies:
         things = list(self._standing.values())
         sizes = np.array([shape_of(thing.model)[1] for thing in things], np.float64).reshape(-1, 3)
         poses = np.array([thing.pose for thing in things], np.float64).reshape(-1, 4)
@@ -168,23 +171,10 @@ class _Thing:
     def __init__(self, model: str, pose: tuple[float, float, float, float]) -> None:
         self.model, self.pose = model, pose
 
-    @classmethod
-    def at(cls, spot: Spot, state: EventSetting) -> _Thing:
-        z = float(state.world.height(np.array([spot.x, spot.y])))
-        return cls(spot.model, (spot.x, spot.y, z, spot.yaw))
-
     def outline(self) -> Rectangle:
         length, width, _ = shape_of(self.model)[1]
         x, y, _, yaw = self.pose
         return Rectangle(x, y, math.cos(yaw), math.sin(yaw), length / 2, width / 2)
-
-
-def _spots(one: Occurrence, state: EventSetting) -> list[Spot]:
-    """Return where an event's things are to stand; the same as long as it goes on."""
-    known = state.base.event_spots
-    if one.event not in known:
-        known[one.event] = spots_of(one, state.base.event_sites)[:THINGS_EACH]
-    return known[one.event]
 
 
 def _is_vehicle(model: str) -> bool:

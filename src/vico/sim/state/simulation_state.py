@@ -230,10 +230,6 @@ class SimulationState:
         x, y = p.position[i, :2].tolist()
         return [self.world.places[k].id for k in self.base.entrances_near(x, y)]
 
-    def doors_of(self, i: int) -> list[dict[str, Any]]:
-        """Ways out of the room that person `i` is in: where each leads, and where it is."""
-        return self.doors_in(self.people.room.item(i))
-
     def doors_in(self, room: int) -> list[dict[str, Any]]:
         """Ways out of a room (-1: none): where each leads, and where it is."""
         if room < 0:

@@ -40,11 +40,6 @@ def state_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
     return digest.hexdigest()
 
 
-def copy_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return a copy that later steps leave alone."""
-    return {name: np.array(array, copy=True) for name, array in arrays.items()}
-
-
 def arrays_of(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
     """Return the arrays whose names start with ``prefix.``, without it."""
     head = prefix + "."

@@ -55,7 +55,7 @@ def ticks_of(seconds: float, what: str, *, multiple: int = 1) -> int:
 
 @dataclass(frozen=True)
 class ControlPeriods:
-    """How often each agent of a run acts and observes; never changes.
+    """Control periods of the agents of a run; they never change.
 
     Attributes
     ----------

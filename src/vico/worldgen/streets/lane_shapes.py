@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geometry import arc_lengths, distance, distances, points_along
-from vico.world.opendrive import wrap_angle
+from vico.geometry import arc_lengths, distance, distances, points_along, wrap_angle
 
 Floats = NDArray[np.float64]
 
