@@ -134,7 +134,8 @@ class RoomGrid:
         least = min(_WIDTHS[0], self.gap(one))
         if any(self.gap(point) < least for point in line):
             return False
-        return not len(people) or bool((_distances(line, people) >= _PASSES - 0.02).all())
+        away = np.hypot(*np.moveaxis(line[:, None] - people[None], -1, 0))
+        return bool((away >= _PASSES - 0.02).all())
 
     def _search(
         self, start: Area, wanted: NDArray[np.bool_], people: Area, bumps: Area, aim: Area, near: float
@@ -197,10 +198,6 @@ def _rectangle_distances(box: Area, points: Area) -> Area:
     u, v = np.abs(c * dx + s * dy) - half_length, np.abs(c * dy - s * dx) - half_width
     outside = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
     return np.asarray(outside + np.minimum(np.maximum(u, v), 0.0))
-
-
-def _distances(points: Area, others: Area) -> Area:
-    return np.asarray(np.hypot(*np.moveaxis(points[:, None] - others[None], -1, 0)))
 
 
 @compiled

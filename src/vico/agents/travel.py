@@ -126,7 +126,10 @@ def _search_manoeuvre(
             return None
         pose = queue.popleft()
         if walkable.clearance_of(pose[0], pose[1]) >= TURNING_CLEARANCE:
-            return _backtrack(before, pose)
+            path = [pose]
+            while (parent := before[_pose_key(path[-1])]) is not None:
+                path.append(parent)
+            return path[::-1]
         for onward in _next_poses(walkable, pose, heading):
             if _pose_key(onward) not in before:
                 before[_pose_key(onward)] = pose
@@ -160,13 +163,6 @@ def _bicycle_fits(walkable: WalkableMap, pose: _BicyclePose, heading: float) -> 
 
 def _pose_key(pose: _BicyclePose) -> tuple[int, int, int]:
     return round(pose[0] / _SEARCH_CELL), round(pose[1] / _SEARCH_CELL), pose[2]
-
-
-def _backtrack(before: dict[tuple[int, int, int], _BicyclePose | None], pose: _BicyclePose) -> list[_BicyclePose]:
-    found = [pose]
-    while (parent := before[_pose_key(found[-1])]) is not None:
-        found.append(parent)
-    return found[::-1]
 
 
 # This near to where one waits for a bus, or to a rack, is there, metres. At a stop something or others may stand in the

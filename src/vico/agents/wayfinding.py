@@ -392,7 +392,9 @@ class Walker:
         if self._blocked == 1 and not solid:
             self._aside = [{"type": "wait"}] * int(self._rng.integers(1, 3))
             return
-        patience = _patience_with(observation)
+        # How often somebody on a bicycle waits for what stopped it to go on.
+        obstacle = str(observation["state"].get("action_reason", "")).removeprefix("stopped by ")
+        patience = _LETS_TRAM_PASS if obstacle == "tram" else _LETS_PASS if obstacle in VEHICLES else 0
         if self._turns_in and self._blocked <= patience:
             # It goes on when it can: who presses on beside it gets stuck between it and a wall.
             self._aside = [{"type": "wait"}] * 2
@@ -450,14 +452,6 @@ def closed_ground(info: Info) -> list[tuple[float, float, float]]:
     """Return the ground that events close now, as far as one knows of them: x, y and radius, ENU metres."""
     known = [event for event in info.get("events", ()) if event["goes_on"]]
     return [(x, y, radius) for event in known for x, y, radius in event["closed_ground"]]
-
-
-def _patience_with(observation: Observation) -> int:
-    """Return how often who rides waits for what stopped it to go on."""
-    what = str(observation["state"].get("action_reason", "")).removeprefix("stopped by ")
-    if what == "tram":
-        return _LETS_TRAM_PASS
-    return _LETS_PASS if what in VEHICLES else 0
 
 
 def _point_ahead(position: Point, yaw: float, reach: float) -> Point:

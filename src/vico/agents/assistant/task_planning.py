@@ -189,7 +189,11 @@ def best_plan(model: TaskModel, left: float) -> TaskPlan:
             for choice, reached, likely in model.steps(outlook):
                 if reached.time > left:
                     continue
-                longer = _extend_plan(plan, choice, outlook, reached, likely=likely, left=left)
+                gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
+                worth = plan.worth + gained * likely * (1.0 - IMPATIENCE * reached.time / max(left, 1.0))
+                longer = TaskPlan(
+                    (*plan.choices, choice), plan.done + gained, reached.time if gained else plan.time, worth
+                )
                 if not _add_label(after.setdefault((reached.at, reached.stages), []), (reached, longer)):
                     continue
                 if (longer.worth, -longer.time) > (best.worth, -best.time):
@@ -198,15 +202,6 @@ def best_plan(model: TaskModel, left: float) -> TaskPlan:
         if len(front) > _MAX_LABELS:
             front = sorted(front, key=lambda label: (-label[1].worth, label[0].time))[:_MAX_LABELS]
     return best
-
-
-def _extend_plan(
-    plan: TaskPlan, choice: Choice, outlook: TaskState, reached: TaskState, *, likely: float, left: float
-) -> TaskPlan:
-    """Return a plan that is one choice longer."""
-    gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
-    worth = plan.worth + gained * likely * (1.0 - IMPATIENCE * reached.time / max(left, 1.0))
-    return TaskPlan((*plan.choices, choice), plan.done + gained, reached.time if gained else plan.time, worth)
 
 
 def _add_label(labels: list[_Label], new: _Label) -> bool:

@@ -437,7 +437,15 @@ class VoxelMap:
         height = -float(dot(camera.rotation[:, 2], camera.shift))
         limits = np.array([STEP, REACH, now + FADES, height])
         clear_seen_through(self.voxels, depth, camera, eye, limits)
-        add_points(self.voxels, depth, segmentation, camera, _entity_kinds(entities, ignore), limits)
+        # Entities that are no lasting obstacles, and why not.
+        passing = {int(entity): IGNORED for entity in np.asarray(ignore, np.int64).tolist()}
+        for entity, about in entities.items():
+            if about["kind"] in MOVING:
+                passing.setdefault(int(entity), MOVES)
+            elif about["kind"] in PORTABLE:
+                passing.setdefault(int(entity), IGNORED)
+        kinds = np.array(sorted(passing.items()), np.int64).reshape(-1, 2)
+        add_points(self.voxels, depth, segmentation, camera, kinds, limits)
         self.refresh(now)
 
     def refresh(self, now: int) -> None:
@@ -565,14 +573,3 @@ class VoxelMap:
         self.voxels.until.ravel()[place] = np.asarray(state["until"], np.int64)
         self.voxels.flags[..., CHANGED] = self.voxels.flags[..., TIMED] = self.voxels.flags[..., THERE]
         self.refresh(0)
-
-
-def _entity_kinds(entities: Mapping[int, Mapping[str, str]], ignore: ArrayLike) -> NDArray[np.int64]:
-    """Return entities that are no lasting obstacles, and why not."""
-    found = {int(entity): IGNORED for entity in np.asarray(ignore, np.int64).tolist()}
-    for entity, about in entities.items():
-        if about["kind"] in MOVING:
-            found.setdefault(int(entity), MOVES)
-        elif about["kind"] in PORTABLE:
-            found.setdefault(int(entity), IGNORED)
-    return np.array(sorted(found.items()), np.int64).reshape(-1, 2)

@@ -33,13 +33,6 @@ GOAL_RADIUS = 2.2
 _PUT_AHEAD, _GOAL_RING = 0.75, 1.6
 
 
-def goal_point(centre: Sequence[float], number: int) -> Array:
-    """Return the middle of a destination, or the place of a number about it, ENU metres, shape ``(2,)``."""
-    middle = np.array(centre[:2], np.float64)
-    turn = 2.0 * math.pi * number / PUT_PLACES
-    return np.asarray(middle + (number > 0) * _GOAL_RING * np.array([math.cos(turn), math.sin(turn)]))
-
-
 def placement_ahead(centre: Sequence[float], here: Stance, *, stand: float, tries: int) -> Array:
     """Return where to put a thing down: ahead, and near the middle of the destination, ENU metres, shape ``(3,)``.
 
@@ -441,7 +434,11 @@ class Manipulator:
     def _bring(self, observation: Observation, info: Info) -> Action:
         if not self._began:
             self._began = True
-            self.drive.begin(goal_point(self.told["destination"]["centre"], self._around), near=AT_GOAL)
+            # To the middle of the destination; after failed tries, to places around it.
+            middle = np.array(self.told["destination"]["centre"][:2], np.float64)
+            turn = 2.0 * math.pi * self._around / PUT_PLACES
+            offset = (self._around > 0) * _GOAL_RING * np.array([math.cos(turn), math.sin(turn)])
+            self.drive.begin(middle + offset, near=AT_GOAL)
         action = self.drive.act(observation)
         if self.drive.busy:
             return action

@@ -192,7 +192,10 @@ def play_task(
     method = method.method if isinstance(method, PlayedByHand) else method
     _check_made_for(task, world, community)
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
-    played = _played_by_a_person(method, names)
+    methods = method.split("+")
+    played = [name for i, name in enumerate(names) if methods[i % len(methods)] == HUMAN]
+    if len(played) > 1:
+        raise InputError("eval: one person plays one assistant; name a planner for the other one: human+heuristic")
     if played and (theatre is None or recording is None):
         raise InputError("eval: a person plays at a page: vico eval assistant --method human, or vico play --task")
     env = make(
@@ -238,15 +241,6 @@ def play_task(
             for step, why in model_faults_of(planner):
                 runner.faults.add(step, name, "model", why)
     return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
-
-
-def _played_by_a_person(method: str, names: list[str]) -> list[str]:
-    """Return the assistants that a person plays: one, or nobody."""
-    methods = method.split("+")
-    found = [name for i, name in enumerate(names) if methods[i % len(methods)] == HUMAN]
-    if len(found) > 1:
-        raise InputError("eval: one person plays one assistant; name a planner for the other one: human+heuristic")
-    return found
 
 
 def _perform(runner: Runner, performance: Performance, judge: Judge, task: Task) -> None:

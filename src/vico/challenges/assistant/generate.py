@@ -45,7 +45,7 @@ from vico.challenges.assistant.tasks import (
 )
 from vico.clock import clock_of, seconds_of_day
 from vico.community.folder import digest_of
-from vico.community.model import Community, Resident, ScheduleItem
+from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.world.model import Place
@@ -197,7 +197,8 @@ def _door(place: Place) -> NDArray[np.float64]:
 def _out_at(who: Resident, time: int, world: World) -> Place | None:
     """Return where somebody is expected at a time who is out then and for a while; None if they are not."""
     home = world.place_by_id[who.home]
-    during = [item for item in who.schedule if _overlaps(item, time, time + _OUT_FOR * STEPS)]
+    until = time + _OUT_FOR * STEPS
+    during = [item for item in who.schedule if seconds_of_day(item.start) < until and seconds_of_day(item.end) > time]
     if any(item.place == who.home for item in during):
         return None
     place = next((world.place_by_id[item.place] for item in during if item.place is not None), None)
@@ -206,10 +207,6 @@ def _out_at(who: Resident, time: int, world: World) -> Place | None:
     if float(np.hypot(*np.subtract(place.position[:2], home.position[:2]))) < APART:
         return None
     return place
-
-
-def _overlaps(item: ScheduleItem, since: float, until: float) -> bool:
-    return seconds_of_day(item.start) < until and seconds_of_day(item.end) > since
 
 
 def _spots(world: World, people: list[Resident], chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:

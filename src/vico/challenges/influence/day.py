@@ -179,7 +179,10 @@ class Ledger:
     def is_meant(self, member: str, text: str) -> bool:
         """Return whether a message is meant for a member: theirs is the first name in it."""
         words = words_of(text[:LONGEST_TEXT])
-        places = {name: _first_occurrence(words, spoken) for name, spoken in self._names.items()}
+        places = {
+            name: next((k for k in range(len(words) - len(spoken) + 1) if words[k : k + len(spoken)] == spoken), None)
+            for name, spoken in self._names.items()
+        }
         named = {name: at for name, at in places.items() if at is not None}
         # "Ada" and "Ada Berg" may begin at the same word: the longer name is meant.
         return bool(named) and member == min(named, key=lambda name: (named[name], -len(self._names[name])))
@@ -278,11 +281,6 @@ class Ledger:
         opinions = self.model.opinions(heard, now=message.time, variant=variant, receptions=receptions)
         ahead = opinions[message.listener, message.speaker] - opinions[message.listener, rival.id]
         return "undecided" if abs(ahead) < _DRAW else "stands_with_you" if ahead > 0 else "stands_with_rival"
-
-
-def _first_occurrence(words: list[str], wanted: list[str]) -> int | None:
-    """Return where some words first stand one after another."""
-    return next((k for k in range(len(words) - len(wanted) + 1) if words[k : k + len(wanted)] == wanted), None)
 
 
 #: Makes what asks a language model, by what for: ``target``, ``dialogue`` or ``member``.

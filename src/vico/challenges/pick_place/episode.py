@@ -149,7 +149,7 @@ def play(
         if seen is not None:
             seen(observation)
         observation = _step(sim, action)
-        lifted = lifted or _rise(sim, task) > 0.05
+        lifted = lifted or float(sim.ground_truth.object_position("thing")[2] - task.thing.position[2]) > 0.05
         if observation["sensors"]["fallen"][0]:
             cause = Verdict.FALLEN
             break
@@ -219,11 +219,6 @@ def _step(sim: Simulation, action: dict[str, Any]) -> Observation:
     sim.advance(PERIOD)
     observations, _ = sim.observe([ROBOT])
     return observations[ROBOT]
-
-
-def _rise(sim: Simulation, task: PickPlaceTask) -> float:
-    """Return how much higher the thing is than where it lay, metres."""
-    return float(sim.ground_truth.object_position("thing")[2] - task.thing.position[2])
 
 
 def _judge(sim: Simulation, task: PickPlaceTask, observation: Observation, *, lifted: bool) -> tuple[str, float]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from vico.challenges.episodes import Outcome
-from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting, setting_of_task
+from vico.challenges.records import Challenge, Metric, Setting, setting_of_task
 from vico.runner.gather import FAULT_KINDS
 
 
@@ -208,7 +208,7 @@ def summarise(challenge: Challenge, outcomes: Sequence[Outcome], *, reference: s
 
 
 def _row(challenge: Challenge, category: str, method: str, outcomes: Sequence[Outcome]) -> Row:
-    records = _records(outcomes)
+    records = [outcome.record for outcome in outcomes if outcome.record is not None]
     metrics = {}
     for metric in challenge.metrics(category):
         values = _values(outcomes, metric.key)
@@ -267,10 +267,6 @@ def _averages(
             difference = estimate_of_means([[v for v, _ in p] for p in pairs], [[w for _, w in p] for p in pairs])
         averages.append(Average(method, key, mean.clipped(first[0].low, first[0].high), difference))
     return averages
-
-
-def _records(outcomes: Sequence[Outcome]) -> list[EpisodeRecord]:
-    return [outcome.record for outcome in outcomes if outcome.record is not None]
 
 
 def _values(outcomes: Sequence[Outcome], key: str) -> list[tuple[float, str]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from itertools import accumulate
@@ -134,16 +134,6 @@ def read_policy(path: Path | str, *, inputs: int | None = None, outputs: int | N
             f"policy: {path} is no archive of plain arrays (pickled objects are refused); write it with "
             "scripts/train_manipulation.py"
         ) from None
-    policy = _policy_of(path, arrays)
-    for what, has, wanted in (("inputs", policy.inputs, inputs), ("outputs", policy.outputs, outputs)):
-        if wanted is not None and has != wanted:
-            raise SchemaError(
-                f"policy: {path} has {has} {what}, not {wanted}: it was trained on another task or observation"
-            )
-    return policy
-
-
-def _policy_of(path: Path, arrays: Mapping[str, NDArray[Any]]) -> ArrayPolicy:
     count = sum(name.startswith("weight_") for name in arrays)
     names = {f"{kind}{k}" for kind in _KNOWN for k in range(count)} | {"mean", "deviation"}
     if not count or names != set(arrays):
@@ -164,7 +154,13 @@ def _policy_of(path: Path, arrays: Mapping[str, NDArray[Any]]) -> ArrayPolicy:
         width = bias.shape
     if arrays["deviation"].shape != arrays["mean"].shape or not (arrays["deviation"] > 0.0).all():
         raise SchemaError(f"policy: {path}: deviation has to have the shape of mean, and to be above 0")
-    return ArrayPolicy(weights, biases, arrays["mean"], arrays["deviation"])
+    policy = ArrayPolicy(weights, biases, arrays["mean"], arrays["deviation"])
+    for what, has, wanted in (("inputs", policy.inputs, inputs), ("outputs", policy.outputs, outputs)):
+        if wanted is not None and has != wanted:
+            raise SchemaError(
+                f"policy: {path} has {has} {what}, not {wanted}: it was trained on another task or observation"
+            )
+    return policy
 
 
 _ENDS = list(accumulate(FULL.values()))
