@@ -134,6 +134,8 @@ class RoomGrid:
         least = min(_WIDTHS[0], self.gap(one))
         if any(self.gap(point) < least for point in line):
             return False
+        if not len(people):
+            return True
         away = np.hypot(*np.moveaxis(line[:, None] - people[None], -1, 0))
         return bool((away >= _PASSES - 0.02).all())
 

@@ -212,7 +212,7 @@ def _follower_with_plan(
     return ScheduleFollower(_Homegoer(resident, plan), public_map, seed=seed, paces=(own, own))
 
 
-#: Names of those who may help begin so.
+#: Names of robots begin so.
 ROBOT_PREFIX = "robot_"
 #: What a robot says that has taken the thing up: nobody waits any longer.
 TAKEN_TEXT = "I have it."

@@ -24,6 +24,7 @@ from vico.io.stores import Store
 from vico.runner.loading import source_digest
 from vico.version import __version__
 from vico.world.folder import read_world
+from vico.world.world import World
 
 SCHEMA = "vico.episode"
 VERSION = 1
@@ -175,6 +176,11 @@ def read_episode(store: Store, name: str, key: str) -> EpisodeRecord | None:
     except (SchemaError, ValueError, RecursionError) as error:
         _log.warning("%s/%s: damaged, and played again (%s)", store, name, error)
         return None
+
+
+def for_size(number: int, world: World) -> int:
+    """Return how many there are in a world, of so many in a window of 800 m."""
+    return min(number, round(number * (world.half / 400.0) ** 2))
 
 
 def record_of(content: Any) -> EpisodeRecord:

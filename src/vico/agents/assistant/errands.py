@@ -16,7 +16,7 @@ from vico.agents.assistant.estimates import Estimates
 from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
-from vico.agents.base import AgentState, Plan
+from vico.agents.base import AgentState, FieldState, Plan
 from vico.agents.day_plan import plan_of_errand
 from vico.agents.perception import RememberedSighting, Sighting
 from vico.seeds import rng
@@ -54,7 +54,7 @@ class Choice:
     region: int = -1
 
 
-class Book:
+class Book(FieldState):
     """What is known of all subtasks.
 
     Parameters
@@ -63,30 +63,17 @@ class Book:
         As told.
     """
 
+    closed: set[int]  # subtasks that are reported, or that a colleague does or has done
+    looked: dict[int, dict[int, int]]
+    refused: dict[str, int]
+    picked: dict[str, int]
+    put: set[str]
+
     def __init__(self, instructions: Sequence[Instruction]) -> None:
         self.instructions = {int(one["index"]): dict(one) | {"sources": list(one["sources"])} for one in instructions}
-        #: Subtasks that are reported, or that a colleague does or has done.
-        self.closed: set[int] = set()
-        self.looked: dict[int, dict[int, int]] = {k: {} for k in self.instructions}
-        self.refused: dict[str, int] = {}
-        self.picked: dict[str, int] = {}
-        self.put: set[str] = set()
-
-    def state(self) -> AgentState:
-        """Return all of it."""
-        return {
-            "closed": sorted(self.closed),
-            "looked": {str(k): {str(r): n for r, n in regions.items()} for k, regions in self.looked.items()},
-            "refused": dict(self.refused),
-            "picked": dict(self.picked),
-            "put": sorted(self.put),
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Know what `state` returned."""
-        self.closed, self.put = set(state["closed"]), set(state["put"])
-        self.looked = {int(k): {int(r): int(n) for r, n in regions.items()} for k, regions in state["looked"].items()}
-        self.refused, self.picked = dict(state["refused"]), dict(state["picked"])
+        self.closed, self.put = set(), set()
+        self.looked = {k: {} for k in self.instructions}
+        self.refused, self.picked = {}, {}
 
     def add_source(self, k: int, region: Mapping[str, Any]) -> None:
         """Look for a subtask's person in one more region, or once more in one that is known."""

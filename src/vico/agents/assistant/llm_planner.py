@@ -27,7 +27,7 @@ from pydantic import BaseModel, ConfigDict
 from vico.agents.assistant.errands import EPISODE_SECONDS, Book, Choice, ChoicePlanner
 from vico.agents.assistant.estimates import Estimates
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
-from vico.agents.base import AgentState
+from vico.agents.base import AgentState, FieldState
 from vico.agents.model_access import ModelAccess, episode_tokens, model_from_environment
 from vico.agents.perception import RememberedSighting
 from vico.clock import DAY, clock_of
@@ -181,28 +181,16 @@ MOST_ACTIONS, MOST_LINES = 20, 12
 LONGEST_LINE = 300
 
 
-class ActionMemory:
+class ActionMemory(FieldState):
     """Previous actions, each with the time it began, how long it took and its outcome."""
 
+    entries: list[dict[str, Any]]
+    _words: str = ""
+    _since: float = 0.0
+    _before: AgentState | None = None
+
     def __init__(self) -> None:
-        self.entries: list[dict[str, Any]] = []
-        self._words = ""
-        self._since = 0.0
-        self._before: AgentState | None = None
-
-    def state(self) -> AgentState:
-        """Return all of it."""
-        return {
-            "entries": [dict(entry) for entry in self.entries],
-            "words": self._words,
-            "since": self._since,
-            "before": self._before,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self.entries = [dict(entry) for entry in state["entries"]]
-        self._words, self._since, self._before = str(state["words"]), float(state["since"]), state["before"]
+        self.entries = []
 
     def begin(self, words: str, now: float, book: Book) -> None:
         """Note an action that begins."""
@@ -331,7 +319,7 @@ _FRESH_SIGHTING, _TALK_MARGIN = 3.0, 2.0
 Author = Callable[[], str | None]
 
 
-class AssistantTalk:
+class AssistantTalk(FieldState):
     """One assistant's side of the conversation.
 
     Parameters
@@ -344,43 +332,29 @@ class AssistantTalk:
         Agents' names of others whose words are remembered.
     """
 
+    _place: list[float] | None = None  # where the colleague was last heard, and when
+    _room: str = ""
+    _heard_at: float = -np.inf
+    _met: bool = False
+    _turns: int = 0
+    _over: bool = False
+    _said: int = 0
+    _waited: int = 0
+    _answered: bool = True
+
     def __init__(self, name: str, colleague: str, *, begins: bool, also: Collection[str] = ()) -> None:
         self.name, self.colleague = name, colleague
         self.conversation = Conversation()
         self._begins, self._also = begins, frozenset(also)
-        self._place: list[float] | None = None  # where the colleague was last heard, and when
-        self._room, self._heard_at = "", -np.inf
-        self._met = False
-        self._turns = 0
-        self._anew()
-
-    def _anew(self) -> None:
-        self._over = False
-        self._said = self._waited = 0
-        self._answered = True
 
     def state(self) -> AgentState:
         """Return what was said, and how far the conversation is."""
-        return {
-            "lines": [dict(line) for line in self.conversation.lines],
-            "place": self._place,
-            "room": self._room,
-            "heard_at": None if np.isinf(self._heard_at) else self._heard_at,
-            "met": self._met,
-            "turns": self._turns,
-            "over": self._over,
-            "said": self._said,
-            "waited": self._waited,
-            "answered": self._answered,
-        }
+        return {"lines": [dict(line) for line in self.conversation.lines], **super().state()}
 
     def restore(self, state: AgentState) -> None:
         """Go on where `state` was returned."""
         self.conversation.lines = [dict(line) for line in state["lines"]]
-        self._place, self._room = state["place"], state["room"]
-        self._heard_at = -np.inf if state["heard_at"] is None else float(state["heard_at"])
-        self._met, self._turns, self._over = state["met"], state["turns"], state["over"]
-        self._said, self._waited, self._answered = state["said"], state["waited"], state["answered"]
+        super().restore(state)
 
     def hear(self, view: ObservationView, clock: str) -> None:
         """Remember what the colleague, and those the tasks are about, said."""
@@ -424,7 +398,9 @@ class AssistantTalk:
 
     def decided(self) -> None:
         """Take note that a decision was made: at the next one they may talk again."""
-        self._anew()
+        self._over = False
+        self._said = self._waited = 0
+        self._answered = True
 
     def seen(self, view: ObservationView, skills: AssistantSkills) -> Mapping[str, Any] | None:
         """Return how near the colleague is, for the model; None where it is not known to be near."""

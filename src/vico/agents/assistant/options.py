@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.assistant.skills import GRASP, OUTSIDE, Action, AssistantSkills, LookAround, ObservationView
-from vico.agents.base import AgentState
+from vico.agents.base import AgentState, FieldState
 from vico.agents.perception import Sighting
 from vico.exact import each
 
@@ -46,7 +46,7 @@ class Option(Protocol):
         """Go on where another one, made in the same way, was."""
 
 
-class Pursuit:
+class Pursuit(FieldState):
     """Going up to something that was seen, or somebody who moves, through the door that they were seen through.
 
     Attributes
@@ -55,32 +55,17 @@ class Pursuit:
         Where it was seen last, ENU metres, shape ``(3,)``; None before.
     """
 
+    position: NDArray[np.float64] | None
+    _through: str = ""
+    # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
+    _goal: NDArray[np.float64] | None = None
+    _holds: int = 0
+    # Views to take in a room that one came into after it, before one walks to where it is thought to be.
+    _views: int = 0
+
     def __init__(self, skills: AssistantSkills, position: NDArray[np.float64] | None = None) -> None:
         self.position = position
         self._skills = skills
-        self._through = ""
-        # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
-        self._goal: NDArray[np.float64] | None = None
-        self._holds = 0
-        # Views to take in a room that one came into after it, before one walks to where it is thought to be.
-        self._views = 0
-
-    def state(self) -> AgentState:
-        """Return where it was seen."""
-        return {
-            "position": None if self.position is None else self.position.copy(),
-            "through": self._through,
-            "goal": None if self._goal is None else self._goal.copy(),
-            "holds": self._holds,
-            "views": self._views,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self.position, self._goal = (
-            None if state[name] is None else np.array(state[name], np.float64) for name in ("position", "goal")
-        )
-        self._through, self._holds, self._views = state["through"], state["holds"], state["views"]
 
     def see(self, view: ObservationView, position: NDArray[np.float64]) -> None:
         """Take note of where it is now."""
@@ -117,21 +102,14 @@ class Pursuit:
         return self._goal
 
 
-class GoTo:
+class GoTo(FieldState):
     """Go to a region: into the place, or to the middle of the spot outdoors. Outcomes: ``arrived``, ``stuck``."""
+
+    _steps: int = 0
 
     def __init__(self, skills: AssistantSkills, region: Region, *, near: float = 1.0) -> None:
         self.outcome = ""
         self._skills, self._region, self._near = skills, region, near
-        self._steps = 0
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {"steps": self._steps}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._steps = state["steps"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""
@@ -181,33 +159,20 @@ class Search:
         return action
 
 
-class WalkUp:
+class WalkUp(FieldState):
     """Walk up to a thing that was seen. Outcomes: ``arrived``, ``stuck``."""
+
+    target: Sighting
+    _pursuit: Pursuit
+    _nearest: float = math.inf
+    _steps: int = 0
+    _vain: int = 0
 
     def __init__(self, skills: AssistantSkills, target: Sighting, *, near: float = GRASP) -> None:
         self.outcome = ""
         self.target = target
         self._near = near
         self._pursuit = Pursuit(skills, target.position)
-        self._nearest = math.inf
-        self._steps = self._vain = 0
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {
-            "target": self.target.state(),
-            "pursuit": self._pursuit.state(),
-            "nearest": None if math.isinf(self._nearest) else self._nearest,
-            "steps": self._steps,
-            "vain": self._vain,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self.target = Sighting(**state["target"])
-        self._pursuit.restore(state["pursuit"])
-        self._nearest = math.inf if state["nearest"] is None else state["nearest"]
-        self._steps, self._vain = state["steps"], state["vain"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState, generator_state, restore_generator
+from vico.agents.base import AgentState, FieldState
 from vico.agents.navigation.navigator import Navigator
 from vico.agents.navigation.path_planning import Target
 from vico.agents.perception import Sighting, SightingMemory, sightings
@@ -84,7 +84,7 @@ class ObservationView:
         return math.hypot(x, y)
 
 
-class AssistantSkills:
+class AssistantSkills(FieldState):
     """The skills of one assistant, with what it remembers of rooms and things.
 
     Parameters
@@ -95,36 +95,22 @@ class AssistantSkills:
         Decides how it gets out of others' way.
     """
 
+    _generator: np.random.Generator
+    navigator: Navigator
+    seen: SightingMemory
+    places: dict[str, str]  # the place to which each room that one was in belongs
+    _trail: list[str]
+    _tries: int = 0
+
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self.map = public_map
-        self._rng = generator
+        self._generator = generator
         self.navigator = Navigator(public_map, generator)
         self.navigator.walker.wide_drift = _DRIFT
         self.seen = SightingMemory()
         #: Metres a second outdoors.
         self.pace = WALK
-        #: Which place each room that one was in belongs to.
-        self.places: dict[str, str] = {}
-        self._trail: list[str] = []
-        self._tries = 0
-
-    def state(self) -> AgentState:
-        """Return the way under way, what is known of rooms and things, and where chance stands."""
-        return {
-            "generator": generator_state(self._rng),
-            "navigator": self.navigator.state(),
-            "seen": self.seen.state(),
-            "places": dict(self.places),
-            "trail": list(self._trail),
-            "tries": self._tries,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on with what `state` returned."""
-        restore_generator(self._rng, state["generator"])
-        self.navigator.restore(state["navigator"])
-        self.seen.restore(state["seen"])
-        self.places, self._trail, self._tries = dict(state["places"]), list(state["trail"]), state["tries"]
+        self.places, self._trail = {}, []
 
     def notice(self, view: ObservationView) -> None:
         """Take in a new observation: what stands where, what was seen, and the way one came."""

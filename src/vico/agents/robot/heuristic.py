@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.requester import TAKEN_TEXT
 from vico.agents.robot.arm_interface import ArmSkill
 from vico.agents.robot.arm_interface import ErrandStage as Stage
@@ -174,7 +174,7 @@ _MAX_PUSHES, _PUSH_ON = 4, 0.6
 _HOME_TRIES = 2
 
 
-class PushTrip:
+class PushTrip(FieldState):
     """Pushes the thing of a task, another way each time.
 
     Parameters
@@ -192,12 +192,14 @@ class PushTrip:
         Whether the last push brought the thing to the destination.
     """
 
+    _pusher: Pusher
+    _pushed: int = 0
+    is_there: bool = False
+
     def __init__(self, told: Mapping[str, Any], body: ArmBody, worker: ArmSkill, *, period: float) -> None:
         self._goal = np.array(told["destination"]["centre"][:2], np.float64)
         self._brings = told["category"] == "deliver"
         self._worker, self._pusher = worker, Pusher(body, period=period)
-        self._pushed = 0
-        self.is_there = False
 
     @property
     def busy(self) -> bool:
@@ -237,15 +239,6 @@ class PushTrip:
         away = thing - here
         first = math.atan2(float(away[1]), float(away[0]))
         return np.asarray(thing + _PUSH_ON * approach_side(self._pushed, first))
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"pusher": self._pusher.state(), "pushed": self._pushed, "is_there": self.is_there}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._pusher.restore(state["pusher"])
-        self._pushed, self.is_there = int(state["pushed"]), bool(state["is_there"])
 
 
 _CALLS_EVERY = 4.0  # seconds between two calls of the person

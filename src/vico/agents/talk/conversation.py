@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.talk.acquaintance import (
     GROWN_UP,
     Acquaintance,
@@ -83,7 +83,7 @@ class Errand:
     leaves: bool
 
 
-class Conversation:
+class Conversation(FieldState):
     """Decides whether to speak, and what to say.
 
     Parameters
@@ -96,25 +96,23 @@ class Conversation:
         Decides which words.
     """
 
+    _greeted: dict[str, float]
+    _said: dict[str, int]
+
     def __init__(self, resident: Speaker, known: Sequence[Acquaintance], generator: np.random.Generator) -> None:
         self._me = resident
         # Not everybody's author said these.
         self._gender, self._household = (str(getattr(resident, field, None) or "") for field in ("gender", "household"))
         self._known = {person.agent: person for person in known}
         self._rng = generator
-        self._greeted: dict[str, float] = {}
+        self._greeted, self._said = {}, {}
         #: Changes whenever somebody is spoken with.
         self.encounters = 0
-        self._said: dict[str, int] = {}
-
-    def state(self) -> AgentState:
-        """Return whom it greeted when, and how much it said; the generator is its owner's to save."""
-        return {"greeted": dict(self._greeted), "said": dict(self._said)}
 
     def restore(self, state: AgentState) -> None:
         """Remember what `state` returned."""
         self.encounters += 1
-        self._greeted, self._said = dict(state["greeted"]), dict(state["said"])
+        super().restore(state)
 
     @property
     def known(self) -> Collection[str]:

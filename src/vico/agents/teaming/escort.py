@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.robot.body import Drive, Stance
 from vico.agents.teaming.people import I_FOLLOW, LETS_GO
 from vico.agents.teaming.team_skills import find_in_view, ground_distance, messages_from, turn, turn_towards
@@ -49,7 +49,7 @@ class EscortStage(StrEnum):
     WAIT = "wait"
 
 
-class Escort:
+class Escort(FieldState):
     """Goes to the person, calls, follows, leaves them before the door, and stands beside it.
 
     Parameters
@@ -60,6 +60,12 @@ class Escort:
         Whether it keeps near the person on the way; else it goes to the door as fast as it can.
     """
 
+    going: Drive
+    stage: EscortStage = EscortStage.MEET
+    _began: bool = False
+    _said: float = 0.0
+    _spot: int = 0
+
     def __init__(self, told: Mapping[str, Any], public_map: PublicMap, *, stays_near: bool = True) -> None:
         self.told, self.stays_near, self.period = dict(told), stays_near, float(told["period"])
         place = public_map.place_by_id[str(told["destination"]["place"])]
@@ -67,8 +73,6 @@ class Escort:
         self._before = np.array(place.position, np.float64)
         self._map = public_map
         self.going = Drive(period=self.period)
-        self.stage = EscortStage.MEET
-        self._began, self._said, self._spot = False, 0.0, 0
 
     @property
     def wants_picture(self) -> bool:
@@ -140,22 +144,6 @@ class Escort:
 
     def _next(self, stage: EscortStage) -> None:
         self.stage, self._began, self._said = stage, False, 0.0
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {
-            "going": self.going.state(),
-            "stage": str(self.stage),
-            "began": self._began,
-            "said": self._said,
-            "spot": self._spot,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self.going.restore(state["going"])
-        self.stage, self._began = EscortStage(state["stage"]), bool(state["began"])
-        self._said, self._spot = float(state["said"]), int(state["spot"])
 
 
 def waiting_spots(public_map: PublicMap, door: Array, before: Array, here: Array) -> list[Array]:

@@ -23,6 +23,7 @@ from vico.challenges.assistant.evaluate import CAUSES, CauseTracker, Judge
 from vico.challenges.assistant.generate import first_subtasks, generate_task
 from vico.challenges.assistant.tasks import CATEGORIES, RESIDENTS, STEPS, SUBTASKS, Category, Task
 from vico.challenges.episode_record import episode_record
+from vico.challenges.episodes import for_size
 from vico.challenges.records import EpisodeRecord, Job, Metric, Part, Progress, Setting
 from vico.clock import seconds_of_day
 from vico.community import build_community
@@ -326,11 +327,6 @@ def _planners(
         except InputError as error:
             made[name] = AbsentAgent(str(error))
     return made
-
-
-def for_size(number: int, world: World) -> int:
-    """Return how many there are in a world, of so many in a window of 800 m."""
-    return min(number, round(number * (world.half / 400.0) ** 2))
 
 
 def set_up(simulation: Simulation, task: Task) -> None:

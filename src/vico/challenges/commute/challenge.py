@@ -13,12 +13,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from vico.agents.base import Action, Agent, AgentState, Info, Observation, usage_of
+from vico.agents.base import Action, Agent, FieldState, Info, Observation, usage_of
 from vico.agents.commute import METHODS, make_planner
 from vico.challenges.commute import tasks
 from vico.challenges.commute.evaluate import CAUSES, DayJudge, part_of
 from vico.challenges.commute.generate import generate_commute
 from vico.challenges.commute.tasks import HOURS, LEGAL, MOST_ON_BIKE, MOST_ON_FOOT, CommuteTask
+from vico.challenges.episodes import for_size
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.clock import clock_of
 from vico.envs import CommunityEnv, Simulation, make
@@ -58,7 +59,7 @@ def refusal(action: object, vehicle: str) -> tuple[str, str] | None:
     return None
 
 
-class LegalAgent:
+class LegalAgent(FieldState):
     """Passes an agent's legal actions on; one that is not becomes a wait, is counted, and the agent is told.
 
     Parameters
@@ -74,11 +75,14 @@ class LegalAgent:
         How often each type of action was refused.
     """
 
+    inner: Agent
+    _last: tuple[str, str] | None = None
+    refused: Counter[str]
+
     def __init__(self, inner: Agent, commutes: CommuteInfo) -> None:
         self.inner = inner
-        self.refused: Counter[str] = Counter()
+        self.refused = Counter()
         self._commutes = commutes
-        self._last: tuple[str, str] | None = None
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the agent's action, or a wait."""
@@ -92,16 +96,6 @@ class LegalAgent:
             return action
         self.refused[str(action["type"])[:40]] += 1
         return {"type": "wait"}
-
-    def state(self) -> AgentState:
-        """Return what the agent remembers, and what was refused last."""
-        return {"inner": self.inner.state(), "last": self._last, "refused": dict(self.refused)}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on from what `state` returned."""
-        self.inner.restore(state["inner"])
-        self._last = None if state["last"] is None else (state["last"][0], state["last"][1])
-        self.refused = Counter(state["refused"])
 
 
 class CommuteInfo:
@@ -214,11 +208,6 @@ def set_up(simulation: Simulation, *, task: CommuteTask) -> None:
     """Stand the agent where the day begins, with its money."""
     simulation.scenario.place_agent(AGENT, (*task.appointments[0].position, 0.0))
     simulation.scenario.give_cash(AGENT, task.resident.cash)
-
-
-def for_size(number: int, world: World) -> int:
-    """Return how many there are in a world, of so many in a window of 800 m."""
-    return min(number, round(number * (world.half / 400.0) ** 2))
 
 
 def stops_of(public_map: PublicMap) -> list[tuple[float, float]]:

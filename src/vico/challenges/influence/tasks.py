@@ -98,7 +98,8 @@ def settings_of(setting: Setting) -> InfluenceSettings:
         fits = isinstance(value, (int, float) if wanted is float else wanted) and not isinstance(value, bool)
         if not fits:
             raise InputError(f"influence: setting {name} is {value!r}; give a {wanted.__name__}")
-    found = InfluenceSettings(**{name: float(value) if name == "hours" else value for name, value in setting.items()})
+    typed: dict[str, Any] = {name: float(value) if name == "hours" else value for name, value in setting.items()}
+    found = InfluenceSettings(**typed)
     _check_choice("assignment", found.assignment, ("both", *get_args(Assignment)))
     _check_choice("simulation", found.simulation, get_args(Simulated))
     _check_choice("members", found.members, ("model", "llm"))

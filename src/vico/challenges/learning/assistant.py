@@ -13,10 +13,11 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from vico.agents.single import action_function
-from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, for_size, residents_of_task, set_up
+from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, residents_of_task, set_up
 from vico.challenges.assistant.evaluate import Judge
 from vico.challenges.assistant.generate import generate_task
 from vico.challenges.assistant.tasks import STEPS, Category, Subtask, Task
+from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep
 from vico.clock import seconds_of_day
 from vico.community.model import Community

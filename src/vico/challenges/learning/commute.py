@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from vico.agents.commute.abstract_city import OBSERVATION_SIZE, STATE_SIZE, city_arrays, observe
 from vico.agents.commute.learning import CommuteVectorEnv, fill_state, training_city
 from vico.challenges.commute import tasks
-from vico.challenges.commute.challenge import AGENT, CommuteInfo, for_size, refusal, set_up, stay_until, stops_of
+from vico.challenges.commute.challenge import AGENT, CommuteInfo, refusal, set_up, stay_until, stops_of
 from vico.challenges.commute.evaluate import CommuteLog, DayJudge
 from vico.challenges.commute.generate import generate_commute
 from vico.challenges.commute.tasks import CommuteTask
+from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep
 from vico.clock import clock_of
 from vico.envs import CommunityEnv, StepResult, make

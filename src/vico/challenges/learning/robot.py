@@ -17,14 +17,15 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from vico.agents.base import Action, Agent, AgentState, Info, Observation
+from vico.agents.base import Action, Agent, FieldState, Info, Observation
 from vico.agents.robot.body import Stance, view_points
 from vico.agents.robot.carrier import Carrier, call_message
 from vico.agents.robot.grasps import object_box, pose_of_box
 from vico.agents.single import action_function
 from vico.assets.robots import robot_model
-from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, for_size
+from vico.challenges.assistant.challenge import CARS, PEDESTRIANS
 from vico.challenges.assistant.evaluate import entrance_of
+from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep, begin_episode, with_goal, with_goal_space
 from vico.challenges.robot.challenge import (
     CARRIER,
@@ -313,7 +314,7 @@ class RobotWork:
         return Stance.of(self.stage.result.observations[MANIPULATOR])
 
 
-class _FollowingCarrier:
+class _FollowingCarrier(FieldState):
     """A carrier that comes after the other robot, which has no words where it acts in numbers.
 
     Parameters
@@ -326,9 +327,11 @@ class _FollowingCarrier:
         Seconds between two actions.
     """
 
+    _carrier: Carrier
+    _since: float = _EVERY
+
     def __init__(self, carrier: Carrier, leader: Callable[[], Stance], period: float) -> None:
         self._carrier, self._leader, self._period = carrier, leader, period
-        self._since = _EVERY
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
@@ -340,15 +343,6 @@ class _FollowingCarrier:
             call = {"speaker": MANIPULATOR, "text": call_message(x, y)}
             observation = {**observation, "events": [*observation["events"], call]}
         return self._carrier.act(observation, info)
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"carrier": self._carrier.state(), "since": self._since}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._carrier.restore(state["carrier"])
-        self._since = float(state["since"])
 
 
 class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
