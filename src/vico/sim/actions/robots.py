@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,10 @@ from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
 from vico.sim.actions.model import ActionType, Actors, Field, Refusal, Situation, Values, short
 from vico.sim.people.doors import closed_reason, place_of_room
-from vico.sim.state.simulation_state import RobotSystem, SimulationState
+from vico.sim.state.simulation_state import SimulationState
+
+if TYPE_CHECKING:
+    from vico.sim.robots.population import RobotPopulation
 
 
 def check_control(values: Values, robot: int, state: SimulationState) -> Refusal | None:
@@ -234,7 +238,7 @@ def _describe(space: ActionSpace) -> str:
     return f"{entries} ({', '.join(units)})"
 
 
-def _robots(state: SimulationState) -> RobotSystem:
+def _robots(state: SimulationState) -> RobotPopulation:
     assert state.robots is not None
     return state.robots
 
