@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache
 from types import NoneType, UnionType
 from typing import Any, ClassVar, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
@@ -97,9 +96,13 @@ class FieldState:
                 setattr(self, name, getattr(type(self), name) if is_infinite else _restored_value(kind, saved))
 
 
-@cache
-def _state_fields(of: Any) -> dict[str, Any]:
-    return {name: kind for name, kind in get_type_hints(of).items() if get_origin(kind) is not ClassVar}
+_FIELDS: dict[type, dict[str, Any]] = {}  # by class, for hints are slow to look up
+
+
+def _state_fields(of: type) -> dict[str, Any]:
+    if of not in _FIELDS:
+        _FIELDS[of] = {name: kind for name, kind in get_type_hints(of).items() if get_origin(kind) is not ClassVar}
+    return _FIELDS[of]
 
 
 def _saved_value(value: Any) -> Any:

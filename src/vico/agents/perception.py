@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState
+from vico.agents.base import AgentState, heading
 from vico.agents.navigation.voxels import MOVING
 from vico.exact import apply_matrix
 from vico.io.compiled import compiled
@@ -358,7 +358,7 @@ class SightingMemory:
         state = observation["state"]
         room, now = str(state["room"] or ""), float(state["time"])
         if room:
-            self._looks[room] = self._looks.get(room, 0) | _direction_bits(np.asarray(observation["pose"], np.float64))
+            self._looks[room] = self._looks.get(room, 0) | _direction_bits(heading(observation))
         for thing in things:
             before = self._taken(thing.entity)
             pixels = thing.pixels
@@ -433,9 +433,8 @@ class SightingMemory:
         self._looks = {str(room): int(looks) for room, looks in state["looks"].items()}
 
 
-def _direction_bits(pose: NDArray[np.float64]) -> int:
+def _direction_bits(yaw: float) -> int:
     """Return the directions that a picture takes in, a bit each."""
-    yaw = math.atan2(pose[4], pose[3])
     bits = 0
     for k in range(VIEW_DIRECTIONS):
         away = (2 * math.pi * k / VIEW_DIRECTIONS - yaw + math.pi) % (2 * math.pi) - math.pi

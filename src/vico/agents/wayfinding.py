@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import HEADING_SLICE, Action, AgentState, Info, Observation, heading, wrap_angle
 from vico.agents.day_plan import EASY_PACE, RUN_PACE, SLACK, SLACK_SHARE
 from vico.rules import ReasonCode, code_name, walk_speed
 from vico.world.public import PublicMap
@@ -82,7 +82,8 @@ def stride_lengths(
         Of the day.
     """
     corner_x, corner_y, left, pace, due, ease, haste, place_x, place_y, least, most = strides.T
-    x, y, heading_x, heading_y = pose[:, 0], pose[:, 1], pose[:, 3], pose[:, 4]
+    x, y = pose[:, 0], pose[:, 1]
+    heading_x, heading_y = pose[:, HEADING_SLICE].T
     east, north = corner_x - x, corner_y - y
     away = np.sqrt(east * east + north * north)
     speed = np.where(np.isnan(pace), _speeds_to_arrive(away + left, due - second, ease, haste), pace)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.assistant.skills import GRASP, OUTSIDE, Action, AssistantSkills, LookAround, ObservationView
-from vico.agents.base import AgentState, FieldState
+from vico.agents.base import AgentState, FieldState, heading
 from vico.agents.perception import Sighting
 from vico.exact import each
 
@@ -399,7 +399,7 @@ class PutDown:
 
 def _free_directions(view: ObservationView) -> list[float]:
     """Return directions around, radians, the one first that lies farthest from the ways to the room's doors."""
-    ahead = math.atan2(float(view.pose[4]), float(view.pose[3]))
+    ahead = heading(view.observation)
     around = [ahead + 2.0 * math.pi * k / _DIRECTIONS for k in range(_DIRECTIONS)]
     doors = np.array([door["position"][:2] for door in view.state["doors"]], np.float64).reshape(-1, 2) - view.pose[:2]
     if not len(doors):

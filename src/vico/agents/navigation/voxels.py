@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState
+from vico.agents.base import HEADING_SLICE, AgentState
 from vico.exact import dot
 from vico.io.compiled import compiled
 
@@ -468,9 +468,10 @@ class VoxelMap:
         away, lasts = (_STUMBLE, BUMP_LASTS) if times else (_BODY, FADES)
         wide = min(times - 1, _WIDEST) if times else 1
         self._open_chunks(pose[:2])
+        east, north = pose[HEADING_SLICE]
         for k in range(-wide, wide + 1):
-            x = float(pose[0] + away * pose[3] - k * VOXEL * pose[4])
-            y = float(pose[1] + away * pose[4] + k * VOXEL * pose[3])
+            x = float(pose[0] + away * east - k * VOXEL * north)
+            y = float(pose[1] + away * north + k * VOXEL * east)
             column, row = math.floor(x / VOXEL), math.floor(y / VOXEL)
             self.voxels.until[row % SIDE, column % SIDE] = now + lasts
             self.voxels.flags[(row // CHUNK) % CHUNKS, (column // CHUNK) % CHUNKS, TIMED] = True

@@ -45,7 +45,7 @@ def profiles_of(community: Community) -> list[Profile]:
         ties[second].append(Tie(first, str(relation.kind), relation.strength))
     found = []
     for resident in community.residents:
-        five = [float(getattr(resident.personality, name)) for name in BIG_FIVE]
+        o, c, e, a, n = (float(getattr(resident.personality, name)) for name in BIG_FIVE)
         found.append(
             Profile(
                 id=resident.id,
@@ -53,7 +53,7 @@ def profiles_of(community: Community) -> list[Profile]:
                 age=resident.age,
                 occupation=resident.occupation,
                 values=tuple(resident.values),
-                five=(five[0], five[1], five[2], five[3], five[4]),
+                five=(o, c, e, a, n),
                 traits=tuple(resident.personality.traits),
                 hobbies=tuple(resident.hobbies),
                 groups=tuple(group.name for group in community.groups_of(resident.id)),

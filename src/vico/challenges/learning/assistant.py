@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from vico.agents.base import heading
 from vico.agents.single import action_function
 from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, residents_of_task, set_up
 from vico.challenges.assistant.evaluate import Judge
@@ -147,7 +148,7 @@ class AssistantTask:
         """
         observation = result.observations[AGENT]
         pose = np.asarray(observation["pose"], np.float64)
-        heading = math.atan2(pose[4], pose[3])
+        yaw = heading(observation)
         rows = np.zeros((SUBTASKS, _ROW))
         for k, subtask in enumerate(self._task.subtasks[:SUBTASKS]):
             rows[k, 0] = self._judge.verdicts[k] is not None
@@ -155,7 +156,7 @@ class AssistantTask:
             regions = [*subtask.sources[:SOURCES], *[None] * (SOURCES - len(subtask.sources)), subtask.destination]
             for j, region in enumerate(regions):
                 if region is not None:
-                    rows[k, 2 + j * DIRECTION :][:DIRECTION] = direction(region.centre, pose, heading)
+                    rows[k, 2 + j * DIRECTION :][:DIRECTION] = direction(region.centre, pose, yaw)
         around = surroundings_of(observation, result.infos[AGENT], self.env.public_map)
         names = {name: k for k, things in enumerate(self._judge.things) for name in things}
         people = {s.person.agent: k for k, s in enumerate(self._task.subtasks)} if self.category == "carry" else {}

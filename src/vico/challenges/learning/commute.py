@@ -98,8 +98,8 @@ class ShardedCommuters:
         """Advance all by a second; see `CommuteVectorEnv.step`."""
         parts = np.split(np.ascontiguousarray(actions, np.int64), len(self._group))
         answers = self._group.ask([Call("step", (part,)) for part in parts])
-        seen, rewards, reached, given_up = (np.concatenate([one[k] for one in answers]) for k in range(4))
-        found = [one[4] for one in answers]
+        *arrays, found = zip(*answers, strict=True)
+        seen, rewards, reached, given_up = map(np.concatenate, arrays)
         return seen, rewards, reached, given_up, self._together(seen, found)
 
     def _together(self, seen: NDArray[np.float32], found: Sequence[dict[str, Any]]) -> dict[str, Any]:

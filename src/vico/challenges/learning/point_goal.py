@@ -12,6 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from scipy import sparse
 
+from vico.agents.base import heading
 from vico.challenges.learning.env import TaskStep
 from vico.envs import CommunityEnv, Simulation, StepResult, make
 from vico.envs.array_observations import DIRECTION, HIGH, LOW, direction
@@ -126,8 +127,9 @@ class PointGoal:
 
     def goal(self, result: StepResult) -> NDArray[np.float32]:
         """Return the direction of the goal; see `vico.envs.array_observations.DIRECTION`."""
-        pose = np.asarray(result.observations[self.agent]["pose"], np.float64)
-        return np.array(direction(self._goal, pose, math.atan2(pose[4], pose[3])), np.float32)
+        observation = result.observations[self.agent]
+        pose = np.asarray(observation["pose"], np.float64)
+        return np.array(direction(self._goal, pose, heading(observation)), np.float32)
 
     def phrases(self) -> list[str]:
         """Nothing is said."""

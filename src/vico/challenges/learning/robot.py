@@ -17,7 +17,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from vico.agents.base import Action, Agent, FieldState, Info, Observation
+from vico.agents.base import Action, Agent, FieldState, Info, Observation, heading
 from vico.agents.robot.body import Stance, view_points
 from vico.agents.robot.carrier import Carrier, call_message
 from vico.agents.robot.grasps import object_box, pose_of_box
@@ -225,13 +225,13 @@ class RobotTaskWorld:
         """
         observation, info = result.observations[name], result.infos[name]
         pose = np.asarray(observation["pose"], np.float64)
-        heading = math.atan2(pose[4], pose[3])
-        told = [direction(region.centre, pose, heading) for region in (self.task.source, self.task.destination)]
+        yaw = heading(observation)
+        told = [direction(region.centre, pose, yaw) for region in (self.task.source, self.task.destination)]
         around = surroundings_of(observation, info, self.env.public_map)
         names = (self.task.person.agent, self.task.person.name)
         person = next((one.position for one in around.people if one.name in names), None)
-        told.append([0.0] * DIRECTION if person is None else direction(person, pose, heading))
-        told.append(direction(self.bodies()[int(name == MANIPULATOR)], pose, heading))
+        told.append([0.0] * DIRECTION if person is None else direction(person, pose, yaw))
+        told.append(direction(self.bodies()[int(name == MANIPULATOR)], pose, yaw))
         return np.concatenate([*told, self._seen(observation, info)]).astype(np.float32)
 
     def bodies(self) -> NDArray[np.float64]:

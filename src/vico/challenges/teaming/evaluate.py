@@ -8,9 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from vico.challenges.teaming import accompany, guide, spot
-from vico.challenges.teaming.category import JudgeSample, Robots, Truth, ground_distance, has_fallen, standing_robots
+from vico.challenges.teaming.category import JudgeSample, ground_distance, has_fallen, standing_robots
 from vico.challenges.teaming.tasks import SEEN_DISTANCE, Category, TeamingTask
 from vico.runner.loop import Hook, Step
+from vico.runner.truth import GroundTruth, RobotPopulation
 from vico.world.world import World
 
 FALLEN = "fallen"
@@ -66,7 +67,7 @@ class TeamingJudge(Hook):
     """
 
     def __init__(
-        self, task: TeamingTask, world: World, truth: Truth, robots: Robots, seconds: Callable[[], float]
+        self, task: TeamingTask, world: World, truth: GroundTruth, robots: RobotPopulation, seconds: Callable[[], float]
     ) -> None:
         self.task, self.truth, self.robots, self._seconds = task, truth, robots, seconds
         self.rules = RULES[task.category](task, world)

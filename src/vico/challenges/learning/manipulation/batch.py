@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vico.challenges.learning.manipulation.observation import PRESSING, Bools, Readings, poses_in
 from vico.challenges.learning.manipulation.scene import (
     ACTIONS,
+    JAW,
     PHYSICS_STEP,
     SUBSTEPS,
     Array,
@@ -174,8 +175,8 @@ class BatchedScene:
         """Have MuJoCo move everything on, while the servos' targets go from where they were to where they are."""
         shares = (np.arange(SUBSTEPS) + 1.0) / SUBSTEPS
         path = before[:, None] + shares[None, :, None] * (self.targets - before)[:, None]
-        self._control[:, :, :8] = path
-        self._control[:, :, 8] = path[:, :, 7]  # both fingers
+        self._control[:, :, :ACTIONS] = path
+        self._control[:, :, ACTIONS] = path[:, :, JAW]  # the other finger
         # Nothing is kept of what the solver found last: what a copy does depends on its state alone.
         self._rollout.rollout(
             self.models, self._data, self.state, self._control, control_spec=self._spec, skip_checks=True,
@@ -192,7 +193,7 @@ class BatchedScene:
 
     def _fasten(self) -> None:
         """Fasten boxes that both pads press on to closing hands, and let go of those whose jaw is opened."""
-        jaw, closing = self._joints()[0][:, 7], self.targets[:, 7]
+        jaw, closing = self._joints()[0][:, JAW], self.targets[:, JAW]
         holds = ~np.isnan(self.fastened)
         lets_go = holds & (closing > np.where(holds, self.fastened, 0.0) + _RELEASE_MARGIN)
         self.fastened[lets_go] = np.nan

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.challenges.learning.manipulation.scene import OPENING, PAD, Array, Scene, ready_angles
+from vico.challenges.learning.manipulation.scene import JAW, OPENING, PAD, Array, Scene, ready_angles
 from vico.exact import each
 from vico.io.compiled import compiled
 from vico.kinematics.arm import hand_pose
@@ -139,7 +139,7 @@ class Readings(NamedTuple):
     @property
     def gap(self) -> Array:
         """Between each pad and the side of the box if that is in the middle of the jaw, metres, shape ``(n,)``."""
-        return np.asarray(self.joints[:, 7] + PAD - self.gripped_half)
+        return np.asarray(self.joints[:, JAW] + PAD - self.gripped_half)
 
     @property
     def touching(self) -> Bools:

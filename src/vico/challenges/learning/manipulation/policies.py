@@ -24,6 +24,7 @@ from vico.challenges.learning.manipulation.environment import ManipulationEnv
 from vico.challenges.learning.manipulation.observation import FULL, PRESSING, Readings, hand_poses, observe
 from vico.challenges.learning.manipulation.scene import (
     ACTIONS,
+    JAW,
     PAD,
     Array,
     ManipulationOptions,
@@ -278,7 +279,7 @@ class ArmController:
         before = joints if self._targets is None else self._targets
         action = np.asarray(self._policy(self.observation(moment)), np.float64)
         self._targets = self._motors.moved(before, joints, action)
-        return np.append(self._targets[0], self._targets[0, 7])
+        return np.append(self._targets[0], self._targets[0, JAW])
 
     def observation(self, moment: ArmState) -> NDArray[np.float32]:
         """Return what the policy is told, shape ``(1, size)``."""
@@ -337,7 +338,7 @@ class ScriptedExpert:
         self._chain, self._stand = env.copies.scene.chain, env.copies.scene.stand
         self._task = env.task.name
         self._waited = self._pressed = 0
-        self._opening = float(env.readings.targets[0, 7])
+        self._opening = float(env.readings.targets[0, JAW])
         self._way: list[Array] = []
         self._up: list[Array] = []
         self.stage = ExpertPhase.DOWN
@@ -417,10 +418,10 @@ class ScriptedExpert:
     def _is_in_the_way(self, r: Readings) -> bool:
         """Return whether the jaw has still to open before the hand goes down the last bit."""
         low = r.hand[0, 2] < r.grasp_point[0, 2] + 0.12
-        return bool(low and r.joints[0, 7] < self._opening - 0.01)
+        return bool(low and r.joints[0, JAW] < self._opening - 0.01)
 
     def _jaw_of(self, r: Readings) -> float:
-        now, step = float(r.targets[0, 7]), self.env.options.finger_step
+        now, step = float(r.targets[0, JAW]), self.env.options.finger_step
         if self.stage in (ExpertPhase.DOWN, ExpertPhase.OPEN):
             return (self._opening - now) / step
         return -1.0 if self.stage in (ExpertPhase.CLOSE, ExpertPhase.UP, ExpertPhase.CARRY) else 0.0
@@ -432,7 +433,7 @@ class ScriptedExpert:
             self._pressed = self._pressed + 1 if bool(r.gripped[0]) else 0
             return self._pressed >= _PRESSES or self._waited > _CLOSING
         if self.stage is ExpertPhase.OPEN:
-            return bool(r.joints[0, 7] > self._opening - 0.004) or self._waited > _CLOSING
+            return bool(r.joints[0, JAW] > self._opening - 0.004) or self._waited > _CLOSING
         return bool(np.abs(r.joints[0, :7] - r.targets[0, :7]).max() < _THERE) or self._waited > _CLOSING
 
     def _next(self, r: Readings) -> None:
@@ -447,7 +448,7 @@ class ScriptedExpert:
             self._plan_carry(r)
         elif self.stage is ExpertPhase.CARRY:
             self.stage = ExpertPhase.OPEN
-            self._opening = float(r.joints[0, 7]) + _ROOM
+            self._opening = float(r.joints[0, JAW]) + _ROOM
         elif self.stage is ExpertPhase.OPEN:
             self.stage, self._way = ExpertPhase.BACK, self._up
         elif self.stage is ExpertPhase.BACK:

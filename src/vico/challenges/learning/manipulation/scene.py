@@ -280,6 +280,8 @@ def _ignore(message: str) -> None:
 
 #: Of an action: the arm's joints and the jaw.
 ACTIONS = 8
+#: Column of the jaw in joints, targets and actions: it stands behind the arm's seven.
+JAW = 7
 # Targets run ahead of joints by no more, rad, and fingers past what they press on, metres: 150 Nm and 60 N.
 _AHEAD, _PAST = 0.1, 0.03
 
