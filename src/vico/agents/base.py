@@ -314,7 +314,7 @@ class RandomAgent(FieldState):
         return {"type": "move_forward", "distance": float(self._generator.uniform(0.2, 1.2))}
 
 
-def heading(observation: Observation) -> float:
+def heading(observation: Mapping[str, Any]) -> float:
     """Yaw an agent looks along, radians."""
     east, north = observation["pose"][HEADING_SLICE]
     return math.atan2(north, east)

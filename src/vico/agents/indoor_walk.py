@@ -172,13 +172,9 @@ class RoomGrid:
         return min(max(round(u / _CELL), 0), columns - 1), min(max(round(v / _CELL), 0), rows - 1)
 
 
-def room_grid(room: Area, furniture: Area) -> RoomGrid:
-    """Return the ways of a room; those of the rooms asked for last are kept."""
-    return _cached_room_grid(np.ascontiguousarray(room).tobytes(), np.ascontiguousarray(furniture).tobytes())
-
-
 @lru_cache(maxsize=_CACHED_ROOMS)
 def _cached_room_grid(room: bytes, furniture: bytes) -> RoomGrid:
+    """Return the grid of a room, given the bytes of its arrays; those of the rooms asked for last are kept."""
     return RoomGrid(np.frombuffer(room), np.frombuffer(furniture).reshape(-1, 5))
 
 
@@ -194,10 +190,10 @@ def shift_oncoming_left(people: Area, position: Area, yaw: float) -> Area:
 
 def _rectangle_distances(box: Area, points: Area) -> Area:
     """Return signed distances from points to an oriented rectangle, metres."""
-    x, y, yaw, half_length, half_width = box
+    middle, yaw, half = box[:2], box[2], box[3:5]
     c, s = math.cos(yaw), math.sin(yaw)
-    dx, dy = points[..., 0] - x, points[..., 1] - y
-    u, v = np.abs(c * dx + s * dy) - half_length, np.abs(c * dy - s * dx) - half_width
+    dx, dy = np.moveaxis(points - middle, -1, 0)
+    u, v = np.abs(c * dx + s * dy) - half[0], np.abs(c * dy - s * dx) - half[1]
     outside = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
     return np.asarray(outside + np.minimum(np.maximum(u, v), 0.0))
 
@@ -369,7 +365,9 @@ class IndoorWalker:
         if state["room"] != self._told_room:
             self._told_room, self._people, self._bumps = state["room"], {}, []
             self._anchor, self._waited, self._aside_until = (math.inf, math.inf, 0.0), 0, -math.inf
-        ways = room_grid(view.room, view.furniture)
+        ways = _cached_room_grid(
+            np.ascontiguousarray(view.room).tobytes(), np.ascontiguousarray(view.furniture).tobytes()
+        )
         self._people = {k: seen for k, seen in self._people.items() if time - seen[3] <= _PEOPLE_KEPT}
         self._bumps = [bump for bump in self._bumps if time - bump[2] <= _BUMPS_KEPT]
         for body in view:

@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +101,9 @@ class Player:
         OutputError
             If nothing can be written: that is no episode's fault, and there is no use in going on.
         """
-        told = None if progress is None else partial(_report_progress, progress, label_of(job))
+        told: Progress | None = (
+            None if progress is None else lambda _, step, limit: progress(label_of(job), step, limit)
+        )
         try:
             return self._play(job, told)
         except OutputError:
@@ -231,11 +233,6 @@ def _check(challenge: Challenge, record: EpisodeRecord) -> None:
     for part in record.parts:
         if part.success is bool(part.cause) or (part.cause and part.cause not in causes):
             raise ValueError(f"part {part.name!r}: success {part.success} with the cause {part.cause!r}")
-
-
-def _report_progress(progress: Progress, label: str, _: str, step: int, limit: int) -> None:
-    """Tell how far an episode is, under a name that no other one has."""
-    progress(label, step, limit)
 
 
 def _task_name(job: Job, task: Mapping[str, object]) -> str:

@@ -134,7 +134,12 @@ class MctsPlanner:
             low = min(low, value)
             if value > best_reward:
                 best, best_reward = node, value
-            _back_up(node, value)
+            # The reward counts at the node and at all above it.
+            above: Node | None = node
+            while above is not None:
+                above.visits += 1
+                above.total += value
+                above = above.parent
         moves: list[Move] = []
         walker: Node | None = best
         while walker is not None and walker.move is not None:
@@ -219,16 +224,6 @@ class MctsPlanner:
         if last is not None:
             legs.append(last)
         return Trip(question.now, tuple(legs)) if legs else None
-
-
-def _back_up(node: Node, value: float) -> None:
-    """Note a reward at a node and all above it."""
-    while True:
-        node.visits += 1
-        node.total += value
-        if node.parent is None:
-            return
-        node = node.parent
 
 
 def _point_towards(point: Point2, goal: Point2, stride: float) -> Point2:

@@ -23,7 +23,6 @@ from vico.agents.influence.situation import (
     Situation,
     Talk,
     Visit,
-    visit_from_record,
 )
 from vico.agents.influence.strategies import Strategy, shorten
 from vico.agents.influence.visiting import Visitor, body_in_view
@@ -153,7 +152,7 @@ class Courtship:
         """Remember what `state` returned."""
         restore_generator(self._rng, state["generator"])
         self.talks = [_talk_from_record(state["talks"][str(k)]) for k in range(len(state["talks"]))]
-        self.visits = [visit_from_record(state["visits"][str(k)]) for k in range(len(state["visits"]))]
+        self.visits = [Visit(**state["visits"][str(k)]) for k in range(len(state["visits"]))]
         self._not_before = {str(name): float(time) for name, time in state["not_before"].items()}
 
     def _end_visit(self, ending: Ending, time: float) -> None:

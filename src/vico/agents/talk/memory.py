@@ -86,10 +86,6 @@ class Visit:
     until: float | None = None
 
 
-def _no_sightings() -> None:
-    """Have nothing to tell."""
-
-
 def look_number(time: float) -> int:
     """Return the number of the ten seconds that a time lies in."""
     return int(time // LOOK_PERIOD)
@@ -109,7 +105,7 @@ class ResidentMemory:
         #: In which ten seconds one looked about last.
         self.tick = -1
         #: Tells whom one saw as one of a group, before it is asked for; see `vico.agents.talk.memory`.
-        self.settle: Callable[[], None] = _no_sightings
+        self.settle: Callable[[], None] = lambda: None
         # By agent, the one seen longest ago first.
         self._people: dict[str, tuple[float, float, float, str]] = {}
         self._heard: list[HeardMessage] = []

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from vico.agents.base import heading
 from vico.challenges.learning.env import TaskStep
-from vico.envs import CommunityEnv, Simulation, StepResult, make
+from vico.envs import CommunityEnv, StepResult, make
 from vico.envs.array_observations import DIRECTION, HIGH, LOW, direction
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
@@ -99,7 +99,7 @@ class PointGoal:
         if self.options.robot:
             self.env.arrange(robot_places={self.agent: (float(start[0]), float(start[1]), yaw)})
         else:
-            self.env.arrange(setup=lambda sim: _place(sim, self.agent, start, yaw))
+            self.env.arrange(setup=lambda sim: sim.scenario.place_agent(self.agent, (*start.tolist(), 0.0), yaw=yaw))
         result = self.env.begin(seed)
         self._away = self._way_from(self._position(result))
         return result
@@ -211,7 +211,3 @@ def path_lengths_to(
     column, row = walkable.cell_of(goal).tolist()
     away = sparse.csgraph.dijkstra(graph, directed=False, indices=int(number[row - bottom, column - left]))
     return np.asarray(away, np.float64).reshape(rows, columns), (left, bottom)
-
-
-def _place(simulation: Simulation, agent: str, start: NDArray[np.float64], yaw: float) -> None:
-    simulation.scenario.place_agent(agent, (*start.tolist(), 0.0), yaw=yaw)

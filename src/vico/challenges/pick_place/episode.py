@@ -20,7 +20,7 @@ from vico.agents.robot.body import Stance
 from vico.agents.robot.increments import INCREMENTS, JOINTS, PERIOD, STATE, arm_state, increments_of
 from vico.assets.models.movable import movable_prototype, movable_surfaces
 from vico.assets.robots import robot_model
-from vico.challenges.pick_place.tasks import NEXT_TO, TABLE, PickPlaceTask, TaskThing, draw_task, world_of_task
+from vico.challenges.pick_place.tasks import NEXT_TO, TABLE, PickPlaceTask, draw_task, level_field
 from vico.challenges.robot_tasks import arm_body
 from vico.clock import clock_of
 from vico.envs import Simulation, make
@@ -180,7 +180,7 @@ def play(
 def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, outputs: tuple[str, ...]) -> Simulation:
     """Return the simulation of a task before its first step: the robot, the thing and the one beside it."""
     env = make(
-        world_of_task(task, world),
+        level_field(task.seed, table=task.table) if world is None else world,
         seed=task.seed,
         residents=0,
         robots=("manipulator",),
@@ -199,18 +199,14 @@ def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, output
 
 def _set_up(sim: Simulation, task: PickPlaceTask) -> None:
     for name, thing in (("thing", task.thing), ("landmark", task.landmark)):
-        _add(sim, name, thing)
-
-
-def _add(sim: Simulation, name: str, thing: TaskThing) -> None:
-    sim.scenario.add_object(
-        name,
-        movable_prototype(thing.kind, thing.colour),
-        movable_surfaces(thing.kind, thing.colour),
-        thing.position,
-        size=thing.size,
-        yaw=thing.yaw,
-    )
+        sim.scenario.add_object(
+            name,
+            movable_prototype(thing.kind, thing.colour),
+            movable_surfaces(thing.kind, thing.colour),
+            thing.position,
+            size=thing.size,
+            yaw=thing.yaw,
+        )
 
 
 def _step(sim: Simulation, action: dict[str, Any]) -> Observation:

@@ -280,11 +280,6 @@ def draw_task(seed: int, world: World | None = None, *, seconds: int = SECONDS) 
     )
 
 
-def world_of_task(task: PickPlaceTask, world: World | None) -> World:
-    """Return the world that a task is set in: the one that is given, or a field as the task says."""
-    return level_field(task.seed, table=task.table) if world is None else world
-
-
 #: Three of four episodes begin on the ground, two of four end there beside a thing.
 _SURFACES: tuple[tuple[SurfaceKind, SurfaceKind], ...] = (
     ("ground", "ground"),

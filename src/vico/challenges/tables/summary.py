@@ -39,7 +39,7 @@ class Estimate:
     count: int
     clusters: int
 
-    def clipped(self, low: float, high: float) -> Estimate:
+    def clip(self, low: float, high: float) -> Estimate:
         """Return it with an interval that does not leave some bounds."""
         if self.low is None or self.high is None:
             return self
@@ -213,7 +213,8 @@ def _row(challenge: Challenge, category: str, method: str, outcomes: Sequence[Ou
     for metric in challenge.metrics(category):
         values = _values(outcomes, metric.key)
         if values:
-            metrics[metric.key] = _mean(metric, values)
+            mean = estimate([value for value, _ in values], [world for _, world in values])
+            metrics[metric.key] = mean.clip(metric.low, metric.high)
     parts = [part for record in records for part in record.parts]
     counted = Counter(part.cause for part in parts if not part.success)
     faults = {kind: sum(record.fault_counts.get(kind, 0) for record in records) for kind in FAULT_KINDS}
@@ -265,7 +266,7 @@ def _averages(
         difference = None
         if method != reference and all(pairs):
             difference = estimate_of_means([[v for v, _ in p] for p in pairs], [[w for _, w in p] for p in pairs])
-        averages.append(Average(method, key, mean.clipped(first[0].low, first[0].high), difference))
+        averages.append(Average(method, key, mean.clip(first[0].low, first[0].high), difference))
     return averages
 
 
@@ -294,8 +295,3 @@ def _task(outcome: Outcome) -> tuple[str, int]:
 
 def _world(outcome: Outcome) -> str:
     return str(outcome.job.world)
-
-
-def _mean(metric: Metric, values: Sequence[tuple[float, str]]) -> Estimate:
-    found = estimate([value for value, _ in values], [world for _, world in values])
-    return found.clipped(metric.low, metric.high)

@@ -119,11 +119,6 @@ def standing_robots(robots: RobotPopulation) -> tuple[bool, ...]:
     return tuple(_stands(robots.observation(k)) for k in range(len(robots.names)))
 
 
-def has_fallen(robots: RobotPopulation) -> bool:
-    """Return whether a robot lies on the ground, or is on its way up from there."""
-    return any(bool(robots.observation(k)["fallen"][0]) for k in range(len(robots.names)))
-
-
 def _stands(felt: dict[str, NDArray[Any]]) -> bool:
     upright = float(-felt["gravity"][2]) >= UPRIGHT
     return upright and not felt["fallen"][0] and float(np.hypot(*felt["base_velocity"][:2])) <= STILL

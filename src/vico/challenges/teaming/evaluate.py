@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from vico.challenges.teaming import accompany, guide, spot
-from vico.challenges.teaming.category import JudgeSample, ground_distance, has_fallen, standing_robots
+from vico.challenges.teaming.category import JudgeSample, ground_distance, standing_robots
 from vico.challenges.teaming.tasks import SEEN_DISTANCE, Category, TeamingTask
 from vico.runner.loop import Hook, Step
 from vico.runner.truth import GroundTruth, RobotPopulation
@@ -80,7 +80,9 @@ class TeamingJudge(Hook):
         action = step.actions.get(self.task.person.agent, {})
         if action.get("type") == "communicate":
             self._said.append(str(action["text"]))
-        self.fallen = self.fallen or has_fallen(self.robots)
+        self.fallen = self.fallen or any(
+            bool(self.robots.observation(k)["fallen"][0]) for k in range(len(self.robots.names))
+        )
         second = self._seconds() - self._start
         if int(second) > self._looked and not self.fallen:
             self._looked = int(second)

@@ -271,11 +271,7 @@ def silence_warnings() -> None:
     Motion that breaks down is noticed by its numbers.
     """
     if mujoco.get_mju_user_warning() is None:
-        mujoco.set_mju_user_warning(_ignore)
-
-
-def _ignore(message: str) -> None:
-    """Say nothing: MuJoCo calls from C, on any thread."""
+        mujoco.set_mju_user_warning(lambda message: None)
 
 
 #: Of an action: the arm's joints and the jaw.

@@ -142,12 +142,8 @@ def carrying_share(r: Readings) -> Array:
     level = np.linalg.norm((r.goal - r.thing)[:, :2], axis=1)
     there = share_between(-level, -0.12, -0.03)
     high = there + (1.0 - there) * nearness(np.abs(r.goal[:, 2] + 0.1 - r.thing[:, 2]), 0.1)
-    return np.asarray(r.gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * lowering_share(r, there)))
-
-
-def lowering_share(r: Readings, there: Array) -> Array:
-    """Return how near a box over its goal is to what it is to stand on, from 0 to 1."""
-    return np.asarray(there * nearness(np.abs(r.clearance), 0.06))
+    low = there * nearness(np.abs(r.clearance), 0.06)
+    return np.asarray(r.gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * low))
 
 
 def is_placed(r: Readings) -> Bools:
