@@ -149,8 +149,9 @@ Action = dict[str, Any]
 Observation = dict[str, Any]
 Info = dict[str, Any]
 
-# Of a plan that is told: so many goals, points and letters.
-_MOST_GOALS, _LONGEST_PATH, _LONGEST_WHY = 20, 500, 400
+_MOST_GOALS = 20  # goals of a plan that are told, at most
+_LONGEST_PATH = 500  # points of its path
+_LONGEST_WHY = 400  # characters of its reason
 
 HEADING_SLICE = slice(3, 5)  # of an observation's pose: east and north of the direction it looks along
 

@@ -32,9 +32,9 @@ _ASIDE_MARGINS = ((PASSAGE, DOORWAY, PERSONAL), (0.27, 0.0, PERSONAL), (0.27, 0.
 _LET_PASS_MARGINS = ((0.8, 0.0, PERSONAL), (PASSAGE, 0.0, PERSONAL), (0.27, 0.0, PERSONAL), (0.27, 0.0, 0.7))
 # Metres between the points of a grid. Half a person's width and a little; and what will do where that leaves no way.
 _CELL, _WIDTHS = 0.1, (0.27, 0.252)
-# Middle to middle, metres, that one passes people at. Who comes towards one is passed on the right: such people are
-# taken to be so far to the left of where they are, metres, if they are no farther away than `_ONCOMING`.
-_PASSES, _LEFT, _ONCOMING = 0.55, 0.15, 2.5
+_PASSES = 0.55  # metres, middle to middle, at which one passes people
+_LEFT = 0.15  # metres to the left that oncoming people are taken to be: they are passed on the right
+_ONCOMING = 2.5  # metres within which people are oncoming
 # Ways keep this far from walls and furniture where there is room, metres; a step nearer to them counts as so many.
 _EASY, _NARROW_COSTS = 0.45, 2.0
 _CACHED_ROOMS = 128  # rooms
@@ -267,9 +267,9 @@ _REACH_OF_BUMPS = 0.4  # metres ahead of one's middle is what stopped a step
 _DRIFT, _NARROW = 0.08, 0.45
 # People are remembered for so many seconds after they were in view, and what stopped a step for so many.
 _PEOPLE_KEPT, _BUMPS_KEPT = 5.0, 30.0
-# Whom others are in the way of waits so many seconds before getting out of theirs: the later one by name steps aside
-# first. There one stays so long, unless the way is free sooner.
-_YIELDS, _YIELDS_LATE, _STAYS_ASIDE = 2, 8, 8
+_YIELDS = 2  # seconds that the later one by name waits until it makes way for others
+_YIELDS_LATE = 8  # seconds that others wait
+_STAYS_ASIDE = 8  # seconds that one stays aside, unless the way is free sooner
 _ASIDE_WITHIN = 4.0  # metres
 # Who gets no farther than this in so many seconds takes it that there is no way on there, metres and seconds.
 _NO_FARTHER, _GETS_NOWHERE = 0.6, 10.0

@@ -30,8 +30,10 @@ from vico.world.public import PublicMap, PublicPlace
 _MANY = 40
 # Open places are reached this close to their position, metres.
 _OPEN_REACH = 3.0
-# How often people at rest do something, seconds, and when it all comes round again.
-_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY = 6, 180, 90
+# All of it comes round again after `_ROUND`.
+_EAT_EVERY = 6  # seconds between two bites of somebody at rest
+_MOVE_EVERY = 180  # seconds between two movements
+_DRINK_EVERY = 90  # seconds between two sips
 _ROUND = math.lcm(_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY)
 # Those who came out for a walk or a run stay within this distance of the place, metres.
 _STROLL = 30.0

@@ -57,8 +57,9 @@ TURNING_CLEARANCE = 0.9
 # Room to walls that a bicycle needs, metres, at these points along it.
 _SIDE_CLEARANCE = 0.28
 _BICYCLE_SAMPLES = (-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6)
-# Steps of the search: degrees of a turn and metres of a ride, and how fine places are told apart.
-_TURN_STEP, _RIDE_STEP, _SEARCH_CELL = 15, 0.5, 0.25
+_TURN_STEP = 15  # degrees of a turn of the search
+_RIDE_STEP = 0.5  # metres of a ride of the search
+_SEARCH_CELL = 0.25  # metres within which places are the same to it
 _HEADINGS = 360 // _TURN_STEP
 _MAX_SEARCH_NODES = 1500
 # Where one gets on: on the spot or a step or two aside, as the rules of mounting have it.
@@ -165,10 +166,12 @@ def _pose_key(pose: _BicyclePose) -> tuple[int, int, int]:
     return round(pose[0] / _SEARCH_CELL), round(pose[1] / _SEARCH_CELL), pose[2]
 
 
-# This near to where one waits for a bus, or to a rack, is there, metres. At a stop something or others may stand in the
-# spot: then beside it will do, but not on the road or so near to the middle of a track, where one would keep the bus or
-# tram from coming up; the farther off only for who has got nowhere for some seconds.
-_AT_STOP, _BY_STOP, _BY_OTHERS, _AT_RACK = 0.3, 1.5, 4.0, 1.0
+# As near as this is there. Beside the spot will do, but not on the road or so near to the middle of a track that one
+# would keep the bus or tram from coming up.
+_AT_STOP = 0.3  # metres from where one waits for a bus
+_BY_STOP = 1.5  # metres, where something stands in that spot
+_BY_OTHERS = 4.0  # metres, among others and where one has got nowhere for some seconds
+_AT_RACK = 1.0  # metres from a rack
 _FROM_TRACK, _GETS_NOWHERE = TRAM_WIDTH / 2 + 0.8, 3
 # A bicycle is turned where there is so much room to walls, metres; straight on narrower ways will do.
 _TURNING = 1.0

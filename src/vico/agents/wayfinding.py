@@ -23,9 +23,12 @@ from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
 
 #: Corners count as passed this close, metres.
 CORNER = 0.35
-#: Off the line by more than this after a step means turning first, metres; where there is no more room than `NARROW`
-#: metres anywhere along the step, by more than `NARROW_DRIFT`.
-DRIFT, NARROW, NARROW_DRIFT = 0.12, 0.6, 0.03
+#: Metres off the line after a step from which on one turns first.
+DRIFT = 0.12
+#: Metres of room below which a step is narrow.
+NARROW = 0.6
+#: Metres off the line, where a step is narrow.
+NARROW_DRIFT = 0.03
 #: Shares of a step at which the room to walls is looked at.
 CLEARANCE_SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Surfaces that are not stepped on without a look for vehicles.

@@ -25,9 +25,12 @@ from vico.world.public import PublicMap
 Instruction = Mapping[str, Any]
 Kind = Literal["look", "fetch", "deliver"]
 
-#: Things that so many attempts did not reach are left; regions are looked through so often, and so many attempts made
-#: to meet somebody.
-REFUSALS, LOOKS, MEETINGS = 2, 3, 12
+#: Things that so many attempts did not reach are left.
+REFUSALS = 2
+#: Times that a region is looked through.
+LOOKS = 3
+#: Attempts to meet somebody.
+MEETINGS = 12
 # Who fetches what was seen outdoors walks up to it from so near, metres.
 _NEAR_SEEN = 5.0
 # How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.

@@ -25,8 +25,14 @@ from vico.world.public import PublicMap
 UNIFORM = 60.0
 # People, lights and corners: a way takes so many times what its length and the pace say.
 _DETOUR = 1.25
-# Going in or out; picking up; putting down and reporting; meeting somebody and being handed things, seconds.
-DOOR, PICK, PUT, MEET = 12.0, 6.0, 6.0, 25.0
+#: Seconds to go in or out.
+DOOR = 12.0
+#: Seconds to pick something up.
+PICK = 6.0
+#: Seconds to put something down and report.
+PUT = 6.0
+#: Seconds to meet somebody and be handed things.
+MEET = 25.0
 # Looking through a place, and a spot outdoors: for a thing, and for a person, seconds.
 _LOOK = {("place", False): 45.0, ("outdoor", False): 22.0, ("place", True): 25.0, ("outdoor", True): 6.0}
 # How likely somebody is at a spot outdoors, where a place counts 1: most of a day is spent indoors.

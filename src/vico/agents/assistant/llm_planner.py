@@ -310,8 +310,9 @@ class SpokenMessage(_Reply):
 
 #: A colleague as near as this can hear, metres.
 TALK_DISTANCE = 10.0
-# Lines that one says before it goes on; steps one waits for an answer, or for who begins; turns of the look around.
-_MOST_SAID, _ANSWER_PATIENCE, _LOOK_AROUND = 3, 2, 4
+_MOST_SAID = 3  # lines that one says before it goes on
+_ANSWER_PATIENCE = 2  # steps one waits for an answer, or for the one who begins
+_LOOK_AROUND = 4  # turns of the look around
 # Where somebody was seen or heard so long ago they may still be, seconds; a line reaches so much farther, metres.
 _FRESH_SIGHTING, _TALK_MARGIN = 3.0, 2.0
 

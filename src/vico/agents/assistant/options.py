@@ -245,8 +245,9 @@ class PickUp:
         return {"type": "pick", "hand": view.held.index(0), "object": self.target.entity}
 
 
-# Steps after which one gives up, and for which one goes further into a room; how far, metres.
-_LONGEST, _GOING_IN, _INTO = 50, 4, 1.8
+_LONGEST = 50  # steps after which one gives up
+_GOING_IN = 4  # steps for which one goes further into a room
+_INTO = 1.8  # metres of such a step
 # A room with so many doors to others is a hall, which one tries to leave for so many steps.
 _DOORS_OF_HALL, _LEAVING_HALL = 4, 15
 # Metres from the middle of a spot outdoors at which things are put down there.

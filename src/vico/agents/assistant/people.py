@@ -25,16 +25,19 @@ Region = Mapping[str, Any]
 
 PERSON = "resident"
 _OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
-# One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
-# somebody who is out of view for so long, or hands nothing over, steps.
-_SPEAK, _STAND, _ASK_AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
+_SPEAK = CALL_DISTANCE - 3.0  # metres from which one speaks
+_STAND = HAND_OVER_DISTANCE - 0.3  # metres at which one stands to be handed something
+_ASK_AGAIN = 20  # steps until one asks again
+_LOST = 25  # steps out of view after which somebody is given up
+_LONGEST = 150  # steps after which one gives up, handed or not
 # Who follows keeps behind by so much, runs where it is more than the second, metres, else walks as they do; no longer
 # than for so many steps.
 _BEHIND, _RUN_BEYOND = 1.7, 2.2
 _ESCORT = 700
-# In a room, who has moved less than so much a step, metres, for so many steps is let pass: one goes out, makes room for
-# so many steps, and waits so long for them to come out.
-_STANDS, _LETS_PASS, _ROOM_STEPS, _COMES_OUT = 0.15, 5, 3, 40
+_STANDS = 0.15  # in a room, metres a step below which somebody stands
+_LETS_PASS = 5  # steps that they stand until one lets them pass, and goes out
+_ROOM_STEPS = 3  # steps for which one makes room then
+_COMES_OUT = 40  # steps for which one waits for them to come out
 # ... goes to where the person was last seen for so many steps, then home by the map.
 _TO_LAST_SEEN = 8
 # So many pixels are shown where 20 are asked for, from these distances, metres, of which the first is tried first.
@@ -230,8 +233,9 @@ class AwaitPerson(FieldState):
         return {"type": "turn_left", "degrees": 88.0}
 
 
-# Who is nearer than this is asked, metres; so many questions each, so many steps between two questions.
-_ASK_DISTANCE, _MAX_QUESTIONS, _QUESTION_PAUSE = 4.5, 3, 2
+_ASK_DISTANCE = 4.5  # metres within which somebody is asked
+_MAX_QUESTIONS = 3  # questions to each, at most
+_QUESTION_PAUSE = 2  # steps between two questions
 _QUESTION = "Excuse me, have you seen {}?"
 
 

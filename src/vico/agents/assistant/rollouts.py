@@ -30,7 +30,7 @@ from vico.io.compiled import compiled
 from vico.world.public import PublicMap
 
 #: How far a subtask has come: to be found, in hand, done.
-OPEN, IN_HAND, DONE = 0, 1, 2
+OPEN, IN_HAND, DONE = range(3)
 #: How much a subtask that is done at the end counts less than one that is done at once.
 IMPATIENCE = 0.25
 
@@ -230,9 +230,10 @@ _MEMORY_TIME = 1200.0
 _SIGHTING_FACTOR = 4.0
 _CLAIM_FACTORS = {"see": 3.0, "myself": 3.0, "saw_in": 1.5, "saw_near": 1.0, "told": 1.0, "usual": 0.4}
 _OTHER_CLAIM_FACTOR = 0.3
-# Chance that things are where nobody said; and people, who are at one of the places that are told at first and go on
-# later: at first, and by how much more each second.
-_ELSEWHERE_THINGS, _ELSEWHERE, _ELSEWHERE_LATER, _ELSEWHERE_MOST = 0.03, 0.03, 0.0002, 0.35
+_ELSEWHERE_THINGS = 0.03  # chance that a thing is where nobody said
+_ELSEWHERE = 0.03  # chance that a person is, at first: they are at a place that was told
+_ELSEWHERE_LATER = 0.0002  # and by how much more each second, for they go on
+_ELSEWHERE_MOST = 0.35  # at most
 # How much of their time people are at each place that somebody says they are often seen at, at least.
 _LEAST_SHARE = 0.04
 

@@ -217,8 +217,9 @@ class AssistantSkills(FieldState):
 # Views of 90 degrees overlap a little, four of them show everything around.
 _TURN = 88.0
 _VIEWS = 4
-# So long one tries to get to a spot outdoors, to the middle of a room and to a door, steps.
-_SPOT, _MIDDLE, _DOOR = 25, 12, 40
+_SPOT = 25  # steps in which one tries to get to a spot outdoors
+_MIDDLE = 12  # to the middle of a room
+_DOOR = 40  # to a door
 # Spots outdoors lie so far from the region's middle, share of its radius; regions smaller than this, metres, need none.
 _RING, _ONE_LOOK = 0.6, 5.0
 # One looks from spots at most so far apart, metres.

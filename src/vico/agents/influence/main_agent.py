@@ -181,9 +181,9 @@ def _talk_from_record(record: Mapping[str, Any]) -> Talk:
     return Talk(str(record["target"]), float(record["began"]), said, answers)
 
 
-# One thinks again after so many seconds where there is nobody to see, waits so long for an answer, and looks for
-# somebody no longer than the way takes and so many seconds more.
-_THINK_TIME, _ANSWER_TIME, _SEARCH_TIME = 30.0, 6.0, 600.0
+_THINK_TIME = 30.0  # seconds until one thinks again where there is nobody to see
+_ANSWER_TIME = 6.0  # seconds that one waits for an answer
+_SEARCH_TIME = 600.0  # seconds that one looks for somebody, beside those of the way
 # How far a voice is to carry, metres.
 _VOICE = 3.0
 _ON_THE_WAY = "on my way"

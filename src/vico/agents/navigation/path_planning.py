@@ -19,8 +19,11 @@ from vico.agents.base import AgentState
 from vico.agents.navigation.voxels import FREE_COST, NEAR_COST, SIDE, VOXEL, lowest_level
 from vico.io.compiled import compiled
 
-#: 5 : 7 for 1 : sqrt 2, a little less than that: distances bound costs from below when taken 0.98 times.
-STRAIGHT, DIAGONAL, BOUND = 5, 7, 0.98
+#: Length of a step along an axis; and of one across, a little less than sqrt 2 times as long.
+STRAIGHT = 5
+DIAGONAL = 7
+#: Distances bound costs from below when taken so many times.
+BOUND = 0.98
 # Levels a walker may step up or down from column to column, and how steeply unseen ground may climb, levels a column.
 _STEP_LEVELS, _SLOPE = 3, 0.9
 _AT_LEVEL = 5  # levels that a target may lie above or below who has reached it

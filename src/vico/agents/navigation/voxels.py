@@ -30,11 +30,16 @@ UNKNOWN = -1
 
 #: What moves is taken to be where it was seen for so many seconds, and what one bumped into for so many.
 FADES, BUMP_LASTS = 4, 900
-#: Squared distances, in voxels, up to which a column counts as touching, as near, and as beside.
-TOUCHING, NEAR, BESIDE = 4, 8, 20
+#: Squared distances, in voxels, up to which a column counts as touching something, as near it, and as beside it.
+TOUCHING = 4
+NEAR = 8
+BESIDE = 20
 _REACH = 4  # the root of the last one, rounded down
-#: What a step onto a cell costs: free, not seen yet, beside something, near something; 0 is blocked.
-FREE_COST, UNSEEN_COST, BESIDE_COST, NEAR_COST = 10, 11, 16, 40
+#: Costs of a step onto a cell: free, not seen yet, beside something, near something; 0 is blocked.
+FREE_COST = 10
+UNSEEN_COST = 11
+BESIDE_COST = 16
+NEAR_COST = 40
 
 _PUSH = 0.03  # metres along the ray: a surface on the border of two columns counts for the one behind it
 _EDGE = 0.15  # metres behind a voxel that a pixel must be to have been seen through it
@@ -80,7 +85,7 @@ class Voxels(NamedTuple):
     flags: NDArray[np.bool_]
 
 
-THERE, CHANGED, TIMED = 0, 1, 2
+THERE, CHANGED, TIMED = range(3)
 
 
 def empty_voxels() -> Voxels:

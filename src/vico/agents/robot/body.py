@@ -184,8 +184,9 @@ def free_distance_ahead(body: ArmBody, points: Array) -> float:
 
 Action = dict[str, Any]
 
-# Slower than this a robot stands, m/s; so long it stands where it has arrived, and before a way is asked for anew, s.
-_STANDSTILL, _ARRIVAL_TIME, _STUCK_TIME = 0.03, 1.0, 12.0
+_STANDSTILL = 0.03  # m/s below which a robot stands
+_ARRIVAL_TIME = 1.0  # seconds that it stands where it has arrived
+_STUCK_TIME = 12.0  # seconds that it stands before a way is asked for anew
 #: How often a way is asked for.
 DRIVE_TRIES = 3
 

@@ -187,8 +187,9 @@ class Carrier(FieldState):
 _AT_SOURCE, _SCOUT_TURN_SPEED = 4.5, 0.7
 # Seconds that one turn takes; who went on turning would wander off on a slope.
 _SCOUT_TURN_TIME = 9.5
-# Seconds between two looks, and two sentences; until it goes after a person who may have gone.
-_LOOKS_EVERY, _SAYS_EVERY, _FOLLOW_AFTER = 0.5, 6.0, 80.0
+_LOOKS_EVERY = 0.5  # seconds between two looks
+_SAYS_EVERY = 6.0  # seconds between two sentences
+_FOLLOW_AFTER = 80.0  # seconds until it goes after a person who may have gone
 
 
 class Scout:

@@ -58,8 +58,9 @@ def placement_ahead(centre: Sequence[float], here: Stance, *, stand: float, trie
 _LOOKS_EVERY = 0.5
 #: Farther away a thing is gone nearer to first, metres.
 RELIABLE_DISTANCE = 8.0
-# Seconds of a full turn to look about; places to look from lie on a ring about the middle, metres.
-_TURN_TIME, _VIEWPOINT_RING, _VIEWPOINTS = 9.5, 4.0, 6
+_TURN_TIME = 9.5  # seconds of a full turn to look about
+_VIEWPOINT_RING = 4.0  # metres from the middle to the places to look from
+_VIEWPOINTS = 6  # number of them
 # So high above the ground something is in a hand, metres.
 _LOW = 0.2
 # Sides that are tried one after the other are turned by so much, rad: none comes twice.
@@ -243,8 +244,9 @@ class PushTrip(FieldState):
 
 _CALLS_EVERY = 4.0  # seconds between two calls of the person
 _TURN = 0.7  # to look about, rad/s
-# How near one comes to regions and to people, metres; how often something is tried.
-_AT_SOURCE, _AT_PERSON, _TRIES = 2.5, 3.0, 5
+_AT_SOURCE = 2.5  # metres to which one comes near to a source
+_AT_PERSON = 3.0  # metres to which one comes near to people
+_TRIES = 5  # how often something is tried
 _FAR = 15.0  # metres: nearer to the destination than this nothing is put on a deck
 # Seconds of standing that end going along.
 _STANDS, _SPEED = 4.0, 0.03

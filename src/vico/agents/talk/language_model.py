@@ -20,8 +20,10 @@ from vico.llm.prompts import read_prompt
 __all__ = ["MOST_SAID", "LlmTalk", "SpokenReply", "facts_for_model", "reply_faults"]
 #: Longest answer, characters.
 MOST_SAID = 300
-# So much of a message is shown, characters; so many people and messages are among the facts.
-_MOST_HEARD, _MOST_PEOPLE, _MOST_SEEN, _MOST_MESSAGES = 400, 24, 12, 6
+_MOST_HEARD = 400  # characters of a message that are shown
+_MOST_PEOPLE = 24  # people among the facts
+_MOST_SEEN = 12  # sightings among the facts
+_MOST_MESSAGES = 6  # messages among the facts
 # A server that failed so often in a row is not asked again.
 _GIVES_UP = 3
 # Shorter names may be words.

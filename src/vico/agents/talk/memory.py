@@ -31,8 +31,12 @@ __all__ = [
 ]
 #: Seconds between two times that one takes note of who is about, and the distance up to which one knows them, metres.
 LOOK_PERIOD, RECOGNITION_DISTANCE = 10.0, 20.0
-#: Most people, messages and visits that are remembered; what is oldest is forgotten first.
-MOST_PEOPLE, MOST_MESSAGES, MOST_VISITS = 64, 32, 48
+#: People that are remembered, at most; the oldest are forgotten first.
+MOST_PEOPLE = 64
+#: Messages, likewise.
+MOST_MESSAGES = 32
+#: Visits, likewise.
+MOST_VISITS = 48
 # So much of a message is remembered, characters.
 _MAX_TEXT = 300
 _PEOPLE = ("resident", "assistant")

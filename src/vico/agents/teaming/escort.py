@@ -27,12 +27,16 @@ from vico.world.walkable import OPEN, SIDEWALK
 
 Array = NDArray[np.float64]
 
-# How near one comes to call somebody, and to a spot, metres; seconds between two calls.
-_ESCORT_CALL_DISTANCE, _AT_SPOT, _ESCORT_CALL_PERIOD = 3.0, 0.5, 4.0
+_ESCORT_CALL_DISTANCE = 3.0  # metres from which somebody is called
+_AT_SPOT = 0.5  # metres at which a spot is reached
+_ESCORT_CALL_PERIOD = 4.0  # seconds between two calls
 # So near the door the robot leaves the person, who goes in, and goes to a spot beside it, metres.
 _LEAVES = 5.0
-# Spots beside a door: so far from it, with so much room, and so far off the way in, metres; directions that are tried.
-_RINGS, _ROOM, _OFF_WAY, _SIDES = (2.2, 2.8, 3.3), 0.6, 1.1, 16
+# Spots beside a door.
+_RINGS = (2.2, 2.8, 3.3)  # metres from the door, in the order in which they are tried
+_ROOM = 0.6  # metres of room
+_OFF_WAY = 1.1  # metres off the way in
+_SIDES = 16  # directions that are tried
 # The way in is kept free so far before the door, metres.
 _WAY_IN = 4.0
 _ESCORT_TURN_SPEED = 0.6
@@ -186,15 +190,17 @@ _ESCORT_STAGES = {
 }
 
 
-# How near one comes to call somebody, to a corner of the way, to its end, and to where somebody was last, metres.
-_GUIDE_CALL_DISTANCE, _AT_CORNER, _AT_END, _AT_LOST = 2.5, 0.7, 1.0, 1.5
+_GUIDE_CALL_DISTANCE = 2.5  # metres from which somebody is called
+_AT_CORNER = 0.7  # metres at which a corner of the way is reached
+_AT_END = 1.0  # metres at which its end is
+_AT_LOST = 1.5  # metres at which the place is where somebody was last
 # Metres from one look round to the next; so near the person has to be for the robot to go on.
 _LEG, _NEAR = 4.0, 3.5
 # Who is farther off than this and calls is gone to, metres, until nearer than that.
 _FAR = 5.0
-# Seconds between two calls; of turning until it is sure to have looked all round; and of waiting for who is in view,
-# but does not come, until it goes to them.
-_GUIDE_CALL_PERIOD, _GUIDE_TURN_TIME, _PATIENCE = 4.0, 11.0, 30.0
+_GUIDE_CALL_PERIOD = 4.0  # seconds between two calls
+_GUIDE_TURN_TIME = 11.0  # seconds of turning until it has looked all round
+_PATIENCE = 30.0  # seconds until it goes to somebody in view who does not come
 _GUIDE_TURN_SPEED = 0.9
 
 

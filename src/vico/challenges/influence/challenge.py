@@ -56,9 +56,10 @@ __all__ = [
     "play_by_schedule",
     "time_line",
 ]
-# Seconds: one thinks again after so long where there is nobody to see; it takes so long to find somebody at a place,
-# and so long to say something and be answered; who is to come is late by so much.
-_THINK, _FIND, _ROUND, _LATE = 30.0, 30.0, 3.0, 30.0
+_THINK = 30.0  # seconds until one thinks again where there is nobody to see
+_FIND = 30.0  # seconds to find somebody at a place
+_ROUND = 3.0  # seconds to say something and be answered
+_LATE = 30.0  # seconds that whoever is to come is late
 
 
 @dataclass

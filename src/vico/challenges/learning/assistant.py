@@ -34,8 +34,10 @@ AGENT = "assistant_0"
 SUBTASKS, SOURCES = 6, 3
 # Of a subtask: whether it was reported, how many things it is about by two, directions of sources and destination.
 _ROW = 2 + (SOURCES + 1) * DIRECTION
-# Of the potential: what holding a thing is worth, bringing it nearer, and being near what is next, within metres.
-_HELD, _NEARER, _NEAR, _FAR = 0.25, 0.25, 0.25, 200.0
+_HELD = 0.25  # of the potential: holding a thing
+_NEARER = 0.25  # bringing it nearer
+_NEAR = 0.25  # being near to what is next
+_FAR = 200.0  # metres within which that counts
 
 
 @dataclass(frozen=True, kw_only=True)

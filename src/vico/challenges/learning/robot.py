@@ -27,6 +27,7 @@ from vico.challenges.assistant.challenge import CARS, PEDESTRIANS
 from vico.challenges.assistant.evaluate import entrance_of
 from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep, begin_episode, with_goal, with_goal_space
+from vico.challenges.learning.manipulation.tasks import PAPER_FARTHEST, PAPER_GRASP, PAPER_METRE, PAPER_PLACE
 from vico.challenges.robot.challenge import (
     CARRIER,
     MANIPULATOR,
@@ -53,8 +54,6 @@ from vico.world.world import World
 
 #: What ``goal`` holds, and how many numbers each has; ``other`` is the other robot.
 GOAL = {"source": DIRECTION, "destination": DIRECTION, "person": DIRECTION, "other": DIRECTION, "thing": 7}
-# The paper's reward: a metre costs so much a step, up to so many metres; holding and delivering are worth so much.
-_PENALTY, _FAR, _GRASP, _PLACE = 0.02, 10.0, 5.0, 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,8 +211,8 @@ class RobotTaskWorld:
         away = float(np.linalg.norm(Stance.of(observation).outside(hand) - thing.middle))
         missing = distance(thing.middle[:2], self.goal_at[:2])
         lifted = float(thing.middle[2]) - float(self.env.world.height(thing.middle[:2])) > 4.0 * float(thing.half[2])
-        reward = -_PENALTY * (min(away, _FAR) + min(missing, _FAR))
-        return reward + _GRASP * (self.is_held() and lifted) + _PLACE * self.success
+        reward = -PAPER_METRE * (min(away, PAPER_FARTHEST) + min(missing, PAPER_FARTHEST))
+        return reward + PAPER_GRASP * (self.is_held() and lifted) + PAPER_PLACE * self.success
 
     def goal(self, name: str, result: StepResult) -> NDArray[np.float32]:
         """Return what is asked of a robot and what it sees of it, in numbers.
@@ -256,9 +255,9 @@ def is_usable(action: Mapping[str, Any]) -> bool:
     return bool(np.isfinite(np.asarray(action.get("vector", ()), np.float64)).all())
 
 
-# The carrier comes after the other robot once that is so far away, metres, to so far behind it, and not oftener than
-# every so many seconds.
-_COMES, _BEHIND, _EVERY = 4.0, 2.2, 5.0
+_COMES = 4.0  # metres from the other robot from which on the carrier comes after it
+_BEHIND = 2.2  # metres behind it to which it comes
+_EVERY = 5.0  # seconds between two times, at least
 
 
 class RobotWork:

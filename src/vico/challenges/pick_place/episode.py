@@ -49,8 +49,9 @@ __all__ = [
 ROBOT = "robot_0"
 #: Side of its pictures unless told, pixels, as in the paper.
 SIDE = 224
-# Metres that a thing may be off the height of what it lies on; m/s of one that lies still; newtons of a finger on it.
-_HEIGHT, _STILL, _TOUCHED = 0.05, 0.02, 0.5
+_HEIGHT = 0.05  # metres that a thing may be off the height of what it lies on
+_STILL = 0.02  # m/s below which it lies still
+_TOUCHED = 0.5  # newtons of a finger that touches it
 # Seconds that a thing is given to come to rest once the robot is done.
 _RESTS = 1.0
 
@@ -240,8 +241,11 @@ def _judge(sim: Simulation, task: PickPlaceTask, observation: Observation, *, li
 
 #: What it is called in the records of a dataset.
 METHOD = "arm_worker"
-# Nearer than that the arm's own skills bring the base up, metres; on the way there, m/s and rad/s.
-_NEAR, _FASTEST, _TURNS, _GAIN, _AHEAD = 1.2, 0.5, 0.8, 1.5, 0.15
+_NEAR = 1.2  # metres from which on the arm's own skills bring the base up
+_FASTEST = 0.5  # m/s on the way there
+_TURNS = 0.8  # rad/s on the way there
+_GAIN = 1.5  # of turning, 1/s
+_AHEAD = 0.15  # rad off its heading at which it goes ahead
 
 
 class Demonstrator:

@@ -167,8 +167,9 @@ def read_policy(path: Path | str, *, inputs: int | None = None, outputs: int | N
 _ENDS = list(accumulate(FULL.values()))
 #: Where in an observation its entries are.
 PLACES = {name: slice(end - FULL[name], end) for name, end in zip(FULL, _ENDS, strict=True)}
-# Metres above where it stood that a lifted box is to be, that it counts as lifted from, and as dropped below.
-_GOAL, _LIFTED, _DROPPED = 0.2, 0.12, 0.03
+_GOAL = 0.2  # metres above where it stood that a lifted box is to be
+_LIFTED = 0.12  # metres from which on it counts as lifted
+_DROPPED = 0.03  # metres below which it counts as dropped
 _NEAR = 0.1
 
 
@@ -313,9 +314,11 @@ class ArmController:
 #: Tilts of the hand that are tried, rad, and turns about the vertical of what is put down.
 _TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 _TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))
-# What the jaw is wider than the box by on each side; how near a joint has to come, rad; steps that closing takes at
-# most, and that pads press before the hand goes up; metres that a box is let go of above its ground.
-_ROOM, _THERE, _CLOSING, _PRESSES, _DROP = 0.02, 0.02, 40, 3, 0.006
+_ROOM = 0.02  # metres that the jaw is wider than the box, on each side
+_THERE = 0.02  # rad to which a joint has to come near
+_CLOSING = 40  # steps that closing takes, at most
+_PRESSES = 3  # steps that pads press before the hand goes up
+_DROP = 0.006  # metres above its ground at which a box is let go
 
 
 class ExpertPhase(Enum):

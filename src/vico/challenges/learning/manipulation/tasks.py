@@ -54,7 +54,11 @@ class ManipulationTask:
 NEAR, STAY = 0.1, 100
 #: Metres that a box is lifted.
 LIFTED = 0.1
-_FAR, _PENALTY, _GRASP, _PLACE = 10.0, 0.02, 5.0, 100.0
+# The paper's reward.
+PAPER_METRE = 0.02  # cost of a metre from hand to thing, and from thing to goal, each step
+PAPER_FARTHEST = 10.0  # metres up to which these distances count
+PAPER_GRASP = 5.0  # reward of holding the thing, each step
+PAPER_PLACE = 100.0  # reward of a thing that is placed
 # Metres above the grasp point where a hand is to be until it is ready to go down.
 _HOVER = 0.12
 # From so far off a hand is rewarded for coming nearer, metres.
@@ -72,14 +76,14 @@ def paper_reward(r: Readings, terms: Collection[str]) -> Array:
     """
     total = np.zeros(len(r.hand))
     if "object" in terms:
-        total -= np.minimum(np.linalg.norm(r.hand - r.thing, axis=1), _FAR) * _PENALTY
+        total -= np.minimum(np.linalg.norm(r.hand - r.thing, axis=1), PAPER_FARTHEST) * PAPER_METRE
     if "goal" in terms:
-        total -= np.minimum(r.goal_distance, _FAR) * _PENALTY
+        total -= np.minimum(r.goal_distance, PAPER_FARTHEST) * PAPER_METRE
     if "grasp" in terms:
         height = r.thing[:, 2] - r.surface
-        total += _GRASP * ((height > 2.0 * 2.0 * r.height_half) & r.gripped)
+        total += PAPER_GRASP * ((height > 2.0 * 2.0 * r.height_half) & r.gripped)
     if "place" in terms:
-        total += _PLACE * (r.at_goal == STAY)
+        total += PAPER_PLACE * (r.at_goal == STAY)
     return total
 
 
@@ -158,7 +162,10 @@ def releasing_share(r: Readings) -> Array:
     return np.asarray(stands * share_between(r.gap, -0.01, 0.03))
 
 
-_REACH_NEAR, _REACH_TILT, _REACH_TURN, _REACH_MOVED = 0.04, 0.35, 0.26, 0.05
+_REACH_NEAR = 0.04  # metres between hand and grasp
+_REACH_TILT = 0.35  # rad off straight down
+_REACH_TURN = 0.26  # rad off the box
+_REACH_MOVED = 0.05  # metres that the box may have been moved
 
 
 def evaluate_reach(r: Readings) -> dict[str, Bools]:
