@@ -126,7 +126,7 @@ class ModelAccess(FieldState):
         try:
             found = self.model.ask(prompt.messages(**inputs), reply, check=check, rounds=_ROUNDS, spent=self._spend)
         except VicoError as error:
-            self._noted(error, step)
+            self._note_error(error, step)
             return None
         self._failed = 0
         return found.value
@@ -139,7 +139,7 @@ class ModelAccess(FieldState):
         self.tokens += usage.tokens
         self.cost += usage.cost
 
-    def _noted(self, error: VicoError, step: int) -> None:
+    def _note_error(self, error: VicoError, step: int) -> None:
         """Note an error, and whether it is of any use to ask on."""
         if isinstance(error, LlmReplyError):
             self._failed = 0

@@ -154,9 +154,9 @@ class ScheduleFollower:
         return action
 
     @property
-    def known(self) -> Collection[str]:
+    def acquaintances(self) -> Collection[str]:
         """Agents whom the resident knows."""
-        return self._conversation.known
+        return self._conversation.acquaintances
 
     @property
     def memory(self) -> ResidentMemory:
@@ -169,9 +169,9 @@ class ScheduleFollower:
         return self._conversation.encounters
 
     @property
-    def greeted(self) -> Mapping[str, float]:
+    def greeting_times(self) -> Mapping[str, float]:
         """When the resident last spoke with agents, seconds."""
-        return self._conversation.greeted
+        return self._conversation.greeting_times
 
     def has_arrived(self, time: float) -> bool:
         """Return whether it is where it means to be at a time, seconds: not on the way, and not about to leave."""
@@ -304,7 +304,7 @@ class ScheduleFollower:
             return up
         if time < self._paused_until:
             return self._rest(time, self._paused_until)
-        watched = self._changes.watched(place)
+        watched = self._changes.point_to_watch(place)
         if watched is not None:
             self._paused_until = time + int(self._rng.integers(20, 90))
             return {"type": "look_at", "target": list(watched)}

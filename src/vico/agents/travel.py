@@ -435,11 +435,11 @@ class Traveller:
 
     def _begin(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
         """Plan a trip and begin it; None if there is none."""
-        self.trip, self._leg, self._tries = self._planned(goal, observation), 0, 0
+        self.trip, self._leg, self._tries = self._plan_trip(goal, observation), 0, 0
         self.plans += 1
         return self.trip
 
-    def _planned(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
+    def _plan_trip(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
         """Return the trip that is meant, if there is one in time; else the one that arrives first."""
         if self._planner is not None:
             return self._planner(observation, goal, (*self._closed, *self._ground))
@@ -582,14 +582,14 @@ class Traveller:
             trip = self._begin(goal, observation)
         leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
         if leg is not None and leg.mode == "bike" and leg.destination is None:
-            freed = self._freed(observation)
+            freed = self._free_bicycle(observation)
             return freed or self._walker.towards(leg.end, BIKE_SPEED, observation, info, room=_TURNING)
         end = leg.end if leg is not None and leg.mode == "bike" else self._nearest_station(observation)
         if end is None or _distance_to(observation, end) <= _TO_RACK:
             refused = self._asked == "exit_bike" and observation["state"]["action_code"] == _NO_FREE_SPOT
             if end is None or not refused:
                 return {"type": "exit_bike"}
-        freed = self._freed(observation)
+        freed = self._free_bicycle(observation)
         if freed is not None:
             return freed
         action = self._walker.towards(end, BIKE_SPEED, observation, info, room=_TURNING)
@@ -599,7 +599,7 @@ class Traveller:
             action = self._walker.towards(end, BIKE_SPEED, observation, info)
         return {"type": "exit_bike"} if action is None else action
 
-    def _freed(self, observation: Observation) -> Action | None:
+    def _free_bicycle(self, observation: Observation) -> Action | None:
         """Return what gets a bicycle out of a place where it can't be turned; None where it can."""
         stopped = observation["state"]["action_status"] == "collision"
         self._out = [] if stopped else self._out

@@ -125,13 +125,13 @@ class Player:
         record = read_episode(self.store, path, key)
         kept = record is not None and (run is None or self.store.has(run))
         if record is None or not kept:
-            record = self._played(job, run, progress)
+            record = self._play_job(job, run, progress)
             # Only now: nobody who plays the task should find its answers lying about.
             self.store.write(f"tasks/{_task_name(job, task)}", json_bytes(task))
             write_episode(self.store, path, key, record)
         return Outcome(job, record, world_digest=world, kept=kept)
 
-    def _played(self, job: Job, run: str | None, progress: Progress | None) -> EpisodeRecord:
+    def _play_job(self, job: Job, run: str | None, progress: Progress | None) -> EpisodeRecord:
         """Play an episode, and record it as a run of that name."""
         if run is None:
             record = self.challenge.play(job, progress=progress)

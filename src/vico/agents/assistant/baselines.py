@@ -300,7 +300,7 @@ class HeuristicPlanner(FieldState):
         if search.found is not None:
             self._target = search.found
             return "found"
-        if self.automaton is AUTOMATA["delivery"] and any(view.held):
+        if self.automaton is AUTOMATA["delivery"] and any(view.hands):
             return "nothing, but carrying"
         self._region += 1
         if self._region % len(self.errand["sources"]):
@@ -316,7 +316,7 @@ class HeuristicPlanner(FieldState):
         if pick.outcome == "picked":
             self._picked.add(pick.target.name)
             left = [name for name in self.errand["objects"] if name not in self._picked]
-            return "picked, more wanted" if left and not all(view.held) else "picked, all of it"
+            return "picked, more wanted" if left and not all(view.hands) else "picked, all of it"
         if pick.outcome == "refused":
             self._refused.append(pick.target.name)
         return pick.outcome
@@ -416,7 +416,7 @@ class RandomPlanner:
         regions = [*errand["sources"], *([errand["destination"]] if errand["destination"] else [])]
         self._region = regions[int(self._random.integers(len(regions)))]
         self._search = self._any_object()
-        things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.held]
+        things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.hands]
         self._target = things[int(self._random.integers(len(things)))] if things else None
         self._index = int(errand["index"])
         self._done = False
@@ -426,15 +426,15 @@ class RandomPlanner:
             return self.skills.go_to(view, self._region)
         if self._plan == "search" and self._search is not None:
             return self._search.act(view)
-        if self._plan == "pick" and self._target is not None and 0 in view.held and not self._done:
+        if self._plan == "pick" and self._target is not None and 0 in view.hands and not self._done:
             step = self.skills.approach(view, self._target.position, near=GRASP)
             if step is not None:
                 return step
             self._done = True
-            return {"type": "pick", "hand": view.held.index(0), "object": self._target.entity}
-        if self._plan == "put" and any(view.held) and not self._done:
+            return {"type": "pick", "hand": view.hands.index(0), "object": self._target.entity}
+        if self._plan == "put" and any(view.hands) and not self._done:
             self._done = True
-            return {"type": "put", "hand": next(h for h, entity in enumerate(view.held) if entity)}
+            return {"type": "put", "hand": next(h for h, entity in enumerate(view.hands) if entity)}
         if self._plan == "complete" and not self._done:
             self._done = True
             return {"type": "task_complete", "index": self._index}

@@ -95,26 +95,25 @@ class Book(FieldState):
         """Whether a subtask is still to do."""
         return k not in self.closed
 
-    def wanted(self, k: int) -> list[str]:
+    def missing_names(self, k: int) -> list[str]:
         """Names of a subtask's things that are still to be found."""
         return [
-            n for n in self.instructions[k]["objects"] if n not in self.picked and n not in self.put and self._may(n)
+            n
+            for n in self.instructions[k]["objects"]
+            if n not in self.picked and n not in self.put and self.refused.get(n, 0) < REFUSALS
         ]
-
-    def _may(self, name: str) -> bool:
-        return self.refused.get(name, 0) < REFUSALS
 
     def in_hand(self, k: int, view: ObservationView) -> list[int]:
         """Entities of a subtask's things that one holds."""
         mine = [self.picked.get(name, 0) for name in self.instructions[k]["objects"]]
-        return [entity for entity in view.held if entity and entity in mine]
+        return [entity for entity in view.hands if entity and entity in mine]
 
     def is_wanted(self, k: int, thing: Sighting | RememberedSighting) -> bool:
         """Whether something seen is what a subtask is about: one of its things, or with Carry its person."""
         if self.category(k) == "carry":
             mine = thing.kind == PERSON and thing.name == self.instructions[k]["person"]["name"]
             return mine and self.refused.get(thing.name, 0) < MEETINGS
-        return thing.kind == "object" and thing.name in self.wanted(k)
+        return thing.kind == "object" and thing.name in self.missing_names(k)
 
     def choices(self, view: ObservationView, seen: Mapping[int, RememberedSighting]) -> list[Choice]:
         """Return everything that makes sense now.
@@ -130,9 +129,9 @@ class Book(FieldState):
                 continue
             if self.in_hand(k, view):
                 found.append(Choice("deliver", k))
-            if all(view.held) and self.category(k) != "search":
+            if all(view.hands) and self.category(k) != "search":
                 continue
-            if self.category(k) != "carry" and not self.wanted(k):
+            if self.category(k) != "carry" and not self.missing_names(k):
                 continue
             if k in seen:
                 found.append(Choice("fetch", k))
@@ -219,7 +218,7 @@ class Errand:
         return {"type": "wait"}
 
     @property
-    def _told(self) -> Instruction:
+    def _instruction(self) -> Instruction:
         return self._book.instructions[self.choice.subtask]
 
     @property
@@ -230,19 +229,19 @@ class Errand:
     def _region(self) -> Mapping[str, Any]:
         """Where to go first."""
         if self.choice.kind == "deliver":
-            region: Mapping[str, Any] = self._told["destination"]
+            region: Mapping[str, Any] = self._instruction["destination"]
             return region
         if self._seen is not None:
             place = self._skills.places.get(self._seen.room) or None
             centre = [float(x) for x in self._seen.position]
             kind = "outdoor" if place is None else "place"
             return {"kind": kind, "place": place, "centre": centre, "radius": 3.0, "surface": None}
-        source: Mapping[str, Any] = self._told["sources"][max(self.choice.region, 0)]
+        source: Mapping[str, Any] = self._instruction["sources"][max(self.choice.region, 0)]
         return source
 
     def _begin(self) -> Option:
         """Make the option of the stage."""
-        told, person, target = self._told, str(self._told["person"]["name"]), self._target
+        told, person, target = self._instruction, str(self._instruction["person"]["name"]), self._target
         k = self.choice.subtask
         if self._stage in ("pick", "show"):
             assert target is not None
@@ -286,8 +285,8 @@ class Errand:
         if isinstance(option, PutDown):
             return self._after_put(option)
         if isinstance(option, AwaitPerson):
-            return self._closed("report" if option.outcome == "came" else "over")
-        return self._closed("over")
+            return self._close_subtask("report" if option.outcome == "came" else "over")
+        return self._close_subtask("over")
 
     def _after_way(self, view: ObservationView) -> str:
         if self.choice.kind == "deliver":
@@ -313,17 +312,17 @@ class Errand:
         name = pick.target.name
         if pick.outcome == "picked":
             self._book.picked[name] = pick.target.entity
-            more = self._book.wanted(self.choice.subtask)
-            return "look" if more and not all(view.held) else "over"
+            more = self._book.missing_names(self.choice.subtask)
+            return "look" if more and not all(view.hands) else "over"
         if pick.outcome == "refused":
             self._book.refused[name] = self._book.refused.get(name, 0) + 1
         return "over"
 
     def _after_meeting(self, meet: Meet, view: ObservationView) -> str:
         if meet.outcome != "handed":
-            return self._given_up(str(self._told["person"]["name"]))
-        mine = [entity for entity in view.held if entity and entity not in self._book.picked.values()]
-        self._book.picked.update(zip(self._told["objects"], mine, strict=False))
+            return self._given_up(str(self._instruction["person"]["name"]))
+        mine = [entity for entity in view.hands if entity and entity not in self._book.picked.values()]
+        self._book.picked.update(zip(self._instruction["objects"], mine, strict=False))
         return "follow"
 
     def _given_up(self, name: str) -> str:
@@ -337,18 +336,18 @@ class Errand:
     def _after_put(self, put: PutDown) -> str:
         if self._category == "carry":
             if put.outcome == "empty hands":
-                for name in self._told["objects"]:
+                for name in self._instruction["objects"]:
                     self._book.picked.pop(name, None)
             return "await"
         k = self.choice.subtask
         if put.outcome == "empty hands":
-            for name in self._told["objects"]:
+            for name in self._instruction["objects"]:
                 if name in self._book.picked:
                     del self._book.picked[name]
                     self._book.put.add(name)
-        return "over" if self._book.wanted(k) or put.outcome != "empty hands" else "report"
+        return "over" if self._book.missing_names(k) or put.outcome != "empty hands" else "report"
 
-    def _closed(self, stage: str) -> str:
+    def _close_subtask(self, stage: str) -> str:
         if stage == "over":
             self._book.closed.add(self.choice.subtask)
         return stage
@@ -438,7 +437,7 @@ class ChoicePlanner(ABC):
                 choice = self.decide(view)
                 if choice is None:
                     return self.idle(view)
-                seen = self.seen(view).get(choice.subtask) if choice.kind == "fetch" else None
+                seen = self.last_sightings(view).get(choice.subtask) if choice.kind == "fetch" else None
                 self.errand = Errand(choice, self.book, self.skills, seen)
             action = self.errand.act(view)
             if action is not None:
@@ -463,14 +462,14 @@ class ChoicePlanner(ABC):
         """Subtasks that are this assistant's: every `of`-th."""
         return list(self.book.instructions)[self.number :: self.of]
 
-    def seen(self, view: ObservationView) -> dict[int, RememberedSighting]:
+    def last_sightings(self, view: ObservationView) -> dict[int, RememberedSighting]:
         """Return, by subtask, where what it is about was seen last, if it may still be there."""
         now = float(view.state["time"])
         found: dict[int, RememberedSighting] = {}
         for k, told in self.book.instructions.items():
             if not self.book.is_open(k):
                 continue
-            names = [told["person"]["name"]] if self.book.category(k) == "carry" else self.book.wanted(k)
+            names = [told["person"]["name"]] if self.book.category(k) == "carry" else self.book.missing_names(k)
             for name in names:
                 thing = self.skills.seen.last_seen(name)
                 if thing is None or not self.book.is_wanted(k, thing):

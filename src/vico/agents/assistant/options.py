@@ -224,7 +224,7 @@ class PickUp:
         """Return the next action."""
         if self._asked:
             self._asked = False
-            if self.target.entity in view.held:
+            if self.target.entity in view.hands:
                 self.outcome = "picked"
                 return None
             self._tries += 1
@@ -238,11 +238,11 @@ class PickUp:
             if action is not None:
                 return action
             self._walk = None
-        if all(view.held):
+        if all(view.hands):
             self.outcome = "hands full"
             return None
         self._asked = True
-        return {"type": "pick", "hand": view.held.index(0), "object": self.target.entity}
+        return {"type": "pick", "hand": view.hands.index(0), "object": self.target.entity}
 
 
 _LONGEST = 50  # steps after which one gives up
@@ -317,7 +317,7 @@ class PutDown:
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action."""
         mine = self._entities
-        full = [hand for hand, entity in enumerate(view.held) if entity and (mine is None or entity in mine)]
+        full = [hand for hand, entity in enumerate(view.hands) if entity and (mine is None or entity in mine)]
         if not full:
             self.outcome = "empty hands"
             return None
@@ -334,7 +334,7 @@ class PutDown:
         """Put a thing on the surface that is named; else ahead, in one direction after the other."""
         if self._put:
             self._put = False
-            if view.refused and self._on:
+            if view.was_refused and self._on:
                 self._on = False  # there is no room on it: beside it, then
             else:
                 self._bearing, self._aimed = self._bearing + 1, False

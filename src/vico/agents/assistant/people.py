@@ -66,7 +66,7 @@ class Meet(FieldState):
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action."""
-        held = sum(entity > 0 for entity in view.held)
+        held = sum(entity > 0 for entity in view.hands)
         if self._before is None:
             self._before = held
         self._steps += 1

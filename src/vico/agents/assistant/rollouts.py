@@ -388,15 +388,15 @@ class SituationBuilder:
             Seconds to the end.
         """
         here = (float(view.pose[0]), float(view.pose[1]))
-        return self._made(subtasks, here, view, seen, left)
+        return self._situation_of(subtasks, here, view, seen, left)
 
     def from_point(
         self, subtasks: Sequence[int], point: Point, view: ObservationView, left: float
     ) -> tuple[Situation, list[Choice]]:
         """Return the situation of somebody at a point who knows what was told alone."""
-        return self._made(subtasks, point, view, {}, left)
+        return self._situation_of(subtasks, point, view, {}, left)
 
-    def _made(
+    def _situation_of(
         self,
         subtasks: Sequence[int],
         here: Point,
@@ -414,7 +414,9 @@ class SituationBuilder:
         points = list(dict.fromkeys([here, *(spot.point for spot in spots), *(end for end in ends if end)]))
         index = {point: i for i, point in enumerate(points)}
         travel = np.array([[self._seconds(a, b, here) for b in points] for a in points], np.float64)
-        load = [max(held[k], len(self.book.wanted(k)), 1) if self.book.category(k) != "search" else 0 for k in tasks]
+        load = [
+            max(held[k], len(self.book.missing_names(k)), 1) if self.book.category(k) != "search" else 0 for k in tasks
+        ]
         situation = Situation(
             travel=travel.reshape(len(points), len(points)),
             spot_point=np.array([index[spot.point] for spot in spots], np.int64),
@@ -429,7 +431,7 @@ class SituationBuilder:
             put=np.array([PUT * n + self._doors(k) for k, n in zip(tasks, load, strict=True)], np.float64),
             load=np.minimum(np.array(load, np.int64), 2),
             stage=np.array([IN_HAND if held[k] else OPEN for k in tasks], np.int64),
-            hands=view.held.count(0),
+            hands=view.hands.count(0),
             left=left,
         )
         return situation, [spot.choice for spot in spots] + [Choice("deliver", k) for k in tasks]

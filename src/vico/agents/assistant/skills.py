@@ -64,12 +64,12 @@ class ObservationView:
         return self.state["place"] or None
 
     @property
-    def held(self) -> list[int]:
+    def hands(self) -> list[int]:
         """Entities in the hands, 0 where one is free."""
         return [int(entity or 0) for entity in self.state["held"]]
 
     @property
-    def refused(self) -> bool:
+    def was_refused(self) -> bool:
         """Whether the last action was refused."""
         return str(self.state["action_status"]) == "refused"
 
@@ -115,7 +115,7 @@ class AssistantSkills(FieldState):
     def notice(self, view: ObservationView) -> None:
         """Take in a new observation: what stands where, what was seen, and the way one came."""
         self.navigator.notice(
-            dict(view.observation), dict(view.info), ignore=[entity for entity in view.held if entity]
+            dict(view.observation), dict(view.info), ignore=[entity for entity in view.hands if entity]
         )
         self.seen.notice(view.observation, view.things)
         room = view.room
@@ -145,8 +145,8 @@ class AssistantSkills(FieldState):
         place = self.map.place_by_id[place_id]
         door = place.entrance or place.position
         at_door = view.away(door) <= ENTER_REACH
-        if at_door and not (view.refused and self._tries > 3):
-            self._tries = self._tries + 1 if view.refused else 1
+        if at_door and not (view.was_refused and self._tries > 3):
+            self._tries = self._tries + 1 if view.was_refused else 1
             return {"type": "enter", "place": place_id}
         self._tries = 0
         # The spot before it that maps show may lie a little too far off.

@@ -128,8 +128,8 @@ class MctsPlanner:
         best, best_reward = root, self._reward(root, question)
         low = best_reward
         for _ in range(self._settings.iterations):
-            node = self._selected(root, question, best_reward - low or 1.0)
-            node = self._expanded(node, question, chance)
+            node = self._select(root, question, best_reward - low or 1.0)
+            node = self._expand(node, question, chance)
             value = self._reward(node, question)
             low = min(low, value)
             if value > best_reward:
@@ -150,7 +150,7 @@ class MctsPlanner:
     def _reward(self, node: Node, question: CommuteQuery) -> float:
         return -node.seconds - self._settings.alpha * math.dist(node.point, question.goal)
 
-    def _selected(self, node: Node, question: CommuteQuery, scale: float) -> Node:
+    def _select(self, node: Node, question: CommuteQuery, scale: float) -> Node:
         """Go down to a node that has moves left to try, by UCB1."""
         while True:
             if node.untried is None:
@@ -166,7 +166,7 @@ class MctsPlanner:
                 ),
             )
 
-    def _expanded(self, node: Node, question: CommuteQuery, chance: np.random.Generator) -> Node:
+    def _expand(self, node: Node, question: CommuteQuery, chance: np.random.Generator) -> Node:
         if not node.untried:
             return node
         move = node.untried.pop(int(chance.integers(len(node.untried))))

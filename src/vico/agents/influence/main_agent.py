@@ -124,7 +124,7 @@ class Courtship:
         talk.said.append(said)
         return f"{self._address[talk.target]}! {said[0].upper()}{said[1:]}"
 
-    def heard(self, answer: str) -> None:
+    def note_answer(self, answer: str) -> None:
         """Note what the member answered."""
         self.talks[-1].answers.append(shorten(answer, _LONGEST))
 
@@ -235,7 +235,11 @@ class MainAgent:
             return self._give_up(time, self._visitor.failure)
         if step is not None and time > self._until:
             return self._give_up(time, "not found" if self._visitor.is_there else "not reached")
-        return self._begin(observation, info, time) if step is None else step
+        if step is not None:
+            return step
+        self._talks = True
+        self.courtship.begin(self._target, time % DAY)
+        return self._say(observation, info, time)
 
     def state(self) -> AgentState:
         """Return all it remembers."""
@@ -275,18 +279,13 @@ class MainAgent:
         self.courtship.set_out(target, stay.place, of_day)
         return True
 
-    def _begin(self, observation: Observation, info: Info, time: float) -> Action:
-        self._talks = True
-        self.courtship.begin(self._target, time % DAY)
-        return self._say(observation, info, time)
-
     def _talk(self, observation: Observation, info: Info, time: float) -> Action:
         """Wait for the answer, then say the next thing."""
         answers = [
             e["text"] for e in observation["events"] if e["speaker"] == self._target and e["time"] >= self._spoke_at
         ]
         if answers:
-            self.courtship.heard(answers[-1])
+            self.courtship.note_answer(answers[-1])
             if _ON_THE_WAY in answers[-1].lower():
                 return self._break_off(time, "on the way")
             return self._say(observation, info, time)

@@ -60,14 +60,14 @@ class CourtedMember(FieldState):
         return -math.inf if self._is_busy else self._follower.walks_until
 
     @property
-    def known(self) -> Collection[str]:
+    def acquaintances(self) -> Collection[str]:
         """Agents it would greet."""
-        return self._follower.known
+        return self._follower.acquaintances
 
     @property
-    def greeted(self) -> Mapping[str, float]:
+    def greeting_times(self) -> Mapping[str, float]:
         """When it last spoke with agents, seconds."""
-        return self._follower.greeted
+        return self._follower.greeting_times
 
     @property
     def encounters(self) -> int:

@@ -600,7 +600,7 @@ class ArmWorker:
         self._begin(ArmTask.FOLD, self._job.target, self._job.entity)
         self._job.enter(ArmStage.CARRY)
 
-    def moved(self, servos: Array) -> None:
+    def set_servos(self, servos: Array) -> None:
         """Take in where somebody else has told the servos to be meanwhile, rad and metres, shape ``(9,)``."""
         self._job.servos, self._job.knows = np.array(servos, np.float64), True
 

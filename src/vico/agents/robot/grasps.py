@@ -285,14 +285,14 @@ class HeldObject(NamedTuple):
         axes = np.array([[-s, c], [c, s]])
         return ObjectBox(self.middle, axes, self.half, -self.below, self.above - _PAD_CLEARANCE)
 
-    def turned(self, turn: float) -> Array:
+    def rotation_after_turn(self, turn: float) -> Array:
         """Return the rotation of the hand with the thing turned about the vertical, rad, shape ``(3, 3)``."""
         return product(_rotation_about_vertical(turn), self.rotation)
 
     def pose_over(self, spot: Array, turn: float) -> Array:
         """Return the pose of the hand with which the middle of the thing's underside is at a spot."""
         off = apply_matrix(np.array([*self.middle, -self.below]), _rotation_about_vertical(turn))
-        return np.column_stack([self.turned(turn), spot - off])
+        return np.column_stack([self.rotation_after_turn(turn), spot - off])
 
 
 def is_slender(half: float, height: float) -> bool:

@@ -228,7 +228,7 @@ class PushTrip(FieldState):
         action = self._pusher.act(observation)
         if not self._pusher.busy:
             if isinstance(self._worker, ArmWorker):
-                self._worker.moved(self._pusher.servos)
+                self._worker.set_servos(self._pusher.servos)
             came = self._pusher.outcome == "pushed"
             self.is_there = came and self._brings and ground_distance(self._pusher.thing, self._goal) < GOAL_RADIUS
         return action

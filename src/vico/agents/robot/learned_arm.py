@@ -270,7 +270,7 @@ class LearnedArm:
             self._worker.held = object_in_jaw(self.body, angles[:7].copy(), thing.as_box(), float(angles[7:].min()))
         elif thing is not None:
             self._worker.held = None
-        self._worker.moved(self._servos)
+        self._worker.set_servos(self._servos)
         self._worker.fold()
         self._next(PolicyStage.FOLD)
         return self._hold()

@@ -159,7 +159,7 @@ class ResidentMemory:
         if self._visits and self._visits[-1].until is None:
             self._visits[-1] = replace(self._visits[-1], until=time)
 
-    def seen(self, agent: str) -> SeenPerson | None:
+    def last_seen(self, agent: str) -> SeenPerson | None:
         """Return when and where somebody was seen last; None if they were not."""
         self.settle()
         found = self._people.get(agent)
@@ -172,7 +172,7 @@ class ResidentMemory:
         return self._people.keys()
 
     @property
-    def heard(self) -> Sequence[HeardMessage]:
+    def messages(self) -> Sequence[HeardMessage]:
         """What was said, in order."""
         return self._heard
 

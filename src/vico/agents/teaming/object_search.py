@@ -106,7 +106,7 @@ class Spotter:
         if not self._asked:
             point = self.viewpoints[self._view % len(self.viewpoints)]
             return self._ask(point, _HEIGHTS[self._level])
-        if self._refused(observation):
+        if self._was_refused(observation):
             self._level += 1
             if self._level == len(_HEIGHTS):
                 self._go_on()
@@ -133,7 +133,7 @@ class Spotter:
             off = here.position[:2] - self.found
             far = max(float(np.hypot(*off)), 1e-6)
             return self._ask(self.found + off * min(_OFF, far) / far, _CLOSER)
-        if self._refused(observation):
+        if self._was_refused(observation):
             self._next(SpotterStage.TELL)
             return {"type": "stop"}
         if not self._is_there(observation):
@@ -179,7 +179,7 @@ class Spotter:
         self._asked, self._clock = True, 0.0
         return {"type": "fly_to", "target": self._aim.tolist()}
 
-    def _refused(self, observation: Observation) -> bool:
+    def _was_refused(self, observation: Observation) -> bool:
         return self._clock <= 1.5 * self.period and observation["state"]["action_status"] == "refused"
 
     def _is_there(self, observation: Observation) -> bool:

@@ -278,7 +278,7 @@ class ThingPlacer:
         """Give a thing to somebody who holds it from the start; `near` is where they are expected."""
         return self._add(name, kind, near, room=None, holder=holder)
 
-    def described(self, names: Sequence[str]) -> str:
+    def describe(self, names: Sequence[str]) -> str:
         """Return things in words: a red bag and a blue cup."""
         things = [thing for thing in self.made if thing.id in names]
         return " and ".join(movable_kinds()[thing.kind].described(thing.colour) for thing in things)

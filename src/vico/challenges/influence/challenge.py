@@ -158,7 +158,7 @@ def _talk(day: Day, mover: Mover, target: str, time: float, plans: dict[str, Day
         if answer is None or gone:
             mover.courtship.break_off(time, "on the way" if gone else "no answer")
             return time
-        mover.courtship.heard(answer)
+        mover.courtship.note_answer(answer)
 
 
 def time_line(day: Day) -> list[str]:

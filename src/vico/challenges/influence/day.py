@@ -201,10 +201,10 @@ class Ledger:
         """
         text = text[:LONGEST_TEXT]
         conversation, number = self._place_of(time, speaker, member)
-        ignored = self._ignored(time, distance, on_the_way, number)
+        ignored = self._reason_to_ignore(time, distance, on_the_way, number)
         message = HeardMessage(time, speaker, member, text, conversation, number)
         reception = self.model.reception(message, self.heard)
-        answer = self._said(message, ignored, reception)
+        answer = self._reply(message, ignored, reception)
         if ignored in ("", "enough"):
             self.heard.append(message)
             self.receptions.append(reception)
@@ -239,7 +239,7 @@ class Ledger:
             return last.conversation + 1, 0
         return last.conversation, last.round + 1
 
-    def _ignored(self, time: float, distance: float, on_the_way: bool, number: int) -> Ignored:
+    def _reason_to_ignore(self, time: float, distance: float, on_the_way: bool, number: int) -> Ignored:
         if time > self._ends:
             return "day over"
         if distance > TALKING_DISTANCE:
@@ -248,7 +248,7 @@ class Ledger:
             return "on the way"
         return "enough" if number >= ROUNDS else ""
 
-    def _said(self, message: HeardMessage, ignored: Ignored, reception: float) -> str | None:
+    def _reply(self, message: HeardMessage, ignored: Ignored, reception: float) -> str | None:
         if ignored in ("too far", "day over"):
             return None
         listener, speaker = self.model.profiles[message.listener], self.model.profiles[message.speaker]
@@ -258,13 +258,13 @@ class Ledger:
         if ignored:
             return line("on_the_way" if ignored == "on the way" else "enough")
         if self.language is not None:
-            told = self._asked(message, listener, speaker)
+            told = self._ask_model(message, listener, speaker)
             if told is not None:
                 return told
         words = line(self.model.tone(reception))
         return f"{words} {line(self._stance(message, rival, reception))}" if message.round == ROUNDS - 1 else words
 
-    def _asked(self, message: HeardMessage, listener: Profile, speaker: Profile) -> str | None:
+    def _ask_model(self, message: HeardMessage, listener: Profile, speaker: Profile) -> str | None:
         assert self.language is not None
         said = [*self.talks_of(listener.id, speaker.id), {"speaker": speaker.id, "said": message.text, "answer": ""}]
         told = self.language.answer(listener, speaker, list(said))

@@ -129,7 +129,8 @@ class AssistantTask:
             reward += self._potential - before
         over = self._judge.over
         cut = not over and not self.env.agents
-        info: dict[str, Any] = {"done": self._done, "reported": self._reported()}
+        reported = sum(verdict is not None for verdict in self._judge.verdicts)
+        info: dict[str, Any] = {"done": self._done, "reported": reported}
         if over or cut:
             info["is_success"] = all(self._judge.final())
         return TaskStep(self._result, reward, terminated=over, truncated=cut, info=info)
@@ -177,15 +178,12 @@ class AssistantTask:
             f"Hello {split_name(subtask.person.name)[1]}! May I help?" for subtask in self._task.subtasks[:SUBTASKS]
         ]
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the instructions, as planners get them."""
         return {"instructions": self._task.instructions()}
 
     def _count(self) -> int:
         return sum(self._judge.final())
-
-    def _reported(self) -> int:
-        return sum(verdict is not None for verdict in self._judge.verdicts)
 
     def _open(self) -> list[int]:
         return [k for k, verdict in enumerate(self._judge.verdicts) if verdict is None]

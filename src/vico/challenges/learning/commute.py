@@ -235,7 +235,7 @@ class CommuteTaskEnv:
         """Nothing is said."""
         return []
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the day."""
         start = clock_of(self._day.appointments[0].end)
         return {"instructions": self._day.instructions(), "starts": start}

@@ -94,7 +94,7 @@ class PointGoal:
     def begin(self, seed: int) -> StepResult:
         """Draw start and goal."""
         chance = rng(seed, "point goal", self.env.world.digest)
-        start, self._goal = self._drawn(chance)
+        start, self._goal = self._draw(chance)
         yaw = float(chance.uniform(-math.pi, math.pi))
         if self.options.robot:
             self.env.arrange(robot_places={self.agent: (float(start[0]), float(start[1]), yaw)})
@@ -135,14 +135,14 @@ class PointGoal:
         """Nothing is said."""
         return []
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the point, ENU metres."""
         return {"instructions": f"Go to the point {self._goal[0]:.1f} m east, {self._goal[1]:.1f} m north."}
 
     def _position(self, result: StepResult) -> NDArray[np.float64]:
         return np.asarray(result.observations[self.agent]["pose"][:2], np.float64)
 
-    def _drawn(self, chance: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _draw(self, chance: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Draw start and goal, and find the ways to the goal."""
         walkable, options = self.env.world.walkable, self.options
         room = 1.0 if options.robot else 0.5

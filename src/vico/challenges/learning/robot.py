@@ -231,7 +231,7 @@ class RobotTaskWorld:
         person = next((one.position for one in around.people if one.name in names), None)
         told.append([0.0] * DIRECTION if person is None else direction(person, pose, yaw))
         told.append(direction(self.bodies()[int(name == MANIPULATOR)], pose, yaw))
-        return np.concatenate([*told, self._seen(observation, info)]).astype(np.float32)
+        return np.concatenate([*told, self._thing_numbers(observation, info)]).astype(np.float32)
 
     def bodies(self) -> NDArray[np.float64]:
         """Return where the robots are, ENU metres, shape ``(2, 3)``."""
@@ -239,7 +239,7 @@ class RobotTaskWorld:
         assert robots is not None
         return np.asarray(robots.bodies().position, np.float64)
 
-    def _seen(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> NDArray[np.float64]:
+    def _thing_numbers(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> NDArray[np.float64]:
         if "depth" not in observation or "segmentation" not in observation:
             return np.zeros(GOAL["thing"])
         named = (int(e) for e, about in info["entities"].items() if about.get("name") == self.task.thing.name)
@@ -305,7 +305,7 @@ class RobotWork:
         """Nothing is said."""
         return []
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the instructions, as robots of the challenge get them."""
         return {"instructions": self.stage.task.instruction()}
 
@@ -421,9 +421,11 @@ class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
         """
         if seed is not None:
             self._random = rng(seed, "robot team episodes")
-        number, result = begin_episode(self._begin, seed, tasks=self._tasks, random=self._random)
+        number, result = begin_episode(
+            lambda number: self.stage.begin(number, {}), seed, tasks=self._tasks, random=self._random
+        )
         self.agents = list(self.possible_agents)
-        return self._told(result, {"task": number, "instructions": self.stage.task.instruction()})
+        return self._results_for(result, {"task": number, "instructions": self.stage.task.instruction()})
 
     def step(
         self, actions: Mapping[str, Any]
@@ -449,7 +451,7 @@ class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
         if over or cut:
             self.agents = []
             info |= {"is_success": stage.success and usable, "cause": cause}
-        observations, infos = self._told(stage.result, info)
+        observations, infos = self._results_for(stage.result, info)
         return (
             observations,
             dict.fromkeys(names, reward),
@@ -471,10 +473,9 @@ class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
         self.stage.env.close()
         self.agents = []
 
-    def _begin(self, number: int) -> StepResult:
-        return self.stage.begin(number, {})
-
-    def _told(self, result: StepResult, more: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    def _results_for(
+        self, result: StepResult, more: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Return what each is told; in the array form infos hold numbers alone, which libraries make tensors of."""
         observations: dict[str, Any] = {}
         infos: dict[str, dict[str, Any]] = {}

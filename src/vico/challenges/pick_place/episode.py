@@ -357,12 +357,14 @@ def demonstrate(
     task = draw_task(seed, world, seconds=seconds)
     count = 0
 
-    def told(observation: Observation) -> None:
+    def count_observation(observation: Observation) -> None:
         nonlocal count
         if seen is not None:
             seen(count, observation)
         count += 1
 
-    played = play(task, world, Demonstrator(period=PERIOD), side=max(side, SIDE), seen=told, to_the_end=True)
+    played = play(
+        task, world, Demonstrator(period=PERIOD), side=max(side, SIDE), seen=count_observation, to_the_end=True
+    )
     largest = np.abs(played.actions).max(axis=1, initial=0.0)
     return DemonstratedEpisode(task, played, np.flatnonzero(largest >= drop_below))

@@ -86,7 +86,7 @@ class TeamingJudge(Hook):
         second = self._seconds() - self._start
         if int(second) > self._looked and not self.fallen:
             self._looked = int(second)
-            self.rules.look(self._seen(step, second))
+            self.rules.look(self._sample(step, second))
             self._said = []
 
     @property
@@ -103,7 +103,7 @@ class TeamingJudge(Hook):
         """Return why it failed; "" if it did not."""
         return FALLEN if self.fallen else self.rules.cause()
 
-    def _seen(self, step: Step, second: float) -> JudgeSample:
+    def _sample(self, step: Step, second: float) -> JudgeSample:
         task, positions = self.task, self.robots.bodies().position
         walks = task.walk is not None
         who = task.person.agent
@@ -117,10 +117,10 @@ class TeamingJudge(Hook):
             outdoors=walks and self.truth.agent_room(who) is None,
             said=tuple(self._said),
             thing=thing,
-            shown=self._shown(step),
+            shown=self._pixels_shown(step),
         )
 
-    def _shown(self, step: Step) -> tuple[int, ...]:
+    def _pixels_shown(self, step: Step) -> tuple[int, ...]:
         """Return how many pixels of the thing each robot sees that is near enough."""
         if self.task.thing is None:
             return ()

@@ -279,7 +279,7 @@ class ArmController:
         joints = np.append(moment.joints[:7], moment.joints[7:9].mean())[None]
         before = joints if self._targets is None else self._targets
         action = np.asarray(self._policy(self.observation(moment)), np.float64)
-        self._targets = self._motors.moved(before, joints, action)
+        self._targets = self._motors.move_targets(before, joints, action)
         return np.append(self._targets[0], self._targets[0, JAW])
 
     def observation(self, moment: ArmState) -> NDArray[np.float32]:
@@ -433,7 +433,7 @@ class ScriptedExpert:
         """Return whether the stage is over, as the way is."""
         self._waited += 1
         if self.stage is ExpertPhase.CLOSE:
-            self._pressed = self._pressed + 1 if bool(r.gripped[0]) else 0
+            self._pressed = self._pressed + 1 if bool(r.is_gripped[0]) else 0
             return self._pressed >= _PRESSES or self._waited > _CLOSING
         if self.stage is ExpertPhase.OPEN:
             return bool(r.joints[0, JAW] > self._opening - 0.004) or self._waited > _CLOSING

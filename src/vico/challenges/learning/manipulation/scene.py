@@ -289,7 +289,7 @@ class Motors(NamedTuple):
     high: Array
     step: Array
 
-    def moved(self, targets: Array, joints: Array, actions: Array) -> Array:
+    def move_targets(self, targets: Array, joints: Array, actions: Array) -> Array:
         """Return targets moved by actions, within bounds and not far ahead of the joints; shape ``(n, 8)`` each."""
         wanted = targets + np.clip(actions, -1.0, 1.0) * self.step
         ahead = np.append(np.full(7, _AHEAD), _PAST)

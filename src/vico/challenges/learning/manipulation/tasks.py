@@ -81,7 +81,7 @@ def paper_reward(r: Readings, terms: Collection[str]) -> Array:
         total -= np.minimum(r.goal_distance, PAPER_FARTHEST) * PAPER_METRE
     if "grasp" in terms:
         height = r.thing[:, 2] - r.surface
-        total += PAPER_GRASP * ((height > 2.0 * 2.0 * r.height_half) & r.gripped)
+        total += PAPER_GRASP * ((height > 2.0 * 2.0 * r.height_half) & r.is_gripped)
     if "place" in terms:
         total += PAPER_PLACE * (r.at_goal == STAY)
     return total
@@ -138,7 +138,7 @@ def lifting_share(r: Readings) -> Array:
     """Return how far a gripped box has been lifted and is held still, from 0 to 1."""
     up = share_between(r.clearance, 0.0, 0.15)
     still = (r.clearance > LIFTED) * nearness(r.thing_speed[:, 0], 0.25)
-    return np.asarray(r.gripped * (0.6 * up + 0.4 * still))
+    return np.asarray(r.is_gripped * (0.6 * up + 0.4 * still))
 
 
 def carrying_share(r: Readings) -> Array:
@@ -147,7 +147,7 @@ def carrying_share(r: Readings) -> Array:
     there = share_between(-level, -0.12, -0.03)
     high = there + (1.0 - there) * nearness(np.abs(r.goal[:, 2] + 0.1 - r.thing[:, 2]), 0.1)
     low = there * nearness(np.abs(r.clearance), 0.06)
-    return np.asarray(r.gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * low))
+    return np.asarray(r.is_gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * low))
 
 
 def is_placed(r: Readings) -> Bools:
@@ -192,13 +192,13 @@ def begin_lift(chance: np.random.Generator, options: ManipulationOptions) -> Epi
 def evaluate_lift(r: Readings) -> dict[str, Bools]:
     """Say what of the rule holds."""
     lifted, slow = r.clearance >= LIFTED, r.thing_speed[:, 0] < _LIFT_SLOW
-    return {"gripped": r.gripped, "lifted": lifted, "still": slow, "success": r.gripped & lifted & slow}
+    return {"gripped": r.is_gripped, "lifted": lifted, "still": slow, "success": r.is_gripped & lifted & slow}
 
 
 def staged_lift_reward(r: Readings) -> Array:
     """Return the staged reward: once the box is gripped, all of the approach counts as done."""
-    before = np.where(r.gripped, 1.0, approach_share(r))
-    grip = np.where(r.gripped, 1.0, closing_share(r))
+    before = np.where(r.is_gripped, 1.0, approach_share(r))
+    grip = np.where(r.is_gripped, 1.0, closing_share(r))
     return np.asarray(0.25 * before + 0.25 * grip + 0.5 * lifting_share(r))
 
 
@@ -234,13 +234,13 @@ def begin_pick_place(chance: np.random.Generator, options: ManipulationOptions) 
 
 def evaluate_pick_place(r: Readings) -> dict[str, Bools]:
     """Say what of the rule holds."""
-    found = {"gripped": r.gripped, "was_lifted": r.was_lifted, "at_goal": r.goal_distance < NEAR}
+    found = {"gripped": r.is_gripped, "was_lifted": r.was_lifted, "at_goal": r.goal_distance < NEAR}
     return {**found, "released": ~r.touching, "success": is_placed(r) & r.was_lifted}
 
 
 def staged_pick_place_reward(r: Readings) -> Array:
     """Return the staged reward: lifting, and carrying once the box has been lifted."""
-    held_or_there = r.gripped | (r.goal_distance < NEAR)
+    held_or_there = r.is_gripped | (r.goal_distance < NEAR)
     later = r.was_lifted & held_or_there
     return np.asarray(np.where(later, 0.4 + 0.6 * staged_place_reward(r), 0.4 * staged_lift_reward(r)))
 
