@@ -140,7 +140,7 @@ def _restored_value(kind: Any, saved: Any) -> Any:
         return origin(
             {int(name) if parts[0] is int else name: _restored_value(parts[-1], one) for name, one in saved.items()}
         )
-    if isinstance(kind, type) and isinstance(saved, Mapping):
+    if isinstance(kind, type) and isinstance(saved, Mapping) and kind is not Any:
         return kind(**saved)
     return kind(saved) if isinstance(kind, type) and issubclass(kind, Enum) else saved
 
