@@ -604,7 +604,7 @@ class ArmWorker:
         """Take in where somebody else has told the servos to be meanwhile, rad and metres, shape ``(9,)``."""
         self._job.servos, self._job.knows = np.array(servos, np.float64), True
 
-    def lost(self, observation: Mapping[str, Any]) -> bool:
+    def has_lost(self, observation: Mapping[str, Any]) -> bool:
         """Return whether a jaw that held something feels it no more; then nothing is held.
 
         Asked once a period while there is no work for it.

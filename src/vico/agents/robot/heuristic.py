@@ -311,7 +311,7 @@ class Manipulator:
         for text in messages_from(observation, self.carrier):
             self.deck.hear(text)
             self._hear_of_it(parse_sighting(text))
-        if self.worker.lost(observation):
+        if self.worker.has_lost(observation):
             self._search_about(Stance.of(observation).position)
         if self._waits_to_say:
             return {"type": "communicate", "text": self._waits_to_say.pop(0)}

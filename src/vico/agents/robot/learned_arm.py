@@ -154,9 +154,9 @@ class LearnedArm:
         self._worker.fold()
         self._next(PolicyStage.FOLD)
 
-    def lost(self, observation: Mapping[str, Any]) -> bool:
-        """Return whether a jaw that held something feels it no more; see `ArmWorker.lost`."""
-        return not self.busy and self._worker.lost(observation)
+    def has_lost(self, observation: Mapping[str, Any]) -> bool:
+        """Return whether a jaw that held something feels it no more; see `ArmWorker.has_lost`."""
+        return not self.busy and self._worker.has_lost(observation)
 
     # What it does.
 
