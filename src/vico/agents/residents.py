@@ -46,7 +46,7 @@ class BatchResident(Protocol):
 
     @property
     def encounters(self) -> int:
-        """Changes whenever `greeted` does."""
+        """Changes whenever `greeting_times` does."""
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""

@@ -71,7 +71,7 @@ class CourtedMember(FieldState):
 
     @property
     def encounters(self) -> int:
-        """Changes whenever `greeted` does."""
+        """Changes whenever `greeting_times` does."""
         return self._follower.encounters
 
     @property
