@@ -58,13 +58,13 @@ def test_some_of_those_at_leisure_go_to_a_concert_and_look_at_the_stage() -> Non
     info = {"weather": FAIR, "events": [event | {"position": [20.0, -20.0, 0.0]}]}
     plans = [DayPlanChanges(public, [stay], seed=seed, name=ME) for seed in range(40)]
     there = [plan.place_of(stay, info, "") for plan in plans]
-    comes = [plan.watched(place) is not None for plan, place in zip(plans, there, strict=True)]
+    comes = [plan.point_to_watch(place) is not None for plan, place in zip(plans, there, strict=True)]
     assert 8 <= sum(comes) <= 24
     away = [np.hypot(*(np.array(place.position[:2]) - HERE[:2])) for place in there]
     assert all((distance <= 14.0) == here for distance, here in zip(away, comes, strict=True))
     # In the rain those who mind it don't, and afterwards nobody is there.
     wet = info | {"weather": DOWNPOUR}
-    assert not any(plan.watched(plan.place_of(stay, wet, "")) for plan in plans)
+    assert not any(plan.point_to_watch(plan.place_of(stay, wet, "")) for plan in plans)
     over = {"weather": FAIR, "events": [info["events"][0] | {"goes_on": False}]}
     assert {plan.place_of(stay, over, "").id for plan in plans[:1]} <= {toy_city.PARK, toy_city.CAFE}
 

@@ -266,8 +266,8 @@ def test_conv_counts_those_who_first_preferred_the_other() -> None:
     before = {"sum": {"a": "x", "b": "y", "c": "y", "d": "y"}}
     after = {"sum": {"a": "y", "b": "x", "c": "x", "d": "y"}}
     verdict = evaluate.Verdict("x", before, after, frozenset({"b", "c"}))
-    assert verdict.won("sum") == (2, 4)
-    assert verdict.converted("sum") == (2, 3)
+    assert verdict.rankings_won("sum") == (2, 4)
+    assert verdict.rankings_converted("sum") == (2, 3)
     parts = evaluate.parts_of(verdict, {m: m for m in "abcd"}, "first", 60)
     assert [part.cause for part in parts] == ["lost to the rival", "", "", "never sought"]
     assert evaluate.metrics_of([verdict])["win"] == 50.0

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Literal
 
-from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation, heading, wrap_angle
 
 RestPosture = Literal["sit", "lie"]
 #: Return the next action on the way to a point, None within some metres of it: the point, those metres, and what is
@@ -97,7 +97,7 @@ _TILL_PATIENCE = 400.0
 _QUEUE_TOLERANCE = 0.35  # metres from one's spot in line
 
 
-class Buyer:
+class Buyer(FieldState):
     """Buys once for each errand.
 
     Parameters
@@ -106,22 +106,14 @@ class Buyer:
         Gets on within a room.
     """
 
+    _errand: str = ""
+    _since: float = -math.inf
+    _waits: bool = False
+    _asked: bool = False
+    _done: bool = False
+
     def __init__(self, walk: WalkAction) -> None:
         self._walk = walk
-        self._errand, self._since = "", -math.inf
-        self._waits = self._asked = self._done = False
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        since = None if math.isinf(self._since) else self._since
-        flags = {"waits": self._waits, "asked": self._asked, "done": self._done}
-        return {"errand": self._errand, "since": since} | flags
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._errand = str(state["errand"])
-        self._since = -math.inf if state["since"] is None else float(state["since"])
-        self._waits, self._asked, self._done = (bool(state[name]) for name in ("waits", "asked", "done"))
 
     def towards(self, errand: str, observation: Observation, info: Info) -> Action | None:
         """Return the next action of buying for an errand, a name of it; None once that is done or can't be."""
@@ -151,7 +143,7 @@ _COUNTER_PATIENCE = 150.0
 _AT_POST, _ALIGNED = 0.2, math.radians(8.0)
 
 
-class Clerk:
+class Clerk(FieldState):
     """Takes its place behind a till once for each shift, and looks over it.
 
     Parameters
@@ -160,20 +152,12 @@ class Clerk:
         Gets on within a room.
     """
 
+    _shift: str = ""
+    _since: float = -math.inf
+    serves: bool = False  # whether it stands where it serves
+
     def __init__(self, walk: WalkAction) -> None:
         self._walk = walk
-        self._shift, self._since = "", -math.inf
-        #: Whether it stands where it serves.
-        self.serves = False
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"shift": self._shift, "since": None if math.isinf(self._since) else self._since, "serves": self.serves}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._shift, self.serves = str(state["shift"]), bool(state["serves"])
-        self._since = -math.inf if state["since"] is None else float(state["since"])
 
     def towards(self, shift: str, observation: Observation, info: Info) -> Action | None:
         """Return the next action of a shift, a name of it; None where there is no free till, or no way to it."""

@@ -8,9 +8,12 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from enum import Enum
+from types import NoneType, UnionType
+from typing import Any, ClassVar, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -23,6 +26,7 @@ __all__ = [
     "Agent",
     "AgentState",
     "AgentUsage",
+    "FieldState",
     "FunctionAgent",
     "Goal",
     "GroupAgent",
@@ -66,12 +70,88 @@ def restore_generator(generator: np.random.Generator, state: Mapping[str, Any]) 
         raise InputError(f"agent: not a state of this random stream ({error}); restore it with the same vico") from None
 
 
+class FieldState:
+    """State that follows from fields: what a subclass annotates in its body is saved, and restored.
+
+    Fields are saved by name, without leading underscores, in the order in which they are declared: numbers, text,
+    enums, arrays, lists, sets, tuples and dicts of these, records, random streams, and objects that have a state. An
+    infinite number is saved as None, which stands for the value in the class's body. What is not to be saved is
+    annotated in ``__init__``.
+    """
+
+    def state(self) -> AgentState:
+        """Return all it remembers."""
+        return {name.lstrip("_"): _saved_value(getattr(self, name)) for name in _state_fields(type(self))}
+
+    def restore(self, state: AgentState) -> None:
+        """Remember what `state` returned."""
+        for name, kind in _state_fields(type(self)).items():
+            saved, own = state[name.lstrip("_")], getattr(self, name)
+            if isinstance(own, np.random.Generator):
+                restore_generator(own, saved)
+            elif hasattr(own, "restore"):
+                own.restore(saved)
+            else:
+                is_infinite = saved is None and kind is float
+                setattr(self, name, getattr(type(self), name) if is_infinite else _restored_value(kind, saved))
+
+
+_FIELDS: dict[type, dict[str, Any]] = {}  # by class, for hints are slow to look up
+
+
+def _state_fields(of: type) -> dict[str, Any]:
+    if of not in _FIELDS:
+        _FIELDS[of] = {name: kind for name, kind in get_type_hints(of).items() if get_origin(kind) is not ClassVar}
+    return _FIELDS[of]
+
+
+def _saved_value(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if isinstance(value, np.random.Generator):
+        return generator_state(value)
+    if isinstance(value, Enum):
+        return str(value)
+    if isinstance(value, float):
+        return None if math.isinf(value) else value
+    if hasattr(value, "state"):
+        return value.state()
+    if isinstance(value, set):
+        return sorted(value)
+    if isinstance(value, list | tuple):
+        return [_saved_value(one) for one in value]
+    if isinstance(value, Mapping):
+        return {str(name): _saved_value(one) for name, one in value.items()}
+    return value
+
+
+def _restored_value(kind: Any, saved: Any) -> Any:
+    """Return a saved value as an annotation has it: JSON has no tuples, sets, records, or keys that are numbers."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is UnionType:
+        return None if saved is None else _restored_value(next(one for one in parts if one is not NoneType), saved)
+    if origin is np.ndarray:
+        return np.array(saved, *get_args(parts[1]))
+    if origin in (list, set):
+        return origin(_restored_value(parts[0], one) for one in saved)
+    if origin is tuple:
+        return tuple(saved)
+    if origin in (dict, Counter):
+        return origin(
+            {int(name) if parts[0] is int else name: _restored_value(parts[-1], one) for name, one in saved.items()}
+        )
+    if isinstance(kind, type) and isinstance(saved, Mapping) and kind is not Any:
+        return kind(**saved)
+    return kind(saved) if isinstance(kind, type) and issubclass(kind, Enum) else saved
+
+
 Action = dict[str, Any]
 Observation = dict[str, Any]
 Info = dict[str, Any]
 
-# Of a plan that is told: so many goals, points and letters.
-_MOST_GOALS, _LONGEST_PATH, _LONGEST_WHY = 20, 500, 400
+_MOST_GOALS = 20  # goals of a plan that are told, at most
+_LONGEST_PATH = 500  # points of its path
+_LONGEST_WHY = 400  # characters of its reason
 
 HEADING_SLICE = slice(3, 5)  # of an observation's pose: east and north of the direction it looks along
 
@@ -200,7 +280,7 @@ def split_groups(agents: Mapping[str, Agent]) -> tuple[list[tuple[GroupAgent, li
     return list(groups.values()), alone
 
 
-class RandomAgent:
+class RandomAgent(FieldState):
     """Walks, turns, talks and goes through doors at random.
 
     Parameters
@@ -211,37 +291,31 @@ class RandomAgent:
         Of the run.
     """
 
+    _generator: np.random.Generator
+
     def __init__(self, name: str, *, seed: int = 0) -> None:
-        self._rng = rng(seed, "random agent", name)
+        self._generator = rng(seed, "random agent", name)
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return some action that makes sense where the agent is; two out of three are steps ahead."""
         state = observation["state"]
-        draw = float(self._rng.random())
+        draw = float(self._generator.random())
         if state["action_status"] == "collision" or draw < 0.2:
-            side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
-            return {"type": side, "degrees": float(self._rng.uniform(20.0, 160.0))}
+            side = "turn_left" if self._generator.random() < 0.5 else "turn_right"
+            return {"type": side, "degrees": float(self._generator.uniform(20.0, 160.0))}
         if draw < 0.25 and state["room"]:
             return {"type": "exit"}
         if draw < 0.25 and state["accessible_places"]:
             options = state["accessible_places"]
-            return {"type": "enter", "place": options[int(self._rng.integers(len(options)))]}
+            return {"type": "enter", "place": options[int(self._generator.integers(len(options)))]}
         if draw < 0.27:
             return {"type": "communicate", "text": "Hello!"}
         if draw < 0.32:
-            return {"type": ("drink", "eat", "wait")[int(self._rng.integers(3))]}
-        return {"type": "move_forward", "distance": float(self._rng.uniform(0.2, 1.2))}
-
-    def state(self) -> AgentState:
-        """Return where its stream of chance stands."""
-        return {"generator": generator_state(self._rng)}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on where another one was."""
-        restore_generator(self._rng, state["generator"])
+            return {"type": ("drink", "eat", "wait")[int(self._generator.integers(3))]}
+        return {"type": "move_forward", "distance": float(self._generator.uniform(0.2, 1.2))}
 
 
-def heading(observation: Observation) -> float:
+def heading(observation: Mapping[str, Any]) -> float:
     """Yaw an agent looks along, radians."""
     east, north = observation["pose"][HEADING_SLICE]
     return math.atan2(north, east)

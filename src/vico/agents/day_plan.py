@@ -316,7 +316,7 @@ class DayPlanChanges:
         _ = self.departures
         return self._departures[2]
 
-    def watched(self, place: PublicPlace) -> Point3 | None:
+    def point_to_watch(self, place: PublicPlace) -> Point3 | None:
         """Return the point that those look at who came to a place; None where there is none."""
         return next((one.watched for one in self._events.values() if one.place is place), None)
 

@@ -245,5 +245,8 @@ def fly(held: HeldInput, observation: Observation) -> Action:
     return {"type": "control", "space": "velocity", "vector": vector}
 
 
-# What robots are asked for at most; each clips it to what it can do. m/s and rad/s.
-_FASTEST, _FASTEST_TURN, _FASTEST_FLIGHT, _FASTEST_CLIMB = 2.0, 1.2, 6.0, 2.0
+# What robots are asked for at most; each clips it to what it can do.
+_FASTEST = 2.0  # m/s, on the ground
+_FASTEST_TURN = 1.2  # rad/s
+_FASTEST_FLIGHT = 6.0  # m/s, in the air
+_FASTEST_CLIMB = 2.0  # m/s, up and down

@@ -32,9 +32,9 @@ _ASIDE_MARGINS = ((PASSAGE, DOORWAY, PERSONAL), (0.27, 0.0, PERSONAL), (0.27, 0.
 _LET_PASS_MARGINS = ((0.8, 0.0, PERSONAL), (PASSAGE, 0.0, PERSONAL), (0.27, 0.0, PERSONAL), (0.27, 0.0, 0.7))
 # Metres between the points of a grid. Half a person's width and a little; and what will do where that leaves no way.
 _CELL, _WIDTHS = 0.1, (0.27, 0.252)
-# Middle to middle, metres, that one passes people at. Who comes towards one is passed on the right: such people are
-# taken to be so far to the left of where they are, metres, if they are no farther away than `_ONCOMING`.
-_PASSES, _LEFT, _ONCOMING = 0.55, 0.15, 2.5
+_PASSES = 0.55  # metres, middle to middle, at which one passes people
+_LEFT = 0.15  # metres to the left that oncoming people are taken to be: they are passed on the right
+_ONCOMING = 2.5  # metres within which people are oncoming
 # Ways keep this far from walls and furniture where there is room, metres; a step nearer to them counts as so many.
 _EASY, _NARROW_COSTS = 0.45, 2.0
 _CACHED_ROOMS = 128  # rooms
@@ -134,7 +134,10 @@ class RoomGrid:
         least = min(_WIDTHS[0], self.gap(one))
         if any(self.gap(point) < least for point in line):
             return False
-        return not len(people) or bool((_distances(line, people) >= _PASSES - 0.02).all())
+        if not len(people):
+            return True
+        away = np.hypot(*np.moveaxis(line[:, None] - people[None], -1, 0))
+        return bool((away >= _PASSES - 0.02).all())
 
     def _search(
         self, start: Area, wanted: NDArray[np.bool_], people: Area, bumps: Area, aim: Area, near: float
@@ -169,13 +172,9 @@ class RoomGrid:
         return min(max(round(u / _CELL), 0), columns - 1), min(max(round(v / _CELL), 0), rows - 1)
 
 
-def room_grid(room: Area, furniture: Area) -> RoomGrid:
-    """Return the ways of a room; those of the rooms asked for last are kept."""
-    return _cached_room_grid(np.ascontiguousarray(room).tobytes(), np.ascontiguousarray(furniture).tobytes())
-
-
 @lru_cache(maxsize=_CACHED_ROOMS)
 def _cached_room_grid(room: bytes, furniture: bytes) -> RoomGrid:
+    """Return the grid of a room, given the bytes of its arrays; those of the rooms asked for last are kept."""
     return RoomGrid(np.frombuffer(room), np.frombuffer(furniture).reshape(-1, 5))
 
 
@@ -191,16 +190,12 @@ def shift_oncoming_left(people: Area, position: Area, yaw: float) -> Area:
 
 def _rectangle_distances(box: Area, points: Area) -> Area:
     """Return signed distances from points to an oriented rectangle, metres."""
-    x, y, yaw, half_length, half_width = box
+    middle, yaw, half = box[:2], box[2], box[3:5]
     c, s = math.cos(yaw), math.sin(yaw)
-    dx, dy = points[..., 0] - x, points[..., 1] - y
-    u, v = np.abs(c * dx + s * dy) - half_length, np.abs(c * dy - s * dx) - half_width
+    dx, dy = np.moveaxis(points - middle, -1, 0)
+    u, v = np.abs(c * dx + s * dy) - half[0], np.abs(c * dy - s * dx) - half[1]
     outside = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
     return np.asarray(outside + np.minimum(np.maximum(u, v), 0.0))
-
-
-def _distances(points: Area, others: Area) -> Area:
-    return np.asarray(np.hypot(*np.moveaxis(points[:, None] - others[None], -1, 0)))
 
 
 @compiled
@@ -272,9 +267,9 @@ _REACH_OF_BUMPS = 0.4  # metres ahead of one's middle is what stopped a step
 _DRIFT, _NARROW = 0.08, 0.45
 # People are remembered for so many seconds after they were in view, and what stopped a step for so many.
 _PEOPLE_KEPT, _BUMPS_KEPT = 5.0, 30.0
-# Whom others are in the way of waits so many seconds before getting out of theirs: the later one by name steps aside
-# first. There one stays so long, unless the way is free sooner.
-_YIELDS, _YIELDS_LATE, _STAYS_ASIDE = 2, 8, 8
+_YIELDS = 2  # seconds that the later one by name waits until it makes way for others
+_YIELDS_LATE = 8  # seconds that others wait
+_STAYS_ASIDE = 8  # seconds that one stays aside, unless the way is free sooner
 _ASIDE_WITHIN = 4.0  # metres
 # Who gets no farther than this in so many seconds takes it that there is no way on there, metres and seconds.
 _NO_FARTHER, _GETS_NOWHERE = 0.6, 10.0
@@ -370,7 +365,9 @@ class IndoorWalker:
         if state["room"] != self._told_room:
             self._told_room, self._people, self._bumps = state["room"], {}, []
             self._anchor, self._waited, self._aside_until = (math.inf, math.inf, 0.0), 0, -math.inf
-        ways = room_grid(view.room, view.furniture)
+        ways = _cached_room_grid(
+            np.ascontiguousarray(view.room).tobytes(), np.ascontiguousarray(view.furniture).tobytes()
+        )
         self._people = {k: seen for k, seen in self._people.items() if time - seen[3] <= _PEOPLE_KEPT}
         self._bumps = [bump for bump in self._bumps if time - bump[2] <= _BUMPS_KEPT]
         for body in view:

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from vico.agents.base import AgentState
+from vico.agents.base import FieldState
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError, VicoError
 from vico.llm import Connection, LanguageModel, Sampling, Usage
 from vico.llm.prompts import Prompt
@@ -74,7 +74,7 @@ def episode_tokens(environ: Mapping[str, str] | None = None) -> int | None:
     return int(text)
 
 
-class ModelAccess:
+class ModelAccess(FieldState):
     """Asks a model for one agent.
 
     Parameters
@@ -94,28 +94,15 @@ class ModelAccess:
         Why nobody is asked any more; empty while the model answers.
     """
 
+    tokens: int = 0
+    cost: float = 0.0
+    faults: list[tuple[int, str]]
+    over: str = ""
+    _failed: int = 0  # questions in a row
+
     def __init__(self, model: LanguageModel, *, limit: int | None = None) -> None:
         self.model, self.limit = model, limit
-        self.tokens, self.cost = 0, 0.0
-        self.faults: list[tuple[int, str]] = []
-        self.over = ""
-        self._failed = 0  # questions in a row
-
-    def state(self) -> AgentState:
-        """Return what was spent, and what failed; the model itself is the owner's to give anew."""
-        return {
-            "tokens": self.tokens,
-            "cost": self.cost,
-            "faults": [[step, why] for step, why in self.faults],
-            "over": self.over,
-            "failed": self._failed,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on from what `state` returned."""
-        self.tokens, self.cost, self.over = int(state["tokens"]), float(state["cost"]), str(state["over"])
-        self.faults = [(int(step), str(why)) for step, why in state["faults"]]
-        self._failed = int(state["failed"])
+        self.faults = []
 
     def ask(
         self, prompt: Prompt, reply: type[T], inputs: Mapping[str, Any], *, step: int, check: Check[T] | None = None
@@ -139,7 +126,7 @@ class ModelAccess:
         try:
             found = self.model.ask(prompt.messages(**inputs), reply, check=check, rounds=_ROUNDS, spent=self._spend)
         except VicoError as error:
-            self._noted(error, step)
+            self._note_error(error, step)
             return None
         self._failed = 0
         return found.value
@@ -152,7 +139,7 @@ class ModelAccess:
         self.tokens += usage.tokens
         self.cost += usage.cost
 
-    def _noted(self, error: VicoError, step: int) -> None:
+    def _note_error(self, error: VicoError, step: int) -> None:
         """Note an error, and whether it is of any use to ask on."""
         if isinstance(error, LlmReplyError):
             self._failed = 0

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState
+from vico.agents.base import AgentState, heading
 from vico.agents.navigation.voxels import MOVING
 from vico.exact import apply_matrix
 from vico.io.compiled import compiled
@@ -208,14 +208,14 @@ class DepthGrid:
         a = np.asarray(start, np.float64)[:2]
         b = np.asarray(goal, np.float64)[:2]
         if radius not in self._blocked:
-            self._blocked[radius] = np.packbits(self._grown(radius))
+            self._blocked[radius] = np.packbits(self._grow_obstacles(radius))
         blocked = self._cells(self._blocked[radius])
         first = tuple(((a - self.corner) / self.cell).astype(int))
         aim = (b - self.corner) / self.cell
         reach = near / self.cell
         return self.corner + (_a_star(blocked, first, aim, reach) + 0.5) * self.cell
 
-    def _grown(self, radius: float) -> NDArray[np.bool_]:
+    def _grow_obstacles(self, radius: float) -> NDArray[np.bool_]:
         bumps = self._cells(self._bits)
         solid = bumps if self._hits is None else (self._hits >= 3) | bumps
         grown = solid.copy()
@@ -358,9 +358,9 @@ class SightingMemory:
         state = observation["state"]
         room, now = str(state["room"] or ""), float(state["time"])
         if room:
-            self._looks[room] = self._looks.get(room, 0) | _direction_bits(np.asarray(observation["pose"], np.float64))
+            self._looks[room] = self._looks.get(room, 0) | _direction_bits(heading(observation))
         for thing in things:
-            before = self._taken(thing.entity)
+            before = self._pop(thing.entity)
             pixels = thing.pixels
             if before is not None and math.dist(before.position, thing.position) < _SAME_PLACE:
                 pixels = max(pixels, before.pixels)
@@ -377,7 +377,7 @@ class SightingMemory:
     def _thing(self, entity: int) -> RememberedSighting | None:
         return self._rooms[self._room_of[entity]].get(entity) if entity in self._room_of else None
 
-    def _taken(self, entity: int) -> RememberedSighting | None:
+    def _pop(self, entity: int) -> RememberedSighting | None:
         room = self._room_of.pop(entity, None)
         return None if room is None else self._rooms[room].pop(entity)
 
@@ -405,7 +405,7 @@ class SightingMemory:
 
     def forget(self, entity: int) -> None:
         """Forget a thing: it was picked up, say."""
-        self._taken(entity)
+        self._pop(entity)
 
     def state(self) -> AgentState:
         """Return all of it."""
@@ -433,9 +433,8 @@ class SightingMemory:
         self._looks = {str(room): int(looks) for room, looks in state["looks"].items()}
 
 
-def _direction_bits(pose: NDArray[np.float64]) -> int:
+def _direction_bits(yaw: float) -> int:
     """Return the directions that a picture takes in, a bit each."""
-    yaw = math.atan2(pose[4], pose[3])
     bits = 0
     for k in range(VIEW_DIRECTIONS):
         away = (2 * math.pi * k / VIEW_DIRECTIONS - yaw + math.pi) % (2 * math.pi) - math.pi

@@ -212,7 +212,7 @@ def _follower_with_plan(
     return ScheduleFollower(_Homegoer(resident, plan), public_map, seed=seed, paces=(own, own))
 
 
-#: Names of those who may help begin so.
+#: Names of robots begin so.
 ROBOT_PREFIX = "robot_"
 #: What a robot says that has taken the thing up: nobody waits any longer.
 TAKEN_TEXT = "I have it."
@@ -249,7 +249,7 @@ class Depositor:
             return self._home.act(observation, info)
         state = observation["state"]
         time = float(state["time"])
-        heard = self._heard(observation)
+        heard = self._robot_messages(observation)
         self._called = self._called or any(is_called(self._resident.name, text) for text in heard)
         if any(state["held"]):
             return self._put(state) if self._called else {"type": "wait"}
@@ -268,7 +268,7 @@ class Depositor:
             return {"type": "turn_left", "degrees": _TURN_ASIDE}
         return {"type": "put", "hand": 0 if state["held"][0] else 1}
 
-    def _heard(self, observation: Observation) -> list[str]:
+    def _robot_messages(self, observation: Observation) -> list[str]:
         """Return what robots near by have said."""
         x, y = observation["pose"][:2]
         return [

@@ -37,16 +37,16 @@ class BatchResident(Protocol):
         """Time before which it goes on with `stride`."""
 
     @property
-    def known(self) -> Collection[str]:
+    def acquaintances(self) -> Collection[str]:
         """Agents it would greet."""
 
     @property
-    def greeted(self) -> Mapping[str, float]:
+    def greeting_times(self) -> Mapping[str, float]:
         """When it last spoke with agents, seconds."""
 
     @property
     def encounters(self) -> int:
-        """Changes whenever `greeted` does."""
+        """Changes whenever `greeting_times` does."""
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
@@ -81,7 +81,7 @@ class Residents:
         pairs = sorted(
             (k * n + self._number[other], other)
             for k, member in enumerate(self._members)
-            for other in member.known
+            for other in member.acquaintances
             if other in self._number
         )
         self._pairs = np.array([pair for pair, _ in pairs], np.int64)
@@ -174,7 +174,7 @@ class Residents:
             member = self._members[k]
             if member.encounters == self._encounters[k]:
                 continue
-            self._encounters[k], greeted = member.encounters, member.greeted
+            self._encounters[k], greeted = member.encounters, member.greeting_times
             for pair in range(self._first_pair[k], self._first_pair[k + 1]):
                 self._greeted[pair] = greeted.get(self._acquaintances[pair], _NEVER)
         self._changed.clear()

@@ -30,8 +30,10 @@ from vico.world.public import PublicMap, PublicPlace
 _MANY = 40
 # Open places are reached this close to their position, metres.
 _OPEN_REACH = 3.0
-# How often people at rest do something, seconds, and when it all comes round again.
-_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY = 6, 180, 90
+# All of it comes round again after `_ROUND`.
+_EAT_EVERY = 6  # seconds between two bites of somebody at rest
+_MOVE_EVERY = 180  # seconds between two movements
+_DRINK_EVERY = 90  # seconds between two sips
 _ROUND = math.lcm(_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY)
 # Those who came out for a walk or a run stay within this distance of the place, metres.
 _STROLL = 30.0
@@ -152,9 +154,9 @@ class ScheduleFollower:
         return action
 
     @property
-    def known(self) -> Collection[str]:
+    def acquaintances(self) -> Collection[str]:
         """Agents whom the resident knows."""
-        return self._conversation.known
+        return self._conversation.acquaintances
 
     @property
     def memory(self) -> ResidentMemory:
@@ -167,9 +169,9 @@ class ScheduleFollower:
         return self._conversation.encounters
 
     @property
-    def greeted(self) -> Mapping[str, float]:
+    def greeting_times(self) -> Mapping[str, float]:
         """When the resident last spoke with agents, seconds."""
-        return self._conversation.greeted
+        return self._conversation.greeting_times
 
     def has_arrived(self, time: float) -> bool:
         """Return whether it is where it means to be at a time, seconds: not on the way, and not about to leave."""
@@ -302,7 +304,7 @@ class ScheduleFollower:
             return up
         if time < self._paused_until:
             return self._rest(time, self._paused_until)
-        watched = self._changes.watched(place)
+        watched = self._changes.point_to_watch(place)
         if watched is not None:
             self._paused_until = time + int(self._rng.integers(20, 90))
             return {"type": "look_at", "target": list(watched)}

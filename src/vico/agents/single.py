@@ -43,11 +43,6 @@ def action_function(agents: Mapping[str, Agent]) -> Answers:
     return answers
 
 
-def residents_as_group(env: CommunityEnv, seed: int) -> Answers:
-    """Return what asks all residents that take part, who follow their schedules."""
-    return action_function(residents_of(env, seed))
-
-
 def make_single(
     world: WorldSource,
     community: CommunitySource = None,
@@ -71,7 +66,9 @@ def make_single(
         If there is no such agent, or the community belongs to another world.
     """
     given: EnvOptions = {"assistants": 1, "observe": (agent,), **options}
-    return SingleAgentEnv(make(world, community, **given), agent, others=residents_as_group)
+    return SingleAgentEnv(
+        make(world, community, **given), agent, others=lambda env, seed: action_function(residents_of(env, seed))
+    )
 
 
 def make_vec(

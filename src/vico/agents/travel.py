@@ -57,8 +57,9 @@ TURNING_CLEARANCE = 0.9
 # Room to walls that a bicycle needs, metres, at these points along it.
 _SIDE_CLEARANCE = 0.28
 _BICYCLE_SAMPLES = (-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6)
-# Steps of the search: degrees of a turn and metres of a ride, and how fine places are told apart.
-_TURN_STEP, _RIDE_STEP, _SEARCH_CELL = 15, 0.5, 0.25
+_TURN_STEP = 15  # degrees of a turn of the search
+_RIDE_STEP = 0.5  # metres of a ride of the search
+_SEARCH_CELL = 0.25  # metres within which places are the same to it
 _HEADINGS = 360 // _TURN_STEP
 _MAX_SEARCH_NODES = 1500
 # Where one gets on: on the spot or a step or two aside, as the rules of mounting have it.
@@ -126,7 +127,10 @@ def _search_manoeuvre(
             return None
         pose = queue.popleft()
         if walkable.clearance_of(pose[0], pose[1]) >= TURNING_CLEARANCE:
-            return _backtrack(before, pose)
+            path = [pose]
+            while (parent := before[_pose_key(path[-1])]) is not None:
+                path.append(parent)
+            return path[::-1]
         for onward in _next_poses(walkable, pose, heading):
             if _pose_key(onward) not in before:
                 before[_pose_key(onward)] = pose
@@ -162,17 +166,12 @@ def _pose_key(pose: _BicyclePose) -> tuple[int, int, int]:
     return round(pose[0] / _SEARCH_CELL), round(pose[1] / _SEARCH_CELL), pose[2]
 
 
-def _backtrack(before: dict[tuple[int, int, int], _BicyclePose | None], pose: _BicyclePose) -> list[_BicyclePose]:
-    found = [pose]
-    while (parent := before[_pose_key(found[-1])]) is not None:
-        found.append(parent)
-    return found[::-1]
-
-
-# This near to where one waits for a bus, or to a rack, is there, metres. At a stop something or others may stand in the
-# spot: then beside it will do, but not on the road or so near to the middle of a track, where one would keep the bus or
-# tram from coming up; the farther off only for who has got nowhere for some seconds.
-_AT_STOP, _BY_STOP, _BY_OTHERS, _AT_RACK = 0.3, 1.5, 4.0, 1.0
+# As near as this is there. Beside the spot will do, but not on the road or so near to the middle of a track that one
+# would keep the bus or tram from coming up.
+_AT_STOP = 0.3  # metres from where one waits for a bus
+_BY_STOP = 1.5  # metres, where something stands in that spot
+_BY_OTHERS = 4.0  # metres, among others and where one has got nowhere for some seconds
+_AT_RACK = 1.0  # metres from a rack
 _FROM_TRACK, _GETS_NOWHERE = TRAM_WIDTH / 2 + 0.8, 3
 # A bicycle is turned where there is so much room to walls, metres; straight on narrower ways will do.
 _TURNING = 1.0
@@ -436,11 +435,11 @@ class Traveller:
 
     def _begin(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
         """Plan a trip and begin it; None if there is none."""
-        self.trip, self._leg, self._tries = self._planned(goal, observation), 0, 0
+        self.trip, self._leg, self._tries = self._plan_trip(goal, observation), 0, 0
         self.plans += 1
         return self.trip
 
-    def _planned(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
+    def _plan_trip(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
         """Return the trip that is meant, if there is one in time; else the one that arrives first."""
         if self._planner is not None:
             return self._planner(observation, goal, (*self._closed, *self._ground))
@@ -583,14 +582,14 @@ class Traveller:
             trip = self._begin(goal, observation)
         leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
         if leg is not None and leg.mode == "bike" and leg.destination is None:
-            freed = self._freed(observation)
+            freed = self._free_bicycle(observation)
             return freed or self._walker.towards(leg.end, BIKE_SPEED, observation, info, room=_TURNING)
         end = leg.end if leg is not None and leg.mode == "bike" else self._nearest_station(observation)
         if end is None or _distance_to(observation, end) <= _TO_RACK:
             refused = self._asked == "exit_bike" and observation["state"]["action_code"] == _NO_FREE_SPOT
             if end is None or not refused:
                 return {"type": "exit_bike"}
-        freed = self._freed(observation)
+        freed = self._free_bicycle(observation)
         if freed is not None:
             return freed
         action = self._walker.towards(end, BIKE_SPEED, observation, info, room=_TURNING)
@@ -600,7 +599,7 @@ class Traveller:
             action = self._walker.towards(end, BIKE_SPEED, observation, info)
         return {"type": "exit_bike"} if action is None else action
 
-    def _freed(self, observation: Observation) -> Action | None:
+    def _free_bicycle(self, observation: Observation) -> Action | None:
         """Return what gets a bicycle out of a place where it can't be turned; None where it can."""
         stopped = observation["state"]["action_status"] == "collision"
         self._out = [] if stopped else self._out

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import HEADING_SLICE, Action, AgentState, Info, Observation, heading, wrap_angle
 from vico.agents.day_plan import EASY_PACE, RUN_PACE, SLACK, SLACK_SHARE
 from vico.rules import ReasonCode, code_name, walk_speed
 from vico.world.public import PublicMap
@@ -23,9 +23,12 @@ from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
 
 #: Corners count as passed this close, metres.
 CORNER = 0.35
-#: Off the line by more than this after a step means turning first, metres; where there is no more room than `NARROW`
-#: metres anywhere along the step, by more than `NARROW_DRIFT`.
-DRIFT, NARROW, NARROW_DRIFT = 0.12, 0.6, 0.03
+#: Metres off the line after a step from which on one turns first.
+DRIFT = 0.12
+#: Metres of room below which a step is narrow.
+NARROW = 0.6
+#: Metres off the line, where a step is narrow.
+NARROW_DRIFT = 0.03
 #: Shares of a step at which the room to walls is looked at.
 CLEARANCE_SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Surfaces that are not stepped on without a look for vehicles.
@@ -82,7 +85,8 @@ def stride_lengths(
         Of the day.
     """
     corner_x, corner_y, left, pace, due, ease, haste, place_x, place_y, least, most = strides.T
-    x, y, heading_x, heading_y = pose[:, 0], pose[:, 1], pose[:, 3], pose[:, 4]
+    x, y = pose[:, 0], pose[:, 1]
+    heading_x, heading_y = pose[:, HEADING_SLICE].T
     east, north = corner_x - x, corner_y - y
     away = np.sqrt(east * east + north * north)
     speed = np.where(np.isnan(pace), _speeds_to_arrive(away + left, due - second, ease, haste), pace)
@@ -392,7 +396,9 @@ class Walker:
         if self._blocked == 1 and not solid:
             self._aside = [{"type": "wait"}] * int(self._rng.integers(1, 3))
             return
-        patience = _patience_with(observation)
+        # How often somebody on a bicycle waits for what stopped it to go on.
+        obstacle = str(observation["state"].get("action_reason", "")).removeprefix("stopped by ")
+        patience = _LETS_TRAM_PASS if obstacle == "tram" else _LETS_PASS if obstacle in VEHICLES else 0
         if self._turns_in and self._blocked <= patience:
             # It goes on when it can: who presses on beside it gets stuck between it and a wall.
             self._aside = [{"type": "wait"}] * 2
@@ -450,14 +456,6 @@ def closed_ground(info: Info) -> list[tuple[float, float, float]]:
     """Return the ground that events close now, as far as one knows of them: x, y and radius, ENU metres."""
     known = [event for event in info.get("events", ()) if event["goes_on"]]
     return [(x, y, radius) for event in known for x, y, radius in event["closed_ground"]]
-
-
-def _patience_with(observation: Observation) -> int:
-    """Return how often who rides waits for what stopped it to go on."""
-    what = str(observation["state"].get("action_reason", "")).removeprefix("stopped by ")
-    if what == "tram":
-        return _LETS_TRAM_PASS
-    return _LETS_PASS if what in VEHICLES else 0
 
 
 def _point_ahead(position: Point, yaw: float, reach: float) -> Point:

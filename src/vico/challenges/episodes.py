@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from vico.io.stores import Store
 from vico.runner.loading import source_digest
 from vico.version import __version__
 from vico.world.folder import read_world
+from vico.world.world import World
 
 SCHEMA = "vico.episode"
 VERSION = 1
@@ -100,7 +101,9 @@ class Player:
         OutputError
             If nothing can be written: that is no episode's fault, and there is no use in going on.
         """
-        told = None if progress is None else partial(_report_progress, progress, label_of(job))
+        told: Progress | None = (
+            None if progress is None else lambda _, step, limit: progress(label_of(job), step, limit)
+        )
         try:
             return self._play(job, told)
         except OutputError:
@@ -122,13 +125,13 @@ class Player:
         record = read_episode(self.store, path, key)
         kept = record is not None and (run is None or self.store.has(run))
         if record is None or not kept:
-            record = self._played(job, run, progress)
+            record = self._play_job(job, run, progress)
             # Only now: nobody who plays the task should find its answers lying about.
             self.store.write(f"tasks/{_task_name(job, task)}", json_bytes(task))
             write_episode(self.store, path, key, record)
         return Outcome(job, record, world_digest=world, kept=kept)
 
-    def _played(self, job: Job, run: str | None, progress: Progress | None) -> EpisodeRecord:
+    def _play_job(self, job: Job, run: str | None, progress: Progress | None) -> EpisodeRecord:
         """Play an episode, and record it as a run of that name."""
         if run is None:
             record = self.challenge.play(job, progress=progress)
@@ -175,6 +178,11 @@ def read_episode(store: Store, name: str, key: str) -> EpisodeRecord | None:
     except (SchemaError, ValueError, RecursionError) as error:
         _log.warning("%s/%s: damaged, and played again (%s)", store, name, error)
         return None
+
+
+def for_size(number: int, world: World) -> int:
+    """Return how many there are in a world, of so many in a window of 800 m."""
+    return min(number, round(number * (world.half / 400.0) ** 2))
 
 
 def record_of(content: Any) -> EpisodeRecord:
@@ -225,11 +233,6 @@ def _check(challenge: Challenge, record: EpisodeRecord) -> None:
     for part in record.parts:
         if part.success is bool(part.cause) or (part.cause and part.cause not in causes):
             raise ValueError(f"part {part.name!r}: success {part.success} with the cause {part.cause!r}")
-
-
-def _report_progress(progress: Progress, label: str, _: str, step: int, limit: int) -> None:
-    """Tell how far an episode is, under a name that no other one has."""
-    progress(label, step, limit)
 
 
 def _task_name(job: Job, task: Mapping[str, object]) -> str:

@@ -193,14 +193,14 @@ def evaluate(
     tasks = [Task(plain_job(job), near=str(job.world)) for job in jobs]
     outcomes: dict[int, Outcome] = {}
 
-    def done(index: int, answer: Answer) -> None:
+    def take_answer(index: int, answer: Answer) -> None:
         job = jobs[index]
         content = answer.content
         outcomes[index] = Outcome(job, None, answer.reason) if content is None else outcome_of(job, content)
         if finished is not None:
             finished(outcomes[index], len(outcomes), len(jobs))
 
-    def told(message: Mapping[str, Any]) -> None:
+    def show_progress(message: Mapping[str, Any]) -> None:
         if progress is not None:
             progress(message["label"], message["step"], message["limit"])
 
@@ -210,7 +210,7 @@ def evaluate(
         workers = min(workers, max(1, len(jobs)))
     with open_executor(workers=workers, ray=ray) as executor, shared_store_marker(store, executor) as seen:
         service = episodes_service(challenge, str(store), code=code_digest(), record=record, seen=seen)
-        executor.run(service, tasks, done=done, told=told)
+        executor.run(service, tasks, done=take_answer, told=show_progress)
     return [outcomes[index] for index in range(len(jobs))]
 
 

@@ -14,9 +14,10 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from vico.agents.base import Agent
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
-from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, for_size
+from vico.challenges.assistant.challenge import CARS, PEDESTRIANS
 from vico.challenges.assistant.tasks import Start, TaskObject
 from vico.challenges.episode_record import episode_record
+from vico.challenges.episodes import for_size
 from vico.challenges.records import EpisodeRecord, Job, Metric, Part, Progress, Setting
 from vico.challenges.robot_tasks import PlacedTask
 from vico.community import build_community

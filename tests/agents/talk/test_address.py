@@ -176,8 +176,8 @@ def test_who_is_spoken_to_is_you_and_a_father_is_dad() -> None:
     mother = person("Neha Holm", 40, "family", note="parent and child", gender="female")
     talk = Conversation(child, [mother, father], np.random.default_rng(1))
     meal = Errand("having soup with Neha and Otto", leaves=False)
-    assert talk._told(meal, mother).words == "having soup with you and Dad"
-    assert talk._told(meal, father).words == "having soup with Mum and you"
+    assert talk._errand_for(meal, mother).words == "having soup with you and Dad"
+    assert talk._errand_for(meal, father).words == "having soup with Mum and you"
 
 
 def test_the_life_of_an_engineer() -> None:

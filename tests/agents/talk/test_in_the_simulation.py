@@ -77,7 +77,7 @@ def test_a_day_is_remembered_as_it_was() -> None:
     first, second = ada.memory.visits
     assert first.until is not None
     assert 8 * 3600 <= first.until < second.since < 8 * 3600 + 130
-    seen = bo.memory.seen("resident_0")
+    seen = bo.memory.last_seen("resident_0")
     assert seen is not None
     assert seen.time >= 8 * 3600
-    assert ada.memory.seen("assistant_0") is None, "it stands far away, behind them"
+    assert ada.memory.last_seen("assistant_0") is None, "it stands far away, behind them"

@@ -17,16 +17,16 @@ def full() -> ResidentMemory:
 
 def test_what_is_oldest_is_forgotten() -> None:
     memory = full()
-    assert (len(list(memory.people)), len(memory.heard), len(memory.visits)) == (
+    assert (len(list(memory.people)), len(memory.messages), len(memory.visits)) == (
         MOST_PEOPLE,
         MOST_MESSAGES,
         MOST_VISITS,
     )
-    assert memory.seen("resident_0") is None
-    last = memory.seen("resident_199")
+    assert memory.last_seen("resident_0") is None
+    last = memory.last_seen("resident_199")
     assert last is not None
     assert (last.time, last.x, last.place) == (199.0, 199.0, "a")
-    assert max(len(one.text) for one in memory.heard) == 300
+    assert max(len(one.text) for one in memory.messages) == 300
 
 
 def test_who_is_seen_again_is_kept() -> None:
@@ -35,8 +35,8 @@ def test_who_is_seen_again_is_kept() -> None:
         memory.see(f"resident_{k}", float(k), 0.0, 0.0, "")
     memory.see("resident_0", 100.0, 0.0, 0.0, "")
     memory.see("new", 101.0, 0.0, 0.0, "")
-    assert memory.seen("resident_0") is not None
-    assert memory.seen("resident_1") is None
+    assert memory.last_seen("resident_0") is not None
+    assert memory.last_seen("resident_1") is None
 
 
 def test_a_visit_that_is_interrupted_goes_on() -> None:
@@ -54,4 +54,4 @@ def test_restored_memories_are_the_same() -> None:
     memory, fresh = full(), ResidentMemory(["a", "b"])
     fresh.restore(decode(encode(memory.state())))
     assert encode(fresh.state()) == encode(memory.state())
-    assert fresh.seen("resident_150") == memory.seen("resident_150")
+    assert fresh.last_seen("resident_150") == memory.last_seen("resident_150")

@@ -17,7 +17,7 @@ from typing import Any
 from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search, WalkUp
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
 from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
-from vico.agents.base import AgentState, Plan, generator_state, restore_generator
+from vico.agents.base import AgentState, FieldState, Plan, generator_state, restore_generator
 from vico.agents.day_plan import plan_of_errand
 from vico.agents.perception import Sighting
 from vico.seeds import rng
@@ -142,7 +142,7 @@ _PATIENCE = 8
 _SHOW_WITHIN = 4.6
 
 
-class HeuristicPlanner:
+class HeuristicPlanner(FieldState):
     """Follows the automaton of the task's category.
 
     Parameters
@@ -154,6 +154,15 @@ class HeuristicPlanner:
     distance
         Taken for the other planners' sake: the automata know no distances.
     """
+
+    skills: AssistantSkills
+    number: int
+    line: list[int]  # subtasks still to do, by their place in `errands`, the one in hand first
+    _tried: list[int]
+    _region: int = 0
+    _picked: set[str]
+    _refused: list[str]
+    _target: Sighting | None = None
 
     def __init__(
         self,
@@ -168,15 +177,11 @@ class HeuristicPlanner:
         self.errands = instructions[number::of]
         self.skills = AssistantSkills(public_map, rng(seed, "heuristic", number))
         self.automaton = AUTOMATA[str(instructions[0]["category"]) if instructions else "delivery"]
-        #: Subtasks still to do, by their place in `errands`, the one in hand first.
         self.line = list(range(len(self.errands)))
         self.number = 0 if self.line else self.automaton.final
         self._tried = [0] * len(self.errands)
-        self._region = 0
-        self._picked: set[str] = set()
-        self._refused: list[str] = []
-        self._target: Sighting | None = None
-        self._option: Option | None = None
+        self._picked, self._refused = set(), []
+        self._option: Option | None = None  # made again from the automaton's state, which `number` is
 
     def plan(self, second: float) -> Plan:
         """Return what it is about."""
@@ -187,24 +192,11 @@ class HeuristicPlanner:
 
     def state(self) -> AgentState:
         """Return the subtask in hand and how far it came, and what the skills remember."""
-        return {
-            "skills": self.skills.state(),
-            "number": self.number,
-            "line": list(self.line),
-            "tried": list(self._tried),
-            "region": self._region,
-            "picked": sorted(self._picked),
-            "refused": list(self._refused),
-            "target": None if self._target is None else self._target.state(),
-            "option": None if self._option is None else self._option.state(),
-        }
+        return {**super().state(), "option": None if self._option is None else self._option.state()}
 
     def restore(self, state: AgentState) -> None:
         """Go on with the subtasks as `state` returned them."""
-        self.skills.restore(state["skills"])
-        self.number, self.line, self._tried = state["number"], list(state["line"]), list(state["tried"])
-        self._region, self._picked, self._refused = state["region"], set(state["picked"]), list(state["refused"])
-        self._target = None if state["target"] is None else Sighting(**state["target"])
+        super().restore(state)
         self._option = None
         if state["option"] is not None:
             self._option = self._begin()
@@ -308,7 +300,7 @@ class HeuristicPlanner:
         if search.found is not None:
             self._target = search.found
             return "found"
-        if self.automaton is AUTOMATA["delivery"] and any(view.held):
+        if self.automaton is AUTOMATA["delivery"] and any(view.hands):
             return "nothing, but carrying"
         self._region += 1
         if self._region % len(self.errand["sources"]):
@@ -324,7 +316,7 @@ class HeuristicPlanner:
         if pick.outcome == "picked":
             self._picked.add(pick.target.name)
             left = [name for name in self.errand["objects"] if name not in self._picked]
-            return "picked, more wanted" if left and not all(view.held) else "picked, all of it"
+            return "picked, more wanted" if left and not all(view.hands) else "picked, all of it"
         if pick.outcome == "refused":
             self._refused.append(pick.target.name)
         return pick.outcome
@@ -424,7 +416,7 @@ class RandomPlanner:
         regions = [*errand["sources"], *([errand["destination"]] if errand["destination"] else [])]
         self._region = regions[int(self._random.integers(len(regions)))]
         self._search = self._any_object()
-        things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.held]
+        things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.hands]
         self._target = things[int(self._random.integers(len(things)))] if things else None
         self._index = int(errand["index"])
         self._done = False
@@ -434,15 +426,15 @@ class RandomPlanner:
             return self.skills.go_to(view, self._region)
         if self._plan == "search" and self._search is not None:
             return self._search.act(view)
-        if self._plan == "pick" and self._target is not None and 0 in view.held and not self._done:
+        if self._plan == "pick" and self._target is not None and 0 in view.hands and not self._done:
             step = self.skills.approach(view, self._target.position, near=GRASP)
             if step is not None:
                 return step
             self._done = True
-            return {"type": "pick", "hand": view.held.index(0), "object": self._target.entity}
-        if self._plan == "put" and any(view.held) and not self._done:
+            return {"type": "pick", "hand": view.hands.index(0), "object": self._target.entity}
+        if self._plan == "put" and any(view.hands) and not self._done:
             self._done = True
-            return {"type": "put", "hand": next(h for h, entity in enumerate(view.held) if entity)}
+            return {"type": "put", "hand": next(h for h, entity in enumerate(view.hands) if entity)}
         if self._plan == "complete" and not self._done:
             self._done = True
             return {"type": "task_complete", "index": self._index}

@@ -16,7 +16,7 @@ from vico.agents.assistant.estimates import Estimates
 from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
-from vico.agents.base import AgentState, Plan
+from vico.agents.base import AgentState, FieldState, Plan
 from vico.agents.day_plan import plan_of_errand
 from vico.agents.perception import RememberedSighting, Sighting
 from vico.seeds import rng
@@ -25,9 +25,12 @@ from vico.world.public import PublicMap
 Instruction = Mapping[str, Any]
 Kind = Literal["look", "fetch", "deliver"]
 
-#: Things that so many attempts did not reach are left; regions are looked through so often, and so many attempts made
-#: to meet somebody.
-REFUSALS, LOOKS, MEETINGS = 2, 3, 12
+#: Things that so many attempts did not reach are left.
+REFUSALS = 2
+#: Times that a region is looked through.
+LOOKS = 3
+#: Attempts to meet somebody.
+MEETINGS = 12
 # Who fetches what was seen outdoors walks up to it from so near, metres.
 _NEAR_SEEN = 5.0
 # How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.
@@ -54,7 +57,7 @@ class Choice:
     region: int = -1
 
 
-class Book:
+class Book(FieldState):
     """What is known of all subtasks.
 
     Parameters
@@ -63,30 +66,17 @@ class Book:
         As told.
     """
 
+    closed: set[int]  # subtasks that are reported, or that a colleague does or has done
+    looked: dict[int, dict[int, int]]
+    refused: dict[str, int]
+    picked: dict[str, int]
+    put: set[str]
+
     def __init__(self, instructions: Sequence[Instruction]) -> None:
         self.instructions = {int(one["index"]): dict(one) | {"sources": list(one["sources"])} for one in instructions}
-        #: Subtasks that are reported, or that a colleague does or has done.
-        self.closed: set[int] = set()
-        self.looked: dict[int, dict[int, int]] = {k: {} for k in self.instructions}
-        self.refused: dict[str, int] = {}
-        self.picked: dict[str, int] = {}
-        self.put: set[str] = set()
-
-    def state(self) -> AgentState:
-        """Return all of it."""
-        return {
-            "closed": sorted(self.closed),
-            "looked": {str(k): {str(r): n for r, n in regions.items()} for k, regions in self.looked.items()},
-            "refused": dict(self.refused),
-            "picked": dict(self.picked),
-            "put": sorted(self.put),
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Know what `state` returned."""
-        self.closed, self.put = set(state["closed"]), set(state["put"])
-        self.looked = {int(k): {int(r): int(n) for r, n in regions.items()} for k, regions in state["looked"].items()}
-        self.refused, self.picked = dict(state["refused"]), dict(state["picked"])
+        self.closed, self.put = set(), set()
+        self.looked = {k: {} for k in self.instructions}
+        self.refused, self.picked = {}, {}
 
     def add_source(self, k: int, region: Mapping[str, Any]) -> None:
         """Look for a subtask's person in one more region, or once more in one that is known."""
@@ -105,26 +95,25 @@ class Book:
         """Whether a subtask is still to do."""
         return k not in self.closed
 
-    def wanted(self, k: int) -> list[str]:
+    def missing_names(self, k: int) -> list[str]:
         """Names of a subtask's things that are still to be found."""
         return [
-            n for n in self.instructions[k]["objects"] if n not in self.picked and n not in self.put and self._may(n)
+            n
+            for n in self.instructions[k]["objects"]
+            if n not in self.picked and n not in self.put and self.refused.get(n, 0) < REFUSALS
         ]
-
-    def _may(self, name: str) -> bool:
-        return self.refused.get(name, 0) < REFUSALS
 
     def in_hand(self, k: int, view: ObservationView) -> list[int]:
         """Entities of a subtask's things that one holds."""
         mine = [self.picked.get(name, 0) for name in self.instructions[k]["objects"]]
-        return [entity for entity in view.held if entity and entity in mine]
+        return [entity for entity in view.hands if entity and entity in mine]
 
     def is_wanted(self, k: int, thing: Sighting | RememberedSighting) -> bool:
         """Whether something seen is what a subtask is about: one of its things, or with Carry its person."""
         if self.category(k) == "carry":
             mine = thing.kind == PERSON and thing.name == self.instructions[k]["person"]["name"]
             return mine and self.refused.get(thing.name, 0) < MEETINGS
-        return thing.kind == "object" and thing.name in self.wanted(k)
+        return thing.kind == "object" and thing.name in self.missing_names(k)
 
     def choices(self, view: ObservationView, seen: Mapping[int, RememberedSighting]) -> list[Choice]:
         """Return everything that makes sense now.
@@ -140,9 +129,9 @@ class Book:
                 continue
             if self.in_hand(k, view):
                 found.append(Choice("deliver", k))
-            if all(view.held) and self.category(k) != "search":
+            if all(view.hands) and self.category(k) != "search":
                 continue
-            if self.category(k) != "carry" and not self.wanted(k):
+            if self.category(k) != "carry" and not self.missing_names(k):
                 continue
             if k in seen:
                 found.append(Choice("fetch", k))
@@ -229,7 +218,7 @@ class Errand:
         return {"type": "wait"}
 
     @property
-    def _told(self) -> Instruction:
+    def _instruction(self) -> Instruction:
         return self._book.instructions[self.choice.subtask]
 
     @property
@@ -240,19 +229,19 @@ class Errand:
     def _region(self) -> Mapping[str, Any]:
         """Where to go first."""
         if self.choice.kind == "deliver":
-            region: Mapping[str, Any] = self._told["destination"]
+            region: Mapping[str, Any] = self._instruction["destination"]
             return region
         if self._seen is not None:
             place = self._skills.places.get(self._seen.room) or None
             centre = [float(x) for x in self._seen.position]
             kind = "outdoor" if place is None else "place"
             return {"kind": kind, "place": place, "centre": centre, "radius": 3.0, "surface": None}
-        source: Mapping[str, Any] = self._told["sources"][max(self.choice.region, 0)]
+        source: Mapping[str, Any] = self._instruction["sources"][max(self.choice.region, 0)]
         return source
 
     def _begin(self) -> Option:
         """Make the option of the stage."""
-        told, person, target = self._told, str(self._told["person"]["name"]), self._target
+        told, person, target = self._instruction, str(self._instruction["person"]["name"]), self._target
         k = self.choice.subtask
         if self._stage in ("pick", "show"):
             assert target is not None
@@ -296,8 +285,8 @@ class Errand:
         if isinstance(option, PutDown):
             return self._after_put(option)
         if isinstance(option, AwaitPerson):
-            return self._closed("report" if option.outcome == "came" else "over")
-        return self._closed("over")
+            return self._close_subtask("report" if option.outcome == "came" else "over")
+        return self._close_subtask("over")
 
     def _after_way(self, view: ObservationView) -> str:
         if self.choice.kind == "deliver":
@@ -323,17 +312,17 @@ class Errand:
         name = pick.target.name
         if pick.outcome == "picked":
             self._book.picked[name] = pick.target.entity
-            more = self._book.wanted(self.choice.subtask)
-            return "look" if more and not all(view.held) else "over"
+            more = self._book.missing_names(self.choice.subtask)
+            return "look" if more and not all(view.hands) else "over"
         if pick.outcome == "refused":
             self._book.refused[name] = self._book.refused.get(name, 0) + 1
         return "over"
 
     def _after_meeting(self, meet: Meet, view: ObservationView) -> str:
         if meet.outcome != "handed":
-            return self._given_up(str(self._told["person"]["name"]))
-        mine = [entity for entity in view.held if entity and entity not in self._book.picked.values()]
-        self._book.picked.update(zip(self._told["objects"], mine, strict=False))
+            return self._given_up(str(self._instruction["person"]["name"]))
+        mine = [entity for entity in view.hands if entity and entity not in self._book.picked.values()]
+        self._book.picked.update(zip(self._instruction["objects"], mine, strict=False))
         return "follow"
 
     def _given_up(self, name: str) -> str:
@@ -347,18 +336,18 @@ class Errand:
     def _after_put(self, put: PutDown) -> str:
         if self._category == "carry":
             if put.outcome == "empty hands":
-                for name in self._told["objects"]:
+                for name in self._instruction["objects"]:
                     self._book.picked.pop(name, None)
             return "await"
         k = self.choice.subtask
         if put.outcome == "empty hands":
-            for name in self._told["objects"]:
+            for name in self._instruction["objects"]:
                 if name in self._book.picked:
                     del self._book.picked[name]
                     self._book.put.add(name)
-        return "over" if self._book.wanted(k) or put.outcome != "empty hands" else "report"
+        return "over" if self._book.missing_names(k) or put.outcome != "empty hands" else "report"
 
-    def _closed(self, stage: str) -> str:
+    def _close_subtask(self, stage: str) -> str:
         if stage == "over":
             self._book.closed.add(self.choice.subtask)
         return stage
@@ -448,7 +437,7 @@ class ChoicePlanner(ABC):
                 choice = self.decide(view)
                 if choice is None:
                     return self.idle(view)
-                seen = self.seen(view).get(choice.subtask) if choice.kind == "fetch" else None
+                seen = self.last_sightings(view).get(choice.subtask) if choice.kind == "fetch" else None
                 self.errand = Errand(choice, self.book, self.skills, seen)
             action = self.errand.act(view)
             if action is not None:
@@ -473,14 +462,14 @@ class ChoicePlanner(ABC):
         """Subtasks that are this assistant's: every `of`-th."""
         return list(self.book.instructions)[self.number :: self.of]
 
-    def seen(self, view: ObservationView) -> dict[int, RememberedSighting]:
+    def last_sightings(self, view: ObservationView) -> dict[int, RememberedSighting]:
         """Return, by subtask, where what it is about was seen last, if it may still be there."""
         now = float(view.state["time"])
         found: dict[int, RememberedSighting] = {}
         for k, told in self.book.instructions.items():
             if not self.book.is_open(k):
                 continue
-            names = [told["person"]["name"]] if self.book.category(k) == "carry" else self.book.wanted(k)
+            names = [told["person"]["name"]] if self.book.category(k) == "carry" else self.book.missing_names(k)
             for name in names:
                 thing = self.skills.seen.last_seen(name)
                 if thing is None or not self.book.is_wanted(k, thing):

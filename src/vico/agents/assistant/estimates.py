@@ -20,14 +20,19 @@ from vico.agents.assistant.skills import WALK
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.public import PublicMap
-from vico.world.walkable import WalkableMap
 
 #: Seconds that a way takes where distances are not reckoned with.
 UNIFORM = 60.0
 # People, lights and corners: a way takes so many times what its length and the pace say.
 _DETOUR = 1.25
-# Going in or out; picking up; putting down and reporting; meeting somebody and being handed things, seconds.
-DOOR, PICK, PUT, MEET = 12.0, 6.0, 6.0, 25.0
+#: Seconds to go in or out.
+DOOR = 12.0
+#: Seconds to pick something up.
+PICK = 6.0
+#: Seconds to put something down and report.
+PUT = 6.0
+#: Seconds to meet somebody and be handed things.
+MEET = 25.0
 # Looking through a place, and a spot outdoors: for a thing, and for a person, seconds.
 _LOOK = {("place", False): 45.0, ("outdoor", False): 22.0, ("place", True): 25.0, ("outdoor", True): 6.0}
 # How likely somebody is at a spot outdoors, where a place counts 1: most of a day is spent indoors.
@@ -84,19 +89,17 @@ class Estimates:
         key = (round(float(goal[0]), 2), round(float(goal[1]), 2))
         if key not in self._fields:
             self._fields[key] = self._map.router.distance_field(np.array(key))
-        metres = _field_value(self._fields[key], start, self._map.walkable)
+        field = self._fields[key]
+        ix, iy = np.clip(self._map.walkable.cell_of(np.asarray(start, np.float64)[:2]), 0, self._map.walkable.n - 1)
+        value = float(field[iy, ix])
+        if math.isfinite(value):
+            metres = value
+        else:
+            around = field[max(iy - 8, 0) : iy + 9, max(ix - 8, 0) : ix + 9]
+            finite = around[np.isfinite(around)]
+            metres = float(finite.min()) if len(finite) else math.inf
         straight = math.dist((float(start[0]), float(start[1])), key)
         return metres if math.isfinite(metres) else 1.4 * straight
-
-
-def _field_value(field: NDArray[np.float32], point: Sequence[float], walkable: WalkableMap) -> float:
-    ix, iy = np.clip(walkable.cell_of(np.asarray(point, np.float64)[:2]), 0, walkable.n - 1)
-    value = float(field[iy, ix])
-    if math.isfinite(value):
-        return value
-    around = field[max(iy - 8, 0) : iy + 9, max(ix - 8, 0) : ix + 9]
-    finite = around[np.isfinite(around)]
-    return float(finite.min()) if len(finite) else math.inf
 
 
 GUIDE = "docs/challenges.md"

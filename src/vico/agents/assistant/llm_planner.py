@@ -27,7 +27,7 @@ from pydantic import BaseModel, ConfigDict
 from vico.agents.assistant.errands import EPISODE_SECONDS, Book, Choice, ChoicePlanner
 from vico.agents.assistant.estimates import Estimates
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
-from vico.agents.base import AgentState
+from vico.agents.base import AgentState, FieldState
 from vico.agents.model_access import ModelAccess, episode_tokens, model_from_environment
 from vico.agents.perception import RememberedSighting
 from vico.clock import DAY, clock_of
@@ -100,7 +100,7 @@ class Briefing:
         if self._estimates.distance:
             one["position"] = _round_point(view.pose[:2])
         one["hands"] = list(held)
-        one["seen"] = [self._seen(view, thing) for thing in self._of_interest()]
+        one["seen"] = [self._sighting_fact(view, thing) for thing in self._of_interest()]
         return one
 
     def actions(
@@ -120,7 +120,7 @@ class Briefing:
             held = " and the ".join(name for name in told["objects"] if name in self._book.picked)
             what = f"the {held}" if held else "what is in hand"
             return f"task {k}: bring {what} to {told['destination']['name']} and put it down there"
-        what = told["person"]["name"] if category == "carry" else " and the ".join(self._book.wanted(k))
+        what = told["person"]["name"] if category == "carry" else " and the ".join(self._book.missing_names(k))
         what = what if category == "carry" else f"the {what}"
         then = {
             "carry": "offer help, take what they hand over, follow them home and put it down there",
@@ -154,11 +154,13 @@ class Briefing:
         names: set[str] = set()
         for k, told in self._book.instructions.items():
             if self._book.is_open(k):
-                names |= {told["person"]["name"]} if self._book.category(k) == "carry" else set(self._book.wanted(k))
+                names |= (
+                    {told["person"]["name"]} if self._book.category(k) == "carry" else set(self._book.missing_names(k))
+                )
         found = (self._skills.seen.last_seen(name) for name in sorted(names))
         return [thing for thing in found if thing is not None]
 
-    def _seen(self, view: ObservationView, thing: RememberedSighting) -> PlainData:
+    def _sighting_fact(self, view: ObservationView, thing: RememberedSighting) -> PlainData:
         ago = max(round(float(view.state["time"]) - thing.time), 0)
         place = self._skills.places.get(thing.room) if thing.room else None
         one: PlainData = {"what": thing.name, "where": self._place_named(place), "seconds_ago": ago}
@@ -181,28 +183,16 @@ MOST_ACTIONS, MOST_LINES = 20, 12
 LONGEST_LINE = 300
 
 
-class ActionMemory:
+class ActionMemory(FieldState):
     """Previous actions, each with the time it began, how long it took and its outcome."""
 
+    entries: list[dict[str, Any]]
+    _words: str = ""
+    _since: float = 0.0
+    _before: AgentState | None = None
+
     def __init__(self) -> None:
-        self.entries: list[dict[str, Any]] = []
-        self._words = ""
-        self._since = 0.0
-        self._before: AgentState | None = None
-
-    def state(self) -> AgentState:
-        """Return all of it."""
-        return {
-            "entries": [dict(entry) for entry in self.entries],
-            "words": self._words,
-            "since": self._since,
-            "before": self._before,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self.entries = [dict(entry) for entry in state["entries"]]
-        self._words, self._since, self._before = str(state["words"]), float(state["since"]), state["before"]
+        self.entries = []
 
     def begin(self, words: str, now: float, book: Book) -> None:
         """Note an action that begins."""
@@ -322,8 +312,9 @@ class SpokenMessage(_Reply):
 
 #: A colleague as near as this can hear, metres.
 TALK_DISTANCE = 10.0
-# Lines that one says before it goes on; steps one waits for an answer, or for who begins; turns of the look around.
-_MOST_SAID, _ANSWER_PATIENCE, _LOOK_AROUND = 3, 2, 4
+_MOST_SAID = 3  # lines that one says before it goes on
+_ANSWER_PATIENCE = 2  # steps one waits for an answer, or for the one who begins
+_LOOK_AROUND = 4  # turns of the look around
 # Where somebody was seen or heard so long ago they may still be, seconds; a line reaches so much farther, metres.
 _FRESH_SIGHTING, _TALK_MARGIN = 3.0, 2.0
 
@@ -331,7 +322,7 @@ _FRESH_SIGHTING, _TALK_MARGIN = 3.0, 2.0
 Author = Callable[[], str | None]
 
 
-class AssistantTalk:
+class AssistantTalk(FieldState):
     """One assistant's side of the conversation.
 
     Parameters
@@ -344,43 +335,29 @@ class AssistantTalk:
         Agents' names of others whose words are remembered.
     """
 
+    _place: list[float] | None = None  # where the colleague was last heard, and when
+    _room: str = ""
+    _heard_at: float = -np.inf
+    _met: bool = False
+    _turns: int = 0
+    _over: bool = False
+    _said: int = 0
+    _waited: int = 0
+    _answered: bool = True
+
     def __init__(self, name: str, colleague: str, *, begins: bool, also: Collection[str] = ()) -> None:
         self.name, self.colleague = name, colleague
         self.conversation = Conversation()
         self._begins, self._also = begins, frozenset(also)
-        self._place: list[float] | None = None  # where the colleague was last heard, and when
-        self._room, self._heard_at = "", -np.inf
-        self._met = False
-        self._turns = 0
-        self._anew()
-
-    def _anew(self) -> None:
-        self._over = False
-        self._said = self._waited = 0
-        self._answered = True
 
     def state(self) -> AgentState:
         """Return what was said, and how far the conversation is."""
-        return {
-            "lines": [dict(line) for line in self.conversation.lines],
-            "place": self._place,
-            "room": self._room,
-            "heard_at": None if np.isinf(self._heard_at) else self._heard_at,
-            "met": self._met,
-            "turns": self._turns,
-            "over": self._over,
-            "said": self._said,
-            "waited": self._waited,
-            "answered": self._answered,
-        }
+        return {"lines": [dict(line) for line in self.conversation.lines], **super().state()}
 
     def restore(self, state: AgentState) -> None:
         """Go on where `state` was returned."""
         self.conversation.lines = [dict(line) for line in state["lines"]]
-        self._place, self._room = state["place"], state["room"]
-        self._heard_at = -np.inf if state["heard_at"] is None else float(state["heard_at"])
-        self._met, self._turns, self._over = state["met"], state["turns"], state["over"]
-        self._said, self._waited, self._answered = state["said"], state["waited"], state["answered"]
+        super().restore(state)
 
     def hear(self, view: ObservationView, clock: str) -> None:
         """Remember what the colleague, and those the tasks are about, said."""
@@ -409,7 +386,7 @@ class AssistantTalk:
         if self._waits():
             self._waited += 1
             return {"type": "wait"}
-        text = author() if self._may_speak() else None
+        text = author() if self._answered and self._said < _MOST_SAID else None
         self._met = True
         if not text:
             self._over = True
@@ -422,11 +399,13 @@ class AssistantTalk:
         self._said, self._waited, self._answered = self._said + 1, 0, False
         return {"type": "communicate", "text": said, "range": min(TALK_DISTANCE, away + _TALK_MARGIN)}
 
-    def decided(self) -> None:
+    def allow_talk(self) -> None:
         """Take note that a decision was made: at the next one they may talk again."""
-        self._anew()
+        self._over = False
+        self._said = self._waited = 0
+        self._answered = True
 
-    def seen(self, view: ObservationView, skills: AssistantSkills) -> Mapping[str, Any] | None:
+    def nearby_colleague(self, view: ObservationView, skills: AssistantSkills) -> Mapping[str, Any] | None:
         """Return how near the colleague is, for the model; None where it is not known to be near."""
         away = self._away(view, skills) if self.colleague else None
         return None if away is None else {"name": self.colleague, "near": True}
@@ -443,9 +422,6 @@ class AssistantTalk:
     def _waits(self) -> bool:
         lets_begin = not self._met and not self._begins and np.isinf(self._heard_at)
         return (lets_begin or not self._answered) and self._waited < _ANSWER_PATIENCE
-
-    def _may_speak(self) -> bool:
-        return self._answered and self._said < _MOST_SAID
 
     def _away(self, view: ObservationView, skills: AssistantSkills) -> float | None:
         """Metres to the colleague, if it is near and in the same space."""
@@ -554,15 +530,15 @@ class LlmPlanner(ChoicePlanner):
         if self._last is not None:
             self.actions.end(self._last, clock_text(self.actions.since), now, self.book)
             self._last = None
-        seen = self.seen(view)
+        seen = self.last_sightings(view)
         choices = self.book.choices(view, seen)
         if not choices:
             return None
         self._instead = self.talk.next(view, self.skills, clock_text(now), lambda: self._line(view))
         if self._instead is not None:
             return None
-        choice = self._chosen(view, choices, seen)
-        self.talk.decided()
+        choice = self._ask_choice(view, choices, seen)
+        self.talk.allow_talk()
         self.actions.begin(self._briefing.words(choice), now, self.book)
         self._last = choice
         return choice
@@ -576,7 +552,9 @@ class LlmPlanner(ChoicePlanner):
         assert self.began is not None
         return round(float(view.state["time"]) - self.began) + 1
 
-    def _chosen(self, view: ObservationView, choices: list[Choice], seen: Mapping[int, RememberedSighting]) -> Choice:
+    def _ask_choice(
+        self, view: ObservationView, choices: list[Choice], seen: Mapping[int, RememberedSighting]
+    ) -> Choice:
         """Return the choice of the model; where there is one alone it is not asked."""
         if len(choices) == 1:
             return choices[0]
@@ -586,7 +564,7 @@ class LlmPlanner(ChoicePlanner):
                 return []
             return [f"action: {reply.action} is none of the available actions; give a number from 1 to {len(choices)}"]
 
-        told = self._told(view) | {"actions": self._briefing.actions(view, choices, seen)}
+        told = self._prompt_inputs(view) | {"actions": self._briefing.actions(view, choices, seen)}
         reply = self.access.ask(self._plan, PlannedAction, told, step=self._step(view), check=check)
         if reply is None:
             return self._nearest(view, choices, seen)
@@ -601,13 +579,13 @@ class LlmPlanner(ChoicePlanner):
 
     def _line(self, view: ObservationView) -> str | None:
         """Return what the model has the assistant say."""
-        reply = self.access.ask(self._message, SpokenMessage, self._told(view), step=self._step(view))
+        reply = self.access.ask(self._message, SpokenMessage, self._prompt_inputs(view), step=self._step(view))
         return None if reply is None else reply.message
 
-    def _told(self, view: ObservationView) -> dict[str, Any]:
+    def _prompt_inputs(self, view: ObservationView) -> dict[str, Any]:
         """Return the inputs that planning and speaking have in common."""
         assert self.began is not None
-        held = self._held(view)
+        held = self._names_in_hand(view)
         state = self._briefing.state(view, left=self.time_left(view), held=self._hands(view))
         told: dict[str, Any] = {
             "name": self.name,
@@ -619,13 +597,16 @@ class LlmPlanner(ChoicePlanner):
             "previous": self.actions.entries,
         }
         if self.talk.colleague:
-            state["colleague"] = self.talk.seen(view, self.skills) or {"name": self.talk.colleague, "near": False}
+            state["colleague"] = self.talk.nearby_colleague(view, self.skills) or {
+                "name": self.talk.colleague,
+                "near": False,
+            }
             told |= {"colleague": self.talk.colleague, "conversation": self.talk.conversation.lines}
         return told
 
-    def _held(self, view: ObservationView) -> dict[int, list[str]]:
+    def _names_in_hand(self, view: ObservationView) -> dict[int, list[str]]:
         """Return the names of what is in hand, by subtask."""
-        entities = {entity for entity in view.held if entity}
+        entities = {entity for entity in view.hands if entity}
         return {
             k: names
             for k, told in self.book.instructions.items()
@@ -635,4 +616,4 @@ class LlmPlanner(ChoicePlanner):
     def _hands(self, view: ObservationView) -> list[str]:
         """Return what each hand holds."""
         names = {entity: name for name, entity in self.book.picked.items()}
-        return [names.get(entity, "a thing") if entity else "free" for entity in view.held]
+        return [names.get(entity, "a thing") if entity else "free" for entity in view.hands]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.assistant.skills import GRASP, OUTSIDE, Action, AssistantSkills, LookAround, ObservationView
-from vico.agents.base import AgentState
+from vico.agents.base import AgentState, FieldState, heading
 from vico.agents.perception import Sighting
 from vico.exact import each
 
@@ -46,7 +46,7 @@ class Option(Protocol):
         """Go on where another one, made in the same way, was."""
 
 
-class Pursuit:
+class Pursuit(FieldState):
     """Going up to something that was seen, or somebody who moves, through the door that they were seen through.
 
     Attributes
@@ -55,32 +55,17 @@ class Pursuit:
         Where it was seen last, ENU metres, shape ``(3,)``; None before.
     """
 
+    position: NDArray[np.float64] | None
+    _through: str = ""
+    # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
+    _goal: NDArray[np.float64] | None = None
+    _holds: int = 0
+    # Views to take in a room that one came into after it, before one walks to where it is thought to be.
+    _views: int = 0
+
     def __init__(self, skills: AssistantSkills, position: NDArray[np.float64] | None = None) -> None:
         self.position = position
         self._skills = skills
-        self._through = ""
-        # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
-        self._goal: NDArray[np.float64] | None = None
-        self._holds = 0
-        # Views to take in a room that one came into after it, before one walks to where it is thought to be.
-        self._views = 0
-
-    def state(self) -> AgentState:
-        """Return where it was seen."""
-        return {
-            "position": None if self.position is None else self.position.copy(),
-            "through": self._through,
-            "goal": None if self._goal is None else self._goal.copy(),
-            "holds": self._holds,
-            "views": self._views,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self.position, self._goal = (
-            None if state[name] is None else np.array(state[name], np.float64) for name in ("position", "goal")
-        )
-        self._through, self._holds, self._views = state["through"], state["holds"], state["views"]
 
     def see(self, view: ObservationView, position: NDArray[np.float64]) -> None:
         """Take note of where it is now."""
@@ -117,21 +102,14 @@ class Pursuit:
         return self._goal
 
 
-class GoTo:
+class GoTo(FieldState):
     """Go to a region: into the place, or to the middle of the spot outdoors. Outcomes: ``arrived``, ``stuck``."""
+
+    _steps: int = 0
 
     def __init__(self, skills: AssistantSkills, region: Region, *, near: float = 1.0) -> None:
         self.outcome = ""
         self._skills, self._region, self._near = skills, region, near
-        self._steps = 0
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {"steps": self._steps}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._steps = state["steps"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""
@@ -181,33 +159,20 @@ class Search:
         return action
 
 
-class WalkUp:
+class WalkUp(FieldState):
     """Walk up to a thing that was seen. Outcomes: ``arrived``, ``stuck``."""
+
+    target: Sighting
+    _pursuit: Pursuit
+    _nearest: float = math.inf
+    _steps: int = 0
+    _vain: int = 0
 
     def __init__(self, skills: AssistantSkills, target: Sighting, *, near: float = GRASP) -> None:
         self.outcome = ""
         self.target = target
         self._near = near
         self._pursuit = Pursuit(skills, target.position)
-        self._nearest = math.inf
-        self._steps = self._vain = 0
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {
-            "target": self.target.state(),
-            "pursuit": self._pursuit.state(),
-            "nearest": None if math.isinf(self._nearest) else self._nearest,
-            "steps": self._steps,
-            "vain": self._vain,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self.target = Sighting(**state["target"])
-        self._pursuit.restore(state["pursuit"])
-        self._nearest = math.inf if state["nearest"] is None else state["nearest"]
-        self._steps, self._vain = state["steps"], state["vain"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""
@@ -259,7 +224,7 @@ class PickUp:
         """Return the next action."""
         if self._asked:
             self._asked = False
-            if self.target.entity in view.held:
+            if self.target.entity in view.hands:
                 self.outcome = "picked"
                 return None
             self._tries += 1
@@ -273,15 +238,16 @@ class PickUp:
             if action is not None:
                 return action
             self._walk = None
-        if all(view.held):
+        if all(view.hands):
             self.outcome = "hands full"
             return None
         self._asked = True
-        return {"type": "pick", "hand": view.held.index(0), "object": self.target.entity}
+        return {"type": "pick", "hand": view.hands.index(0), "object": self.target.entity}
 
 
-# Steps after which one gives up, and for which one goes further into a room; how far, metres.
-_LONGEST, _GOING_IN, _INTO = 50, 4, 1.8
+_LONGEST = 50  # steps after which one gives up
+_GOING_IN = 4  # steps for which one goes further into a room
+_INTO = 1.8  # metres of such a step
 # A room with so many doors to others is a hall, which one tries to leave for so many steps.
 _DOORS_OF_HALL, _LEAVING_HALL = 4, 15
 # Metres from the middle of a spot outdoors at which things are put down there.
@@ -351,7 +317,7 @@ class PutDown:
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action."""
         mine = self._entities
-        full = [hand for hand, entity in enumerate(view.held) if entity and (mine is None or entity in mine)]
+        full = [hand for hand, entity in enumerate(view.hands) if entity and (mine is None or entity in mine)]
         if not full:
             self.outcome = "empty hands"
             return None
@@ -368,7 +334,7 @@ class PutDown:
         """Put a thing on the surface that is named; else ahead, in one direction after the other."""
         if self._put:
             self._put = False
-            if view.refused and self._on:
+            if view.was_refused and self._on:
                 self._on = False  # there is no room on it: beside it, then
             else:
                 self._bearing, self._aimed = self._bearing + 1, False
@@ -434,7 +400,7 @@ class PutDown:
 
 def _free_directions(view: ObservationView) -> list[float]:
     """Return directions around, radians, the one first that lies farthest from the ways to the room's doors."""
-    ahead = math.atan2(float(view.pose[4]), float(view.pose[3]))
+    ahead = heading(view.observation)
     around = [ahead + 2.0 * math.pi * k / _DIRECTIONS for k in range(_DIRECTIONS)]
     doors = np.array([door["position"][:2] for door in view.state["doors"]], np.float64).reshape(-1, 2) - view.pose[:2]
     if not len(doors):

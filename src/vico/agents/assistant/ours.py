@@ -71,7 +71,7 @@ class OurPlanner(ChoicePlanner):
     def notice(self, view: ObservationView) -> Action | None:
         """Plan anew when something that is wanted comes into view while one is on the way or looking."""
         self._beliefs.notice(view, self.skills)
-        known = sorted({thing.entity for thing in self.seen(view).values()})
+        known = sorted({thing.entity for thing in self.last_sightings(view).values()})
         new = [entity for entity in known if entity not in self._known]
         self._known = known
         if new and self.errand is not None and self.errand.stage in _MAY_TURN:
@@ -100,14 +100,14 @@ class OurPlanner(ChoicePlanner):
         """Return the first choice of the best plan."""
         left = self.time_left(view)
         if self._share is None:
-            self._share = self._shared(view, left)
+            self._share = self._share_for(view, left)
         others = [k for k in self.book.instructions if k not in self._share]
         for subtasks in (self._share, others):
             choice = self._best_of(subtasks, view, left)
             if choice is not None:
                 return choice
         # Nothing can be done in time, as it seems: what is nearest to being done, then.
-        choices = self.book.choices(view, self.seen(view))
+        choices = self.book.choices(view, self.last_sightings(view))
         mine = [choice for choice in choices if choice.subtask in self._share]
         return next(iter(mine or choices), None) if left > 0.0 else None
 
@@ -116,9 +116,9 @@ class OurPlanner(ChoicePlanner):
         if not any(self.book.is_open(k) for k in subtasks):
             return None
         if not self._is_uncertain(subtasks):
-            plan = best_plan(TaskModel(self.book, self.estimates, subtasks, view, self.seen(view)), left)
+            plan = best_plan(TaskModel(self.book, self.estimates, subtasks, view, self.last_sightings(view)), left)
             return plan.choices[0] if plan.choices else None
-        situation, choices = self._situations.now(subtasks, view, self.seen(view), left)
+        situation, choices = self._situations.now(subtasks, view, self.last_sightings(view), left)
         chance = rng(self.seed, "ours", self.number, round(float(view.state["time"])))
         chosen = best_first_choice(situation, chance, worlds=_WORLDS)
         return None if chosen < 0 else choices[chosen]
@@ -127,7 +127,7 @@ class OurPlanner(ChoicePlanner):
         """Whether one must look for some of them in more than one region."""
         return any(self.book.is_open(k) and len(self.book.instructions[k]["sources"]) > 1 for k in subtasks)
 
-    def _shared(self, view: ObservationView, left: float) -> list[int]:
+    def _share_for(self, view: ObservationView, left: float) -> list[int]:
         """Return the subtasks that are this assistant's: of all ways to share, the one that ends best."""
         subtasks = list(self.book.instructions)
         if self.of == 1:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vico.agents.assistant.options import Pursuit
 from vico.agents.assistant.skills import WALK, Action, AssistantSkills, ObservationView
-from vico.agents.base import AgentState
+from vico.agents.base import FieldState
 from vico.agents.perception import Sighting
 from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, PACE_HOME
 from vico.agents.talk.sentences import place_named, whereabouts
@@ -25,16 +25,19 @@ Region = Mapping[str, Any]
 
 PERSON = "resident"
 _OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
-# One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
-# somebody who is out of view for so long, or hands nothing over, steps.
-_SPEAK, _STAND, _ASK_AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
+_SPEAK = CALL_DISTANCE - 3.0  # metres from which one speaks
+_STAND = HAND_OVER_DISTANCE - 0.3  # metres at which one stands to be handed something
+_ASK_AGAIN = 20  # steps until one asks again
+_LOST = 25  # steps out of view after which somebody is given up
+_LONGEST = 150  # steps after which one gives up, handed or not
 # Who follows keeps behind by so much, runs where it is more than the second, metres, else walks as they do; no longer
 # than for so many steps.
 _BEHIND, _RUN_BEYOND = 1.7, 2.2
 _ESCORT = 700
-# In a room, who has moved less than so much a step, metres, for so many steps is let pass: one goes out, makes room for
-# so many steps, and waits so long for them to come out.
-_STANDS, _LETS_PASS, _ROOM_STEPS, _COMES_OUT = 0.15, 5, 3, 40
+_STANDS = 0.15  # in a room, metres a step below which somebody stands
+_LETS_PASS = 5  # steps that they stand until one lets them pass, and goes out
+_ROOM_STEPS = 3  # steps for which one makes room then
+_COMES_OUT = 40  # steps for which one waits for them to come out
 # ... goes to where the person was last seen for so many steps, then home by the map.
 _TO_LAST_SEEN = 8
 # So many pixels are shown where 20 are asked for, from these distances, metres, of which the first is tried first.
@@ -47,36 +50,23 @@ def person_in_view(view: ObservationView, name: str) -> Sighting | None:
     return next((seen for seen in view.things if seen.name == name and seen.kind == PERSON), None)
 
 
-class Meet:
+class Meet(FieldState):
     """Go up to a person in view, offer help, and take what they hand over. Outcomes: ``handed``, ``lost``."""
+
+    _pursuit: Pursuit
+    _unseen: int = 0
+    _steps: int = 0
+    _spoke_at: int = -_ASK_AGAIN
+    _before: int | None = None
 
     def __init__(self, skills: AssistantSkills, person: str, count: int, where: NDArray[np.float64] | None) -> None:
         self.outcome = ""
         self._skills, self._person, self._count = skills, person, count
         self._pursuit = Pursuit(skills, where)
-        self._unseen = self._steps = 0
-        self._spoke_at = -_ASK_AGAIN
-        self._before: int | None = None
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {
-            "pursuit": self._pursuit.state(),
-            "unseen": self._unseen,
-            "steps": self._steps,
-            "spoke_at": self._spoke_at,
-            "before": self._before,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._pursuit.restore(state["pursuit"])
-        self._unseen, self._steps = state["unseen"], state["steps"]
-        self._spoke_at, self._before = state["spoke_at"], state["before"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action."""
-        held = sum(entity > 0 for entity in view.held)
+        held = sum(entity > 0 for entity in view.hands)
         if self._before is None:
             self._before = held
         self._steps += 1
@@ -105,31 +95,19 @@ class Meet:
         return {"type": "turn_left", "degrees": 88.0} if self._unseen else {"type": "wait"}
 
 
-class Escort:
+class Escort(FieldState):
     """Follow a person home, and go inside. Outcomes: ``home``, ``stuck``."""
+
+    _pursuit: Pursuit
+    _lost: int = 0
+    _steps: int = 0
+    _still: int = 0
+    _ahead: bool = False
 
     def __init__(self, skills: AssistantSkills, person: str, home: Region) -> None:
         self.outcome = ""
         self._skills, self._person, self._home = skills, person, home
         self._pursuit = Pursuit(skills)
-        self._lost = self._steps = self._still = 0
-        self._ahead = False
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {
-            "pursuit": self._pursuit.state(),
-            "lost": self._lost,
-            "steps": self._steps,
-            "still": self._still,
-            "ahead": self._ahead,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._pursuit.restore(state["pursuit"])
-        self._lost, self._steps = state["lost"], state["steps"]
-        self._still, self._ahead = state["still"], state["ahead"]
 
     def _await_outside(self, view: ObservationView, in_view: bool) -> Action:
         """Make room before the door, and look back until they come out."""
@@ -173,7 +151,7 @@ class Escort:
         return self._skills.go_inside(view, str(self._home["place"])) or {"type": "wait"}
 
 
-class Show:
+class Show(FieldState):
     """Have a thing well in view from near by, as a report asks for. Outcomes: ``shown``, ``lost``.
 
     Parameters
@@ -182,21 +160,15 @@ class Show:
         Farthest distance at which it counts, metres.
     """
 
+    target: Sighting
+    _try: int = 0
+    _steps: int = 0
+    _aimed: bool = False
+
     def __init__(self, skills: AssistantSkills, target: Sighting, *, within: float) -> None:
         self.outcome = ""
         self.target = target
         self._skills, self._within = skills, within
-        self._try = self._steps = 0
-        self._aimed = False
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {"target": self.target.state(), "try": self._try, "steps": self._steps, "aimed": self._aimed}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self.target, self._try = Sighting(**state["target"]), state["try"]
-        self._steps, self._aimed = state["steps"], state["aimed"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action."""
@@ -222,21 +194,14 @@ class Show:
         return {"type": "wait"}
 
 
-class Report:
+class Report(FieldState):
     """Report a subtask as done. Outcome: ``reported``."""
+
+    _said: bool = False
 
     def __init__(self, index: int) -> None:
         self.outcome = ""
         self._index = index
-        self._said = False
-
-    def state(self) -> AgentState:
-        """Return whether it was said."""
-        return {"said": self._said}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._said = state["said"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the report; None after it."""
@@ -247,21 +212,14 @@ class Report:
         return {"type": "task_complete", "index": self._index}
 
 
-class AwaitPerson:
+class AwaitPerson(FieldState):
     """Stay until somebody has come in, too. Outcomes: ``came``, ``did not come``."""
+
+    _steps: int = 0
 
     def __init__(self, person: str, patience: int) -> None:
         self.outcome = ""
         self._person, self._patience = person, patience
-        self._steps = 0
-
-    def state(self) -> AgentState:
-        """Return how long it has waited."""
-        return {"steps": self._steps}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._steps = state["steps"]
 
     def act(self, view: ObservationView) -> Action | None:
         """Look about; None once they came, or patience is at its end."""
@@ -275,12 +233,13 @@ class AwaitPerson:
         return {"type": "turn_left", "degrees": 88.0}
 
 
-# Who is nearer than this is asked, metres; so many questions each, so many steps between two questions.
-_ASK_DISTANCE, _MAX_QUESTIONS, _QUESTION_PAUSE = 4.5, 3, 2
+_ASK_DISTANCE = 4.5  # metres within which somebody is asked
+_MAX_QUESTIONS = 3  # questions to each, at most
+_QUESTION_PAUSE = 2  # steps between two questions
 _QUESTION = "Excuse me, have you seen {}?"
 
 
-class Enquiries:
+class Enquiries(FieldState):
     """Whom one has asked for whom, and what was answered.
 
     Parameters
@@ -289,28 +248,15 @@ class Enquiries:
         Knows the places that answers name.
     """
 
+    _asked: dict[str, list[str]]
+    _last: int = -_QUESTION_PAUSE
+    _step: int = 0
+    # By person's name, ids of the places where somebody said that they are, were or usually are.
+    places: dict[str, list[str]]
+
     def __init__(self, public_map: PublicMap) -> None:
         self._map = public_map
-        self._asked: dict[str, list[str]] = {}
-        self._last = -_QUESTION_PAUSE
-        self._step = 0
-        #: By person's name, ids of the places where somebody said that they are, were or usually are.
-        self.places: dict[str, list[str]] = {}
-
-    def state(self) -> AgentState:
-        """Return all of it."""
-        return {
-            "asked": {who: list(names) for who, names in self._asked.items()},
-            "last": self._last,
-            "step": self._step,
-            "places": {who: list(places) for who, places in self.places.items()},
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Know what `state` returned."""
-        self._asked = {who: list(names) for who, names in state["asked"].items()}
-        self._last, self._step = state["last"], state["step"]
-        self.places = {who: list(places) for who, places in state["places"].items()}
+        self._asked, self.places = {}, {}
 
     def listen(self, view: ObservationView, wanted: Mapping[int, str]) -> list[tuple[int, PublicPlace, str]]:
         """Take in what was said; return by subtask where people may be that nobody had said before, and what was said.

@@ -30,7 +30,7 @@ from vico.io.compiled import compiled
 from vico.world.public import PublicMap
 
 #: How far a subtask has come: to be found, in hand, done.
-OPEN, IN_HAND, DONE = 0, 1, 2
+OPEN, IN_HAND, DONE = range(3)
 #: How much a subtask that is done at the end counts less than one that is done at once.
 IMPATIENCE = 0.25
 
@@ -230,9 +230,10 @@ _MEMORY_TIME = 1200.0
 _SIGHTING_FACTOR = 4.0
 _CLAIM_FACTORS = {"see": 3.0, "myself": 3.0, "saw_in": 1.5, "saw_near": 1.0, "told": 1.0, "usual": 0.4}
 _OTHER_CLAIM_FACTOR = 0.3
-# Chance that things are where nobody said; and people, who are at one of the places that are told at first and go on
-# later: at first, and by how much more each second.
-_ELSEWHERE_THINGS, _ELSEWHERE, _ELSEWHERE_LATER, _ELSEWHERE_MOST = 0.03, 0.03, 0.0002, 0.35
+_ELSEWHERE_THINGS = 0.03  # chance that a thing is where nobody said
+_ELSEWHERE = 0.03  # chance that a person is, at first: they are at a place that was told
+_ELSEWHERE_LATER = 0.0002  # and by how much more each second, for they go on
+_ELSEWHERE_MOST = 0.35  # at most
 # How much of their time people are at each place that somebody says they are often seen at, at least.
 _LEAST_SHARE = 0.04
 
@@ -387,15 +388,15 @@ class SituationBuilder:
             Seconds to the end.
         """
         here = (float(view.pose[0]), float(view.pose[1]))
-        return self._made(subtasks, here, view, seen, left)
+        return self._situation_of(subtasks, here, view, seen, left)
 
     def from_point(
         self, subtasks: Sequence[int], point: Point, view: ObservationView, left: float
     ) -> tuple[Situation, list[Choice]]:
         """Return the situation of somebody at a point who knows what was told alone."""
-        return self._made(subtasks, point, view, {}, left)
+        return self._situation_of(subtasks, point, view, {}, left)
 
-    def _made(
+    def _situation_of(
         self,
         subtasks: Sequence[int],
         here: Point,
@@ -413,7 +414,9 @@ class SituationBuilder:
         points = list(dict.fromkeys([here, *(spot.point for spot in spots), *(end for end in ends if end)]))
         index = {point: i for i, point in enumerate(points)}
         travel = np.array([[self._seconds(a, b, here) for b in points] for a in points], np.float64)
-        load = [max(held[k], len(self.book.wanted(k)), 1) if self.book.category(k) != "search" else 0 for k in tasks]
+        load = [
+            max(held[k], len(self.book.missing_names(k)), 1) if self.book.category(k) != "search" else 0 for k in tasks
+        ]
         situation = Situation(
             travel=travel.reshape(len(points), len(points)),
             spot_point=np.array([index[spot.point] for spot in spots], np.int64),
@@ -428,7 +431,7 @@ class SituationBuilder:
             put=np.array([PUT * n + self._doors(k) for k, n in zip(tasks, load, strict=True)], np.float64),
             load=np.minimum(np.array(load, np.int64), 2),
             stage=np.array([IN_HAND if held[k] else OPEN for k in tasks], np.int64),
-            hands=view.held.count(0),
+            hands=view.hands.count(0),
             left=left,
         )
         return situation, [spot.choice for spot in spots] + [Choice("deliver", k) for k in tasks]

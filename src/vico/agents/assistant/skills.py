@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState, generator_state, restore_generator
+from vico.agents.base import AgentState, FieldState
 from vico.agents.navigation.navigator import Navigator
 from vico.agents.navigation.path_planning import Target
 from vico.agents.perception import Sighting, SightingMemory, sightings
@@ -64,12 +64,12 @@ class ObservationView:
         return self.state["place"] or None
 
     @property
-    def held(self) -> list[int]:
+    def hands(self) -> list[int]:
         """Entities in the hands, 0 where one is free."""
         return [int(entity or 0) for entity in self.state["held"]]
 
     @property
-    def refused(self) -> bool:
+    def was_refused(self) -> bool:
         """Whether the last action was refused."""
         return str(self.state["action_status"]) == "refused"
 
@@ -84,7 +84,7 @@ class ObservationView:
         return math.hypot(x, y)
 
 
-class AssistantSkills:
+class AssistantSkills(FieldState):
     """The skills of one assistant, with what it remembers of rooms and things.
 
     Parameters
@@ -95,41 +95,27 @@ class AssistantSkills:
         Decides how it gets out of others' way.
     """
 
+    _generator: np.random.Generator
+    navigator: Navigator
+    seen: SightingMemory
+    places: dict[str, str]  # the place to which each room that one was in belongs
+    _trail: list[str]
+    _tries: int = 0
+
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self.map = public_map
-        self._rng = generator
+        self._generator = generator
         self.navigator = Navigator(public_map, generator)
         self.navigator.walker.wide_drift = _DRIFT
         self.seen = SightingMemory()
         #: Metres a second outdoors.
         self.pace = WALK
-        #: Which place each room that one was in belongs to.
-        self.places: dict[str, str] = {}
-        self._trail: list[str] = []
-        self._tries = 0
-
-    def state(self) -> AgentState:
-        """Return the way under way, what is known of rooms and things, and where chance stands."""
-        return {
-            "generator": generator_state(self._rng),
-            "navigator": self.navigator.state(),
-            "seen": self.seen.state(),
-            "places": dict(self.places),
-            "trail": list(self._trail),
-            "tries": self._tries,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on with what `state` returned."""
-        restore_generator(self._rng, state["generator"])
-        self.navigator.restore(state["navigator"])
-        self.seen.restore(state["seen"])
-        self.places, self._trail, self._tries = dict(state["places"]), list(state["trail"]), state["tries"]
+        self.places, self._trail = {}, []
 
     def notice(self, view: ObservationView) -> None:
         """Take in a new observation: what stands where, what was seen, and the way one came."""
         self.navigator.notice(
-            dict(view.observation), dict(view.info), ignore=[entity for entity in view.held if entity]
+            dict(view.observation), dict(view.info), ignore=[entity for entity in view.hands if entity]
         )
         self.seen.notice(view.observation, view.things)
         room = view.room
@@ -159,8 +145,8 @@ class AssistantSkills:
         place = self.map.place_by_id[place_id]
         door = place.entrance or place.position
         at_door = view.away(door) <= ENTER_REACH
-        if at_door and not (view.refused and self._tries > 3):
-            self._tries = self._tries + 1 if view.refused else 1
+        if at_door and not (view.was_refused and self._tries > 3):
+            self._tries = self._tries + 1 if view.was_refused else 1
             return {"type": "enter", "place": place_id}
         self._tries = 0
         # The spot before it that maps show may lie a little too far off.
@@ -231,8 +217,9 @@ class AssistantSkills:
 # Views of 90 degrees overlap a little, four of them show everything around.
 _TURN = 88.0
 _VIEWS = 4
-# So long one tries to get to a spot outdoors, to the middle of a room and to a door, steps.
-_SPOT, _MIDDLE, _DOOR = 25, 12, 40
+_SPOT = 25  # steps in which one tries to get to a spot outdoors
+_MIDDLE = 12  # to the middle of a room
+_DOOR = 40  # to a door
 # Spots outdoors lie so far from the region's middle, share of its radius; regions smaller than this, metres, need none.
 _RING, _ONE_LOOK = 0.6, 5.0
 # One looks from spots at most so far apart, metres.

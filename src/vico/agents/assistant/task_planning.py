@@ -77,10 +77,10 @@ class TaskModel:
         held = {k: len(book.in_hand(k, view)) for k in subtasks}
         self.subtasks = [k for k in subtasks if book.is_open(k) and (held[k] or self._regions(k) or k in seen)]
         #: How many hands each subtask's things take.
-        self.load = [max(held[k], len(book.wanted(k)), 1) for k in self.subtasks]
+        self.load = [max(held[k], len(book.missing_names(k)), 1) for k in self.subtasks]
         stages = tuple(IN_HAND if held[k] else OPEN for k in self.subtasks)
         at = (float(view.pose[0]), float(view.pose[1]))
-        self.start = TaskState(at, DOOR if view.room else 0.0, stages, view.held.count(0))
+        self.start = TaskState(at, DOOR if view.room else 0.0, stages, view.hands.count(0))
 
     def _regions(self, k: int) -> list[int]:
         """Source regions of a subtask that were looked through least, if not too often."""
@@ -93,14 +93,14 @@ class TaskModel:
         for i, k in enumerate(self.subtasks):
             stage = outlook.stages[i]
             if stage == IN_HAND:
-                yield Choice("deliver", k), self._delivered(outlook, i, k), 1.0
+                yield Choice("deliver", k), self._after_delivery(outlook, i, k), 1.0
             elif stage == OPEN and self._has_room(outlook, i, k):
-                yield from self._found(outlook, i, k)
+                yield from self._find_steps(outlook, i, k)
 
     def _has_room(self, outlook: TaskState, i: int, k: int) -> bool:
         return self.book.category(k) == "search" or outlook.hands >= min(self.load[i], 2)
 
-    def _found(self, outlook: TaskState, i: int, k: int) -> Iterator[tuple[Choice, TaskState, float]]:
+    def _find_steps(self, outlook: TaskState, i: int, k: int) -> Iterator[tuple[Choice, TaskState, float]]:
         """Yield how a subtask's thing or person may be found."""
         category, told = self.book.category(k), self.book.instructions[k]
         if k in self.seen:
@@ -130,7 +130,7 @@ class TaskModel:
         walk = self.estimates.travel(point, end, pace=PACE_HOME)
         return TaskState(end, time + MEET + walk + DOOR + PUT, _with_stage(outlook.stages, i, DONE), outlook.hands)
 
-    def _delivered(self, outlook: TaskState, i: int, k: int) -> TaskState:
+    def _after_delivery(self, outlook: TaskState, i: int, k: int) -> TaskState:
         region = self.book.instructions[k]["destination"]
         point = (float(region["centre"][0]), float(region["centre"][1]))
         seconds = self.estimates.travel(outlook.at, point) + PUT * self.load[i]
@@ -189,7 +189,11 @@ def best_plan(model: TaskModel, left: float) -> TaskPlan:
             for choice, reached, likely in model.steps(outlook):
                 if reached.time > left:
                     continue
-                longer = _extend_plan(plan, choice, outlook, reached, likely=likely, left=left)
+                gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
+                worth = plan.worth + gained * likely * (1.0 - IMPATIENCE * reached.time / max(left, 1.0))
+                longer = TaskPlan(
+                    (*plan.choices, choice), plan.done + gained, reached.time if gained else plan.time, worth
+                )
                 if not _add_label(after.setdefault((reached.at, reached.stages), []), (reached, longer)):
                     continue
                 if (longer.worth, -longer.time) > (best.worth, -best.time):
@@ -198,15 +202,6 @@ def best_plan(model: TaskModel, left: float) -> TaskPlan:
         if len(front) > _MAX_LABELS:
             front = sorted(front, key=lambda label: (-label[1].worth, label[0].time))[:_MAX_LABELS]
     return best
-
-
-def _extend_plan(
-    plan: TaskPlan, choice: Choice, outlook: TaskState, reached: TaskState, *, likely: float, left: float
-) -> TaskPlan:
-    """Return a plan that is one choice longer."""
-    gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
-    worth = plan.worth + gained * likely * (1.0 - IMPATIENCE * reached.time / max(left, 1.0))
-    return TaskPlan((*plan.choices, choice), plan.done + gained, reached.time if gained else plan.time, worth)
 
 
 def _add_label(labels: list[_Label], new: _Label) -> bool:
@@ -243,7 +238,7 @@ class MctsPlanner(ChoicePlanner):
 
     def decide(self, view: ObservationView) -> Choice | None:
         """Return the choice of the most visited child of the root."""
-        model = TaskModel(self.book, self.estimates, self.mine, view, self.seen(view))
+        model = TaskModel(self.book, self.estimates, self.mine, view, self.last_sightings(view))
         now = float(view.state["time"])
         chance = rng(self.seed, "mcts", self.number, round(now))
         root = _Node(model.start, untried=list(model.steps(model.start)))
@@ -274,11 +269,11 @@ def _select_child(node: _Node, worst: float, best: float) -> _Node:
     """Return the child with the highest upper confidence bound, rewards scaled to 0..1."""
     spread = max(best - worst, 1e-9)
 
-    def bound(child: _Node) -> float:
+    def confidence_bound(child: _Node) -> float:
         mean = (child.value / child.visits - worst) / spread
         return mean + EXPLORATION * math.sqrt(math.log(node.visits) / child.visits)
 
-    return max(node.children, key=bound)
+    return max(node.children, key=confidence_bound)
 
 
 def _after_failure(before: TaskState, after: TaskState) -> TaskState:

@@ -19,40 +19,24 @@ _POLICIES = PACKAGED / "agents" / "commute"
 Instructions = list[dict[str, Any]]
 
 
-def _rule(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
-    return Commuter(WalkPlanner(public_map), public_map, seed=seed)
-
-
-def _llm(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
-    return Commuter(LlmPlanner(instructions, public_map), public_map, seed=seed)
-
-
-def _mcts(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
-    return Commuter(MctsPlanner(public_map, seed=seed), public_map, seed=seed)
-
-
-def _ours(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
-    return Commuter(DayPlanner(instructions, public_map), public_map, seed=seed)
-
-
 def _learned_agent_maker(name: str) -> Callable[[Instructions, PublicMap, int], Agent]:
     """Return the maker of the agent that acts by a packaged policy."""
 
-    def made(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+    def make(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
         from vico.agents.commute.learning import Network, PolicyCommuter  # compiled code, slow to import
 
         return PolicyCommuter(Network.read(_POLICIES / f"{name}.npz"), public_map, seed=seed)
 
-    return made
+    return make
 
 
 METHODS: dict[str, Callable[[Instructions, PublicMap, int], Agent]] = {
-    "rule": _rule,
-    "mcts": _mcts,
-    "llm": _llm,
+    "rule": lambda _, public_map, seed: Commuter(WalkPlanner(public_map), public_map, seed=seed),
+    "mcts": lambda _, public_map, seed: Commuter(MctsPlanner(public_map, seed=seed), public_map, seed=seed),
+    "llm": lambda told, public_map, seed: Commuter(LlmPlanner(told, public_map), public_map, seed=seed),
     "ppo": _learned_agent_maker("ppo"),
     "a2c": _learned_agent_maker("a2c"),
-    "ours": _ours,
+    "ours": lambda told, public_map, seed: Commuter(DayPlanner(told, public_map), public_map, seed=seed),
 }
 
 

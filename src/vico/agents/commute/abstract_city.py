@@ -68,6 +68,18 @@ OBSERVATION_NAMES = (
     *(f"free_{round(360 * k / RAYS)}" for k in range(RAYS)),
 )
 OBSERVATION_SIZE = len(OBSERVATION_NAMES)
+_GOAL_AHEAD = OBSERVATION_NAMES.index("goal_ahead")
+_TIME_LEFT = OBSERVATION_NAMES.index("time_left")
+_ON_FOOT = OBSERVATION_NAMES.index("on_foot")
+_WAS_STOPPED = OBSERVATION_NAMES.index("was_stopped")
+_CASH_LEFT = OBSERVATION_NAMES.index("cash")
+_STATION_AHEAD = OBSERVATION_NAMES.index("station_ahead")
+_STATION_GIVES = OBSERVATION_NAMES.index("station_gives")
+_STATION_TAKES = OBSERVATION_NAMES.index("station_takes")
+_STOP_AHEAD = OBSERVATION_NAMES.index("stop_ahead")
+_BUS_SOON = OBSERVATION_NAMES.index("bus_soon")
+_IS_LAST = OBSERVATION_NAMES.index("last")
+_FREE_AHEAD = OBSERVATION_NAMES.index("free_0")
 
 
 class CityArrays(NamedTuple):
@@ -244,7 +256,7 @@ def next_arrival(city: CityArrays, stop: int, time: float) -> float:
 
 @compiled
 def _write_direction(out: NDArray[np.float32], k: int, east: float, north: float, heading: float) -> None:
-    """Note a direction as ahead and to the left, and how far it is, three numbers."""
+    """Write a direction as ahead and to the left, and how far it is, three numbers."""
     away = math.hypot(east, north)
     angle = math.atan2(north, east) - heading
     out[k], out[k + 1], out[k + 2] = math.cos(angle), math.sin(angle), math.log1p(away) / 6.0
@@ -252,34 +264,34 @@ def _write_direction(out: NDArray[np.float32], k: int, east: float, north: float
 
 @compiled
 def observe(city: CityArrays, state: NDArray[np.float64], out: NDArray[np.float32]) -> None:
-    """Note what an agent knows and sees; `fields.SEEN_NAMES` says in which order.
+    """Write what an agent knows and sees, in the order of `OBSERVATION_NAMES`.
 
     Parameters
     ----------
     state
         Of the agent, shape ``(fields,)``.
     out
-        Filled in, shape ``(SEEN,)``.
+        Filled in, shape ``(OBSERVATION_SIZE,)``.
     """
     x, y, heading, time = state[X], state[Y], state[HEADING], state[TIME]
     out[:] = 0.0
-    _write_direction(out, 0, state[GOAL_X] - x, state[GOAL_Y] - y, heading)
-    out[3] = min(2.0, max(-1.0, (state[DUE] - time) / 600.0))
-    out[4 + int(state[VEHICLE])] = 1.0
-    out[7] = state[HIT]
-    out[8] = min(1.0, state[CASH] / 100.0)
+    _write_direction(out, _GOAL_AHEAD, state[GOAL_X] - x, state[GOAL_Y] - y, heading)
+    out[_TIME_LEFT] = min(2.0, max(-1.0, (state[DUE] - time) / 600.0))
+    out[_ON_FOOT + int(state[VEHICLE])] = 1.0
+    out[_WAS_STOPPED] = state[HIT]
+    out[_CASH_LEFT] = min(1.0, state[CASH] / 100.0)
     station = nearest_index(city.station_xy, x, y)
     if station >= 0:
-        _write_direction(out, 9, city.station_xy[station, 0] - x, city.station_xy[station, 1] - y, heading)
-        out[12] = 1.0 if city.gives[station] else 0.0
-        out[13] = 1.0 if city.takes[station] else 0.0
+        _write_direction(out, _STATION_AHEAD, city.station_xy[station, 0] - x, city.station_xy[station, 1] - y, heading)
+        out[_STATION_GIVES] = 1.0 if city.gives[station] else 0.0
+        out[_STATION_TAKES] = 1.0 if city.takes[station] else 0.0
     stop = nearest_index(city.stop_xy, x, y)
     if stop >= 0:
-        _write_direction(out, 14, city.stop_xy[stop, 0] - x, city.stop_xy[stop, 1] - y, heading)
-        out[17] = 1.0 / (1.0 + next_arrival(city, stop, time) / 60.0)
-    out[18] = state[LAST]
+        _write_direction(out, _STOP_AHEAD, city.stop_xy[stop, 0] - x, city.stop_xy[stop, 1] - y, heading)
+        out[_BUS_SOON] = 1.0 / (1.0 + next_arrival(city, stop, time) / 60.0)
+    out[_IS_LAST] = state[LAST]
     for k in range(RAYS):
-        out[19 + k] = math.log1p(cast_ray(city, x, y, heading + 2.0 * math.pi * k / RAYS)) / 3.0
+        out[_FREE_AHEAD + k] = math.log1p(cast_ray(city, x, y, heading + 2.0 * math.pi * k / RAYS)) / 3.0
 
 
 @compiled
@@ -432,6 +444,6 @@ def step_all(
 
 @compiled
 def observe_all(city: CityArrays, states: NDArray[np.float64], out: NDArray[np.float32]) -> None:
-    """Note what many agents see, shapes ``(k, fields)`` and ``(k, SEEN)``."""
+    """Write what many agents see, shapes ``(k, STATE_SIZE)`` and ``(k, OBSERVATION_SIZE)``."""
     for i in range(states.shape[0]):
         observe(city, states[i], out[i])

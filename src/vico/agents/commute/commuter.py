@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from vico.agents.base import Action, AgentState, Info, Observation, generator_state, restore_generator
+import numpy as np
+
+from vico.agents.base import Action, FieldState, Info, Observation
 from vico.agents.commute.legs import LegMaker
 from vico.agents.travel import Traveller
 from vico.rules import WALK_SPEED
@@ -55,7 +57,7 @@ class CommuteQuery:
 Planner = Callable[[CommuteQuery], Trip | None]
 
 
-class Commuter:
+class Commuter(FieldState):
     """Makes the trips that a planner plans, one commute after the other, from observations and the public map.
 
     Parameters
@@ -73,13 +75,16 @@ class Commuter:
         The modes of the trips planned so far.
     """
 
+    _traveller: Traveller
+    _generator: np.random.Generator
+    _asked: int = -1
+    _departs: float = 0.0
+
     def __init__(self, planner: Planner, public_map: PublicMap, *, seed: int) -> None:
         self.planner = planner
-        self._rng = rng(seed, "commuter")
-        self._traveller = Traveller(public_map, self._rng, planner=self._plan, fastest=WALK_SPEED)
+        self._generator = rng(seed, "commuter")
+        self._traveller = Traveller(public_map, self._generator, planner=self._plan, fastest=WALK_SPEED)
         self._commute: dict[str, Any] = {}
-        self._asked = -1
-        self._departs = 0.0
         self.trip_modes: list[tuple[str, ...]] = []
 
     def act(self, observation: Observation, info: Info) -> Action:
@@ -117,21 +122,6 @@ class Commuter:
             self.trip_modes.append(trip.modes)
             self._departs = trip.depart
         return trip
-
-    def state(self) -> AgentState:
-        """Return the trip under way, and where the stream of chance stands."""
-        return {
-            "traveller": self._traveller.state(),
-            "generator": generator_state(self._rng),
-            "asked": self._asked,
-            "departs": self._departs,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on with the trip that `state` returned."""
-        self._traveller.restore(state["traveller"])
-        restore_generator(self._rng, state["generator"])
-        self._asked, self._departs = int(state["asked"]), float(state["departs"])
 
 
 class WalkPlanner:

@@ -26,7 +26,13 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation, generator_state, heading, restore_generator
+from vico.agents.base import (
+    Action,
+    FieldState,
+    Info,
+    Observation,
+    heading,
+)
 from vico.agents.commute.abstract_city import (
     ACTIONS,
     BEGAN,
@@ -321,7 +327,7 @@ class Network:
         return x
 
 
-class PolicyCommuter:
+class PolicyCommuter(FieldState):
     """Acts by a trained network, one second after the other, as it was trained: actions are drawn by their chances.
 
     Parameters
@@ -334,10 +340,12 @@ class PolicyCommuter:
         Of the episode.
     """
 
+    _generator: np.random.Generator
+
     def __init__(self, network: Network, public_map: PublicMap, *, seed: int) -> None:
         self._network = network
         self._city: CityArrays = city_arrays(public_map, dwell=BUS_DWELL)
-        self._rng = rng(seed, "commute policy")
+        self._generator = rng(seed, "commute policy")
         self._state = np.zeros(STATE_SIZE)
         self._seen = np.zeros(OBSERVATION_SIZE, np.float32)
 
@@ -347,7 +355,7 @@ class PolicyCommuter:
         observe(self._city, self._state, self._seen)
         logits = self._network.logits(self._seen).astype(np.float64)
         chances = each(math.exp, logits - logits.max())
-        kind = int(np.searchsorted(np.cumsum(chances), self._rng.random() * chances.sum()))
+        kind = int(np.searchsorted(np.cumsum(chances), self._generator.random() * chances.sum()))
         name = ACTIONS[min(kind, len(ACTIONS) - 1)]
         if name == "move_forward":
             speed = BIKE_SPEED if self._state[VEHICLE] == BIKE else WALK_SPEED
@@ -355,14 +363,6 @@ class PolicyCommuter:
         if name in ("turn_left", "turn_right"):
             return {"type": name, "degrees": math.degrees(TURN)}
         return {"type": name}
-
-    def state(self) -> AgentState:
-        """Return where its stream of chance stands."""
-        return {"generator": generator_state(self._rng)}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on where another one was."""
-        restore_generator(self._rng, state["generator"])
 
 
 def fill_state(state: NDArray[np.float64], observation: Observation, commute: Mapping[str, Any]) -> None:

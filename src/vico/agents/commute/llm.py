@@ -109,11 +109,11 @@ class LlmPlanner:
         """Return the trip that the model plans; the walk if it plans none that can be made."""
         if question.vehicle == "bike":
             return self._legs.brought_back(question.here, question.goal, question.now, question.closed)
-        plan = self._asked(question)
+        plan = self._ask_model(question)
         trip = None if plan is None else self.trip_of(plan, question)
         return trip if trip is not None else self._walk(question)
 
-    def _asked(self, question: CommuteQuery) -> CommutePlan | None:
+    def _ask_model(self, question: CommuteQuery) -> CommutePlan | None:
         if self._model is None:
             self.fallbacks["unset"] += 1
             return None
@@ -200,7 +200,7 @@ class LlmPlanner:
             to = step.goal_place
             if to != _GOAL and to not in known:
                 return [f"step {k}: there is no stop or station {to!r}; give an id of the lists, or {_GOAL!r}"]
-            if step.transit_type == "bus" and not self._served(here, to):
+            if step.transit_type == "bus" and not self._is_served(here, to):
                 found.append(f"step {k}: no line goes from {here or 'where they are'} to {to} without a change")
             if step.transit_type == "bike" and not {here, to} <= self._legs.stations.keys():
                 found.append(f"step {k}: a bicycle goes from one bicycle station to another, not from {here!r} to {to}")
@@ -209,7 +209,7 @@ class LlmPlanner:
             found.append(f"the last step leads to {here}; it has to lead to {_GOAL!r}")
         return found
 
-    def _served(self, origin: str, destination: str) -> bool:
+    def _is_served(self, origin: str, destination: str) -> bool:
         stops = self._legs.stops
         return origin in stops and destination in stops and destination in self._legs.reached_from(origin)
 

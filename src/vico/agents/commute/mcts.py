@@ -128,13 +128,18 @@ class MctsPlanner:
         best, best_reward = root, self._reward(root, question)
         low = best_reward
         for _ in range(self._settings.iterations):
-            node = self._selected(root, question, best_reward - low or 1.0)
-            node = self._expanded(node, question, chance)
+            node = self._select(root, question, best_reward - low or 1.0)
+            node = self._expand(node, question, chance)
             value = self._reward(node, question)
             low = min(low, value)
             if value > best_reward:
                 best, best_reward = node, value
-            _back_up(node, value)
+            # The reward counts at the node and at all above it.
+            above: Node | None = node
+            while above is not None:
+                above.visits += 1
+                above.total += value
+                above = above.parent
         moves: list[Move] = []
         walker: Node | None = best
         while walker is not None and walker.move is not None:
@@ -145,7 +150,7 @@ class MctsPlanner:
     def _reward(self, node: Node, question: CommuteQuery) -> float:
         return -node.seconds - self._settings.alpha * math.dist(node.point, question.goal)
 
-    def _selected(self, node: Node, question: CommuteQuery, scale: float) -> Node:
+    def _select(self, node: Node, question: CommuteQuery, scale: float) -> Node:
         """Go down to a node that has moves left to try, by UCB1."""
         while True:
             if node.untried is None:
@@ -161,7 +166,7 @@ class MctsPlanner:
                 ),
             )
 
-    def _expanded(self, node: Node, question: CommuteQuery, chance: np.random.Generator) -> Node:
+    def _expand(self, node: Node, question: CommuteQuery, chance: np.random.Generator) -> Node:
         if not node.untried:
             return node
         move = node.untried.pop(int(chance.integers(len(node.untried))))
@@ -219,16 +224,6 @@ class MctsPlanner:
         if last is not None:
             legs.append(last)
         return Trip(question.now, tuple(legs)) if legs else None
-
-
-def _back_up(node: Node, value: float) -> None:
-    """Note a reward at a node and all above it."""
-    while True:
-        node.visits += 1
-        node.total += value
-        if node.parent is None:
-            return
-        node = node.parent
 
 
 def _point_towards(point: Point2, goal: Point2, stride: float) -> Point2:

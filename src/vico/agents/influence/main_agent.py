@@ -23,7 +23,6 @@ from vico.agents.influence.situation import (
     Situation,
     Talk,
     Visit,
-    visit_from_record,
 )
 from vico.agents.influence.strategies import Strategy, shorten
 from vico.agents.influence.visiting import Visitor, body_in_view
@@ -125,7 +124,7 @@ class Courtship:
         talk.said.append(said)
         return f"{self._address[talk.target]}! {said[0].upper()}{said[1:]}"
 
-    def heard(self, answer: str) -> None:
+    def note_answer(self, answer: str) -> None:
         """Note what the member answered."""
         self.talks[-1].answers.append(shorten(answer, _LONGEST))
 
@@ -153,7 +152,7 @@ class Courtship:
         """Remember what `state` returned."""
         restore_generator(self._rng, state["generator"])
         self.talks = [_talk_from_record(state["talks"][str(k)]) for k in range(len(state["talks"]))]
-        self.visits = [visit_from_record(state["visits"][str(k)]) for k in range(len(state["visits"]))]
+        self.visits = [Visit(**state["visits"][str(k)]) for k in range(len(state["visits"]))]
         self._not_before = {str(name): float(time) for name, time in state["not_before"].items()}
 
     def _end_visit(self, ending: Ending, time: float) -> None:
@@ -182,9 +181,9 @@ def _talk_from_record(record: Mapping[str, Any]) -> Talk:
     return Talk(str(record["target"]), float(record["began"]), said, answers)
 
 
-# One thinks again after so many seconds where there is nobody to see, waits so long for an answer, and looks for
-# somebody no longer than the way takes and so many seconds more.
-_THINK_TIME, _ANSWER_TIME, _SEARCH_TIME = 30.0, 6.0, 600.0
+_THINK_TIME = 30.0  # seconds until one thinks again where there is nobody to see
+_ANSWER_TIME = 6.0  # seconds that one waits for an answer
+_SEARCH_TIME = 600.0  # seconds that one looks for somebody, beside those of the way
 # How far a voice is to carry, metres.
 _VOICE = 3.0
 _ON_THE_WAY = "on my way"
@@ -236,7 +235,11 @@ class MainAgent:
             return self._give_up(time, self._visitor.failure)
         if step is not None and time > self._until:
             return self._give_up(time, "not found" if self._visitor.is_there else "not reached")
-        return self._begin(observation, info, time) if step is None else step
+        if step is not None:
+            return step
+        self._talks = True
+        self.courtship.begin(self._target, time % DAY)
+        return self._say(observation, info, time)
 
     def state(self) -> AgentState:
         """Return all it remembers."""
@@ -276,18 +279,13 @@ class MainAgent:
         self.courtship.set_out(target, stay.place, of_day)
         return True
 
-    def _begin(self, observation: Observation, info: Info, time: float) -> Action:
-        self._talks = True
-        self.courtship.begin(self._target, time % DAY)
-        return self._say(observation, info, time)
-
     def _talk(self, observation: Observation, info: Info, time: float) -> Action:
         """Wait for the answer, then say the next thing."""
         answers = [
             e["text"] for e in observation["events"] if e["speaker"] == self._target and e["time"] >= self._spoke_at
         ]
         if answers:
-            self.courtship.heard(answers[-1])
+            self.courtship.note_answer(answers[-1])
             if _ON_THE_WAY in answers[-1].lower():
                 return self._break_off(time, "on the way")
             return self._say(observation, info, time)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.residents import Residents
 from vico.agents.schedule import ScheduleFollower
 from vico.agents.wayfinding import Stride
@@ -20,7 +20,7 @@ _STAYS, _VOICE = 8.0, 3.0
 Answer = Callable[[Mapping[str, Any], float, bool], str | None]
 
 
-class CourtedMember:
+class CourtedMember(FieldState):
     """A resident who follows a day and can be talked with.
 
     Parameters
@@ -35,11 +35,14 @@ class CourtedMember:
         What it says to them.
     """
 
+    _follower: ScheduleFollower
+    _stays_until: float = -math.inf
+    _to_say: list[str]
+
     def __init__(self, follower: ScheduleFollower, name: str, mains: Collection[str], answer: Answer) -> None:
         self.group: Residents | None = None
         self._follower, self._name, self._mains, self._answer = follower, name, frozenset(mains), answer
-        self._stays_until = -math.inf
-        self._to_say: list[str] = []
+        self._to_say = []
 
     @property
     def rests_until(self) -> float:
@@ -57,18 +60,18 @@ class CourtedMember:
         return -math.inf if self._is_busy else self._follower.walks_until
 
     @property
-    def known(self) -> Collection[str]:
+    def acquaintances(self) -> Collection[str]:
         """Agents it would greet."""
-        return self._follower.known
+        return self._follower.acquaintances
 
     @property
-    def greeted(self) -> Mapping[str, float]:
+    def greeting_times(self) -> Mapping[str, float]:
         """When it last spoke with agents, seconds."""
-        return self._follower.greeted
+        return self._follower.greeting_times
 
     @property
     def encounters(self) -> int:
-        """Changes whenever `greeted` does."""
+        """Changes whenever `greeting_times` does."""
         return self._follower.encounters
 
     @property
@@ -95,21 +98,11 @@ class CourtedMember:
             observation = {**observation, "events": others}
         return self._follower.act(observation, info)
 
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {
-            "follower": self._follower.state(),
-            "stays_until": None if math.isinf(self._stays_until) else self._stays_until,
-            "to_say": list(self._to_say),
-        }
-
     def restore(self, state: AgentState) -> None:
         """Go on with the day where `state` was."""
         if self.group is not None:
             self.group.forget(self._name)
-        self._follower.restore(state["follower"])
-        until = state["stays_until"]
-        self._stays_until, self._to_say = -math.inf if until is None else float(until), list(state["to_say"])
+        super().restore(state)
 
     def _listen(self, message: Mapping[str, Any], observation: Observation, time: float) -> None:
         away = math.dist(observation["pose"][:2], message["position"][:2])

@@ -258,8 +258,3 @@ class Visit:
     def record(self) -> dict[str, Any]:
         """Return it as plain data."""
         return asdict(self)
-
-
-def visit_from_record(record: Mapping[str, Any]) -> Visit:
-    """Return a visit that `Visit.record` told."""
-    return Visit(**record)

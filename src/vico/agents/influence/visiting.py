@@ -69,9 +69,10 @@ _STEPS_A_ROOM, _REFUSALS = 60, 3
 # A spot in a room that is not reached within so many steps is looked at from where one has come to.
 _STEPS_A_SPOT = 20
 _AT_PLACE = 2.5
-# Who keeps being stopped in a room goes a step another way: a bump counts so much, and so much is forgotten at each
-# other step; degrees one turns by, and metres one goes.
-_BUMP, _FORGOTTEN, _STUCK = 2, 1, 6
+# Who keeps being stopped in a room goes a step another way.
+_BUMP = 2  # what a collision in a room counts
+_FORGOTTEN = 1  # what is forgotten of it at each other step
+_STUCK = 6  # from this count on one takes a step another way
 _ASIDE, _ASIDE_STEP = (50.0, 150.0), 0.6
 
 

@@ -117,7 +117,7 @@ class Navigator:
         if target != self._target:
             self._target, self._waited, self._forgiven = target, 0, 0
         if self._space == OUTDOORS:
-            return self._outdoors(observation, info, target, speed)
+            return self.walker.towards((target.x, target.y), speed, observation, info)
         return self._indoors(observation, target)
 
     def stop(self) -> None:
@@ -214,11 +214,6 @@ class Navigator:
             return {"type": "turn_left" if turn > 0 else "turn_right", "degrees": abs(math.degrees(turn))}
         self._stepped = True
         return {"type": "move_forward", "distance": stride}
-
-    # Outdoors.
-
-    def _outdoors(self, observation: Observation, info: Info, target: Target, speed: float) -> Action | None:
-        return self.walker.towards((target.x, target.y), speed, observation, info)
 
     # Plain data.
 

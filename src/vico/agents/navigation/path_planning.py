@@ -19,13 +19,18 @@ from vico.agents.base import AgentState
 from vico.agents.navigation.voxels import FREE_COST, NEAR_COST, SIDE, VOXEL, lowest_level
 from vico.io.compiled import compiled
 
-#: 5 : 7 for 1 : sqrt 2, a little less than that: distances bound costs from below when taken 0.98 times.
-STRAIGHT, DIAGONAL, BOUND = 5, 7, 0.98
+#: Length of a step along an axis; and of one across, a little less than sqrt 2 times as long.
+STRAIGHT = 5
+DIAGONAL = 7
+#: Distances bound costs from below when taken so many times.
+BOUND = 0.98
 # Levels a walker may step up or down from column to column, and how steeply unseen ground may climb, levels a column.
 _STEP_LEVELS, _SLOPE = 3, 0.9
 _AT_LEVEL = 5  # levels that a target may lie above or below who has reached it
 _LEVEL_COST = STRAIGHT * FREE_COST / _SLOPE
 _NO_LEVEL = -1000.0
+# Columns of `Target.values`: middle, yaw, half of length and width, how near one has to come, and level.
+_X, _Y, _YAW, _HALF_LENGTH, _HALF_WIDTH, _NEAR, _LEVEL = range(7)
 # Who touches something gets free of it within so many columns, or not at all.
 _WAY_OUT_CELLS = 3
 # Where no way leads there, a level that is left counts as so many columns.
@@ -126,17 +131,17 @@ def search_memory(m: int = SIDE, *, layers: int = 1) -> SearchMemory:
 @compiled(inline="always")
 def box_distance(x, y, target):  # type: ignore[no-untyped-def]
     """Return cells from a point to a box (`Target.values`)."""
-    dx, dy = x - target[0], y - target[1]
-    c, s = math.cos(target[2]), math.sin(target[2])
-    across = max(abs(c * dx + s * dy) - target[3], 0.0)
-    along = max(abs(c * dy - s * dx) - target[4], 0.0)
+    dx, dy = x - target[_X], y - target[_Y]
+    c, s = math.cos(target[_YAW]), math.sin(target[_YAW])
+    across = max(abs(c * dx + s * dy) - target[_HALF_LENGTH], 0.0)
+    along = max(abs(c * dy - s * dx) - target[_HALF_WIDTH], 0.0)
     return math.sqrt(across * across + along * along)
 
 
 @compiled(inline="always")
 def cost_bound(i, j, target):  # type: ignore[no-untyped-def]
     """Return the least that any way from a cell to a target costs."""
-    left = max(box_distance(i + 0.5, j + 0.5, target) - target[5], 0.0)
+    left = max(box_distance(i + 0.5, j + 0.5, target) - target[_NEAR], 0.0)
     return int(BOUND * STRAIGHT * FREE_COST * left)
 
 
@@ -184,7 +189,7 @@ def search_path(grid, memory, start, target, climb):  # type: ignore[no-untyped-
         memory.stamp[b, a] = stamp + 1
         here, blocked = memory.cost[b, a], costs[y & wrap, x & wrap] == 0
         levels = (memory.low[b, a], memory.high[b, a])
-        away = box_distance(x + 0.5, y + 0.5, target) - target[5]
+        away = box_distance(x + 0.5, y + 0.5, target) - target[_NEAR]
         off = _levels_off(levels, target) if climb else 0.0
         if away <= 0.0 and off == 0.0:
             return _backtrack(memory, x, y, layer), True
@@ -248,9 +253,9 @@ def _estimated_cost(i, j, levels, target, climb):  # type: ignore[no-untyped-def
 @compiled(inline="always")
 def _levels_off(levels, target):  # type: ignore[no-untyped-def]
     """Return how many levels are left to climb or to go down to a target; 0 where its height is told by nobody."""
-    if target[6] == _NO_LEVEL:
+    if target[_LEVEL] == _NO_LEVEL:
         return 0.0
-    return max(levels[0] - target[6] - _AT_LEVEL, target[6] - levels[1] - _AT_LEVEL, 0.0)
+    return max(levels[0] - target[_LEVEL] - _AT_LEVEL, target[_LEVEL] - levels[1] - _AT_LEVEL, 0.0)
 
 
 @compiled(inline="always")

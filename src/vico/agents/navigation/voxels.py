@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState
+from vico.agents.base import HEADING_SLICE, AgentState
 from vico.exact import dot
 from vico.io.compiled import compiled
 
@@ -30,11 +30,16 @@ UNKNOWN = -1
 
 #: What moves is taken to be where it was seen for so many seconds, and what one bumped into for so many.
 FADES, BUMP_LASTS = 4, 900
-#: Squared distances, in voxels, up to which a column counts as touching, as near, and as beside.
-TOUCHING, NEAR, BESIDE = 4, 8, 20
+#: Squared distances, in voxels, up to which a column counts as touching something, as near it, and as beside it.
+TOUCHING = 4
+NEAR = 8
+BESIDE = 20
 _REACH = 4  # the root of the last one, rounded down
-#: What a step onto a cell costs: free, not seen yet, beside something, near something; 0 is blocked.
-FREE_COST, UNSEEN_COST, BESIDE_COST, NEAR_COST = 10, 11, 16, 40
+#: Costs of a step onto a cell: free, not seen yet, beside something, near something; 0 is blocked.
+FREE_COST = 10
+UNSEEN_COST = 11
+BESIDE_COST = 16
+NEAR_COST = 40
 
 _PUSH = 0.03  # metres along the ray: a surface on the border of two columns counts for the one behind it
 _EDGE = 0.15  # metres behind a voxel that a pixel must be to have been seen through it
@@ -80,7 +85,7 @@ class Voxels(NamedTuple):
     flags: NDArray[np.bool_]
 
 
-THERE, CHANGED, TIMED = 0, 1, 2
+THERE, CHANGED, TIMED = range(3)
 
 
 def empty_voxels() -> Voxels:
@@ -437,7 +442,15 @@ class VoxelMap:
         height = -float(dot(camera.rotation[:, 2], camera.shift))
         limits = np.array([STEP, REACH, now + FADES, height])
         clear_seen_through(self.voxels, depth, camera, eye, limits)
-        add_points(self.voxels, depth, segmentation, camera, _entity_kinds(entities, ignore), limits)
+        # Entities that are no lasting obstacles, and why not.
+        passing = {int(entity): IGNORED for entity in np.asarray(ignore, np.int64).tolist()}
+        for entity, about in entities.items():
+            if about["kind"] in MOVING:
+                passing.setdefault(int(entity), MOVES)
+            elif about["kind"] in PORTABLE:
+                passing.setdefault(int(entity), IGNORED)
+        kinds = np.array(sorted(passing.items()), np.int64).reshape(-1, 2)
+        add_points(self.voxels, depth, segmentation, camera, kinds, limits)
         self.refresh(now)
 
     def refresh(self, now: int) -> None:
@@ -460,9 +473,10 @@ class VoxelMap:
         away, lasts = (_STUMBLE, BUMP_LASTS) if times else (_BODY, FADES)
         wide = min(times - 1, _WIDEST) if times else 1
         self._open_chunks(pose[:2])
+        east, north = pose[HEADING_SLICE]
         for k in range(-wide, wide + 1):
-            x = float(pose[0] + away * pose[3] - k * VOXEL * pose[4])
-            y = float(pose[1] + away * pose[4] + k * VOXEL * pose[3])
+            x = float(pose[0] + away * east - k * VOXEL * north)
+            y = float(pose[1] + away * north + k * VOXEL * east)
             column, row = math.floor(x / VOXEL), math.floor(y / VOXEL)
             self.voxels.until[row % SIDE, column % SIDE] = now + lasts
             self.voxels.flags[(row // CHUNK) % CHUNKS, (column // CHUNK) % CHUNKS, TIMED] = True
@@ -565,14 +579,3 @@ class VoxelMap:
         self.voxels.until.ravel()[place] = np.asarray(state["until"], np.int64)
         self.voxels.flags[..., CHANGED] = self.voxels.flags[..., TIMED] = self.voxels.flags[..., THERE]
         self.refresh(0)
-
-
-def _entity_kinds(entities: Mapping[int, Mapping[str, str]], ignore: ArrayLike) -> NDArray[np.int64]:
-    """Return entities that are no lasting obstacles, and why not."""
-    found = {int(entity): IGNORED for entity in np.asarray(ignore, np.int64).tolist()}
-    for entity, about in entities.items():
-        if about["kind"] in MOVING:
-            found.setdefault(int(entity), MOVES)
-        elif about["kind"] in PORTABLE:
-            found.setdefault(int(entity), IGNORED)
-    return np.array(sorted(found.items()), np.int64).reshape(-1, 2)

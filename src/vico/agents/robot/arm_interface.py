@@ -97,7 +97,7 @@ class ArmSkill(Protocol):
     def wants_picture(self) -> bool:
         """Whether it looks at what is around it the next time."""
 
-    def lost(self, observation: Mapping[str, Any]) -> bool:
+    def has_lost(self, observation: Mapping[str, Any]) -> bool:
         """Return whether a jaw that held something feels it no more; asked once a period while there is no work."""
 
     def pick(self, entity: int, position: Array, *, beside: Array | None = None) -> None:

@@ -252,10 +252,13 @@ class ArmJob:
         self.box = None if state["box"] is None else ObjectBox(**state["box"])
 
 
-# Nearer than this the base is brought up by speeds of its own, metres; and how exactly.
-_NEAR, _EXACT, _ALIGNED = 1.3, 0.03, 0.08
+_NEAR = 1.3  # metres from which on the base is brought up by speeds of its own
+_EXACT = 0.03  # metres off its place that count as there
+_ALIGNED = 0.08  # rad off its heading that count as aligned
 _BESIDE = 0.9  # cosine of the angle by which the side it comes from may be another one
-_STRAIGHT, _TURN, _GAIN = 0.25, 0.7, 1.5
+_STRAIGHT = 0.25  # speed ahead, m/s
+_TURN = 0.7  # speed of turning, rad/s
+_GAIN = 1.5  # of turning, 1/s
 # Ground that is left between the base and what was seen ahead of it, metres.
 _ROOM_AHEAD = 0.06
 _SETTLES = 12.0  # seconds for coming as near as it can
@@ -332,9 +335,9 @@ def back_off(job: ArmJob, observation: Mapping[str, Any], angles: Array) -> Acti
     return job.hold()
 
 
-# Seconds for fingers to close, and after which a hand that still trembles where it leans on something is as far as it
-# goes; angles, rad, that tell moving from leaning, from one look to the next.
-_GRIP_TIME, _LEANS, _MOVES = 1.6, 8.0, 0.002
+_GRIP_TIME = 1.6  # seconds for fingers to close
+_LEANS = 8.0  # seconds after which a hand that leans on something, and trembles, is as far as it goes
+_MOVES = 0.002  # rad from one look to the next that tell moving from leaning
 # What is so high above the ground is no ground, metres.
 _HIGH = 0.2
 
@@ -597,11 +600,11 @@ class ArmWorker:
         self._begin(ArmTask.FOLD, self._job.target, self._job.entity)
         self._job.enter(ArmStage.CARRY)
 
-    def moved(self, servos: Array) -> None:
+    def set_servos(self, servos: Array) -> None:
         """Take in where somebody else has told the servos to be meanwhile, rad and metres, shape ``(9,)``."""
         self._job.servos, self._job.knows = np.array(servos, np.float64), True
 
-    def lost(self, observation: Mapping[str, Any]) -> bool:
+    def has_lost(self, observation: Mapping[str, Any]) -> bool:
         """Return whether a jaw that held something feels it no more; then nothing is held.
 
         Asked once a period while there is no work for it.

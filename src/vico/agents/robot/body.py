@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AgentState
+from vico.agents.base import FieldState
 from vico.agents.perception import points_from_depth
 from vico.exact import apply_matrix
 from vico.geometry import distance, distances, rotation_matrix
@@ -184,13 +184,14 @@ def free_distance_ahead(body: ArmBody, points: Array) -> float:
 
 Action = dict[str, Any]
 
-# Slower than this a robot stands, m/s; so long it stands where it has arrived, and before a way is asked for anew, s.
-_STANDSTILL, _ARRIVAL_TIME, _STUCK_TIME = 0.03, 1.0, 12.0
+_STANDSTILL = 0.03  # m/s below which a robot stands
+_ARRIVAL_TIME = 1.0  # seconds that it stands where it has arrived
+_STUCK_TIME = 12.0  # seconds that it stands before a way is asked for anew
 #: How often a way is asked for.
 DRIVE_TRIES = 3
 
 
-class Drive:
+class Drive(FieldState):
     """Brings a robot near a point: asks for a way, waits, asks anew where nothing moves.
 
     Parameters
@@ -206,14 +207,17 @@ class Drive:
         Why not; "" if it did.
     """
 
+    _goal: Array | None = None
+    _near: float = 0.5
+    _stops: bool = False
+    _tries: int = 0
+    _asked: bool = False
+    _stood: float = 0.0
+    arrived: bool = False
+    why: str = ""
+
     def __init__(self, *, period: float) -> None:
         self._period = period
-        self._goal: Array | None = None
-        self._near, self._stops = 0.5, False
-        self._tries = 0
-        self._asked = False
-        self._stood = 0.0
-        self.arrived, self.why = False, ""
 
     @property
     def busy(self) -> bool:
@@ -252,26 +256,6 @@ class Drive:
     def _end(self, *, arrived: bool, why: str = "") -> Action:
         self._goal, self.arrived, self.why = None, arrived, why
         return {"type": "stop"}
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {
-            "goal": None if self._goal is None else self._goal.copy(),
-            "near": self._near,
-            "stops": self._stops,
-            "tries": self._tries,
-            "asked": self._asked,
-            "stood": self._stood,
-            "arrived": self.arrived,
-            "why": self.why,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._goal = None if state["goal"] is None else np.array(state["goal"])
-        self._near, self._stops, self._stood = float(state["near"]), bool(state["stops"]), float(state["stood"])
-        self._tries, self._asked = int(state["tries"]), bool(state["asked"])
-        self.arrived, self.why = bool(state["arrived"]), str(state["why"])
 
 
 def follow_joint_path(way: Array, point: int, servos: Array, most: Array) -> int:

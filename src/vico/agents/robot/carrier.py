@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.requester import TAKEN_TEXT
 from vico.agents.robot.arm_interface import ArmSkill, ErrandStage
 from vico.agents.robot.body import ArmBody, Drive, Stance, ground_distance, object_in_view
@@ -143,7 +143,7 @@ def messages_from(observation: Mapping[str, Any], speaker: str) -> list[str]:
 _TELLS_EVERY, _CARRIER_ARRIVES = 2.0, 1.0
 
 
-class Carrier:
+class Carrier(FieldState):
     """Drives to where the other robot calls it, stands, and says where that is.
 
     Parameters
@@ -154,11 +154,13 @@ class Carrier:
         Seconds between two actions.
     """
 
+    _drive: Drive
+    _called: bool = False
+    _told: float = 0.0
+
     def __init__(self, caller: str, *, period: float) -> None:
         self._caller, self._period = caller, period
         self._drive = Drive(period=period)
-        self._called = False
-        self._told = 0.0
 
     @property
     def wants_picture(self) -> bool:
@@ -180,22 +182,14 @@ class Carrier:
             return {"type": "communicate", "text": position_message(Stance.of(observation))}
         return {"type": "wait"}
 
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"drive": self._drive.state(), "called": self._called, "told": self._told}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._drive.restore(state["drive"])
-        self._called, self._told = bool(state["called"]), float(state["told"])
-
 
 # How near to the source it comes, metres: the other robot needs room there; a turn to look about, rad/s.
 _AT_SOURCE, _SCOUT_TURN_SPEED = 4.5, 0.7
 # Seconds that one turn takes; who went on turning would wander off on a slope.
 _SCOUT_TURN_TIME = 9.5
-# Seconds between two looks, and two sentences; until it goes after a person who may have gone.
-_LOOKS_EVERY, _SAYS_EVERY, _FOLLOW_AFTER = 0.5, 6.0, 80.0
+_LOOKS_EVERY = 0.5  # seconds between two looks
+_SAYS_EVERY = 6.0  # seconds between two sentences
+_FOLLOW_AFTER = 80.0  # seconds until it goes after a person who may have gone
 
 
 class Scout:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from vico.agents.base import AgentState
+from vico.agents.base import FieldState
 from vico.agents.robot.increments import BASE, INCREMENTS, JOINTS, STATE, ChunkShape, arm_state, control_of
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError
 from vico.exact import apply_matrix, each
@@ -160,7 +160,7 @@ class ChunkPolicy:
         return np.asarray(found * self.scales["action_std"] + self.scales["action_mean"], np.float32)
 
 
-class ChunkActor:
+class ChunkActor(FieldState):
     """Acts with a policy, twenty times a second.
 
     Parameters
@@ -180,6 +180,10 @@ class ChunkActor:
         If `every` is no number of actions of a chunk, or `ensemble` is negative.
     """
 
+    # Chunks, the newest first, each with the arm's places as it was asked, and how many actions ago that was.
+    _chunks: NDArray[np.float32]
+    _ages: NDArray[np.int64]
+
     def __init__(self, policy: ChunkPolicy, *, every: int = 10, ensemble: float | None = None) -> None:
         every = 1 if ensemble is not None else every
         if not 1 <= every <= policy.shape.chunk:
@@ -192,7 +196,6 @@ class ChunkActor:
     def reset(self) -> None:
         """Forget what was to be done: a new episode begins."""
         shape = self._policy.shape
-        # Chunks, the newest first, each with the arm's places as it was asked, and how many actions ago that was.
         self._chunks = np.zeros((0, shape.chunk, shape.action), np.float32)
         self._ages = np.zeros(0, np.int64)
 
@@ -221,15 +224,6 @@ class ChunkActor:
         self._ages += 1
         action[:_ARM] -= state[:_ARM]
         return control_of(action, state)
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"chunks": self._chunks.copy(), "ages": self._ages.copy()}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._chunks = np.array(state["chunks"], np.float32)
-        self._ages = np.array(state["ages"], np.int64)
 
 
 def new_network(shape: ChunkShape) -> tuple[Any, Any]:

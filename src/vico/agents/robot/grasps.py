@@ -22,8 +22,12 @@ from vico.kinematics.hand_paths import downward
 
 Array = NDArray[np.float64]
 
-#: Metres that the jaw is wider than a thing, on each side; that the hand comes from; that the pads are deep.
-JAW_ROOM, APPROACH_LENGTH, PAD_DEPTH = 0.02, 0.13, 0.035
+#: Metres that the jaw is wider than a thing, on each side.
+JAW_ROOM = 0.02
+#: Metres that the hand comes from.
+APPROACH_LENGTH = 0.13
+#: Metres that the pads are deep.
+PAD_DEPTH = 0.035
 # Tilts of a hand from above, and how far one from the side looks down, rad.
 _TILTS, _SLANTS = (0.0, 0.25, -0.25, 0.5, -0.5), (0.35, 0.0, 0.8)
 # A thing this high is taken from the side, too, metres; cosine of the angle off the way from the base.
@@ -40,8 +44,9 @@ _FEWEST, _STRAYS = 12, 0.01
 _OFF = 0.012
 # The jaw is so much wider, metres, where it closes towards whoever looks: the far side of a thing is hidden.
 _HIDDEN = 0.015
-# Half the width of a pad; widths are compared so close to each other, metres; share of the largest that is as wide.
-_PAD_WIDE, _BIN, _WIDE = 0.05, 0.015, 0.85
+_PAD_WIDE = 0.05  # half the width of a pad, metres
+_BIN = 0.015  # metres of the slices in which widths are taken
+_WIDE = 0.85  # share of the largest width that is as wide
 
 
 class ObjectBox(NamedTuple):
@@ -229,9 +234,9 @@ _HAND_TOLERANCE = 0.03  # metres that a hand may miss the end of its way by
 # Metres before a person, and above the ground, that things are held out to them.
 _ARM_LENGTH, _HELD_OUT = 0.5, 0.75
 _BALL_RADIUS = 0.018  # metres: radius of the balls that a held thing is made of
-# Half the width of what is slender, as a share of its height; fewer points are no look; farther off, metres, its middle
-# is not where it was taken to be, but the thing another one.
-_SLENDER, _GLANCE, _SHIFTED = 0.2, 40, 0.2
+_SLENDER = 0.2  # half the width of what is slender, as a share of its height
+_GLANCE = 40  # fewer points are no look
+_SHIFTED = 0.2  # metres off its place from which on a thing is another one
 
 
 class HeldObject(NamedTuple):
@@ -280,14 +285,14 @@ class HeldObject(NamedTuple):
         axes = np.array([[-s, c], [c, s]])
         return ObjectBox(self.middle, axes, self.half, -self.below, self.above - _PAD_CLEARANCE)
 
-    def turned(self, turn: float) -> Array:
+    def rotation_after_turn(self, turn: float) -> Array:
         """Return the rotation of the hand with the thing turned about the vertical, rad, shape ``(3, 3)``."""
         return product(_rotation_about_vertical(turn), self.rotation)
 
     def pose_over(self, spot: Array, turn: float) -> Array:
         """Return the pose of the hand with which the middle of the thing's underside is at a spot."""
         off = apply_matrix(np.array([*self.middle, -self.below]), _rotation_about_vertical(turn))
-        return np.column_stack([self.turned(turn), spot - off])
+        return np.column_stack([self.rotation_after_turn(turn), spot - off])
 
 
 def is_slender(half: float, height: float) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.requester import TAKEN_TEXT
 from vico.agents.robot.arm_interface import ArmSkill
 from vico.agents.robot.arm_interface import ErrandStage as Stage
@@ -31,13 +31,6 @@ PUT_PLACES = 6
 GOAL_RADIUS = 2.2
 # So far ahead things are put down, and come to from about the middle, metres.
 _PUT_AHEAD, _GOAL_RING = 0.75, 1.6
-
-
-def goal_point(centre: Sequence[float], number: int) -> Array:
-    """Return the middle of a destination, or the place of a number about it, ENU metres, shape ``(2,)``."""
-    middle = np.array(centre[:2], np.float64)
-    turn = 2.0 * math.pi * number / PUT_PLACES
-    return np.asarray(middle + (number > 0) * _GOAL_RING * np.array([math.cos(turn), math.sin(turn)]))
 
 
 def placement_ahead(centre: Sequence[float], here: Stance, *, stand: float, tries: int) -> Array:
@@ -65,8 +58,9 @@ def placement_ahead(centre: Sequence[float], here: Stance, *, stand: float, trie
 _LOOKS_EVERY = 0.5
 #: Farther away a thing is gone nearer to first, metres.
 RELIABLE_DISTANCE = 8.0
-# Seconds of a full turn to look about; places to look from lie on a ring about the middle, metres.
-_TURN_TIME, _VIEWPOINT_RING, _VIEWPOINTS = 9.5, 4.0, 6
+_TURN_TIME = 9.5  # seconds of a full turn to look about
+_VIEWPOINT_RING = 4.0  # metres from the middle to the places to look from
+_VIEWPOINTS = 6  # number of them
 # So high above the ground something is in a hand, metres.
 _LOW = 0.2
 # Sides that are tried one after the other are turned by so much, rad: none comes twice.
@@ -181,7 +175,7 @@ _MAX_PUSHES, _PUSH_ON = 4, 0.6
 _HOME_TRIES = 2
 
 
-class PushTrip:
+class PushTrip(FieldState):
     """Pushes the thing of a task, another way each time.
 
     Parameters
@@ -199,12 +193,14 @@ class PushTrip:
         Whether the last push brought the thing to the destination.
     """
 
+    _pusher: Pusher
+    _pushed: int = 0
+    is_there: bool = False
+
     def __init__(self, told: Mapping[str, Any], body: ArmBody, worker: ArmSkill, *, period: float) -> None:
         self._goal = np.array(told["destination"]["centre"][:2], np.float64)
         self._brings = told["category"] == "deliver"
         self._worker, self._pusher = worker, Pusher(body, period=period)
-        self._pushed = 0
-        self.is_there = False
 
     @property
     def busy(self) -> bool:
@@ -232,7 +228,7 @@ class PushTrip:
         action = self._pusher.act(observation)
         if not self._pusher.busy:
             if isinstance(self._worker, ArmWorker):
-                self._worker.moved(self._pusher.servos)
+                self._worker.set_servos(self._pusher.servos)
             came = self._pusher.outcome == "pushed"
             self.is_there = came and self._brings and ground_distance(self._pusher.thing, self._goal) < GOAL_RADIUS
         return action
@@ -245,20 +241,12 @@ class PushTrip:
         first = math.atan2(float(away[1]), float(away[0]))
         return np.asarray(thing + _PUSH_ON * approach_side(self._pushed, first))
 
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"pusher": self._pusher.state(), "pushed": self._pushed, "is_there": self.is_there}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._pusher.restore(state["pusher"])
-        self._pushed, self.is_there = int(state["pushed"]), bool(state["is_there"])
-
 
 _CALLS_EVERY = 4.0  # seconds between two calls of the person
 _TURN = 0.7  # to look about, rad/s
-# How near one comes to regions and to people, metres; how often something is tried.
-_AT_SOURCE, _AT_PERSON, _TRIES = 2.5, 3.0, 5
+_AT_SOURCE = 2.5  # metres to which one comes near to a source
+_AT_PERSON = 3.0  # metres to which one comes near to people
+_TRIES = 5  # how often something is tried
 _FAR = 15.0  # metres: nearer to the destination than this nothing is put on a deck
 # Seconds of standing that end going along.
 _STANDS, _SPEED = 4.0, 0.03
@@ -323,7 +311,7 @@ class Manipulator:
         for text in messages_from(observation, self.carrier):
             self.deck.hear(text)
             self._hear_of_it(parse_sighting(text))
-        if self.worker.lost(observation):
+        if self.worker.has_lost(observation):
             self._search_about(Stance.of(observation).position)
         if self._waits_to_say:
             return {"type": "communicate", "text": self._waits_to_say.pop(0)}
@@ -441,7 +429,11 @@ class Manipulator:
     def _bring(self, observation: Observation, info: Info) -> Action:
         if not self._began:
             self._began = True
-            self.drive.begin(goal_point(self.told["destination"]["centre"], self._around), near=AT_GOAL)
+            # To the middle of the destination; after failed tries, to places around it.
+            middle = np.array(self.told["destination"]["centre"][:2], np.float64)
+            turn = 2.0 * math.pi * self._around / PUT_PLACES
+            offset = (self._around > 0) * _GOAL_RING * np.array([math.cos(turn), math.sin(turn)])
+            self.drive.begin(middle + offset, near=AT_GOAL)
         action = self.drive.act(observation)
         if self.drive.busy:
             return action

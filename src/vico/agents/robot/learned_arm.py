@@ -68,13 +68,14 @@ def path_beside_goal(
 Action = dict[str, Any]
 
 _FACES = 0.4  # rad off facing the thing at which a policy that drives takes over
-# A thing was picked once it has been lifted so far, metres, and pressed on so long; it was put down once no finger has
-# pressed on it for so long, seconds.
-_LIFTED, _HOLDS, _LETS_GO = 0.08, 0.25, 0.5
+_LIFTED = 0.08  # metres that a thing is lifted once it was picked
+_HOLDS = 0.25  # seconds that it is pressed on until then
+_LETS_GO = 0.5  # seconds without a finger on it after which it was put down
 # Fingers that did not pick a thing open by so much, metres.
 _LETS_GO_BY = 0.02
-# Of its speed the arm goes with to where a policy begins; angles that count as there, rad; seconds for it.
-_SPEED, _THERE, _READY_TIME = 0.5, 0.03, 20.0
+_SPEED = 0.5  # share of its speed at which the arm goes to where a policy begins
+_THERE = 0.03  # rad off that count as there
+_READY_TIME = 20.0  # seconds for it, at most
 _SERVOS = 9
 
 
@@ -153,9 +154,9 @@ class LearnedArm:
         self._worker.fold()
         self._next(PolicyStage.FOLD)
 
-    def lost(self, observation: Mapping[str, Any]) -> bool:
-        """Return whether a jaw that held something feels it no more; see `ArmWorker.lost`."""
-        return not self.busy and self._worker.lost(observation)
+    def has_lost(self, observation: Mapping[str, Any]) -> bool:
+        """Return whether a jaw that held something feels it no more; see `ArmWorker.has_lost`."""
+        return not self.busy and self._worker.has_lost(observation)
 
     # What it does.
 
@@ -269,7 +270,7 @@ class LearnedArm:
             self._worker.held = object_in_jaw(self.body, angles[:7].copy(), thing.as_box(), float(angles[7:].min()))
         elif thing is not None:
             self._worker.held = None
-        self._worker.moved(self._servos)
+        self._worker.set_servos(self._servos)
         self._worker.fold()
         self._next(PolicyStage.FOLD)
         return self._hold()

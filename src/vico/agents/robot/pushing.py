@@ -34,15 +34,22 @@ _BEHIND, _NEAR = 1.15, 0.25
 _LIFTS, _SINKS = 0.1, 0.003
 # Fingers are so much nearer to each other than the thing is wide, on each side, and so far apart at least, metres.
 _WITHIN, _NARROW = 0.03, 0.02
-# Speeds, m/s and rad/s: of pushing, where nothing moves yet, back, and turning; gains of turning to the thing, and of
-# steering to where it is to be, and the most of that.
-_SPEED, _HARD, _BACK_SPEED, _TURN, _GAIN, _STEER, _STEER_MOST = 0.15, 0.3, 0.2, 0.6, 1.5, 0.6, 0.2
+_SPEED = 0.15  # m/s, pushing
+_HARD = 0.3  # m/s, where nothing moves yet
+_BACK_SPEED = 0.2  # m/s, back
+_TURN = 0.6  # rad/s, turning
+_GAIN = 1.5  # 1/s, of turning to the thing
+_STEER = 0.6  # rad/s a metre, of steering to where it is to be
+_STEER_MOST = 0.2  # rad/s of steering, at most
 # Angles, rad: turned to it; so far aside the thing has slipped off the fingers.
 _ALIGNED, _ASIDE = 0.06, 0.5
-# Seconds: between two looks, without getting on, of all of pushing a metre, of any other stage.
-_LOOKS, _STUCK, _A_METRE, _STALE = 0.4, 4.0, 60.0, 25.0
-# Slower than this nothing moves, m/s; how far one goes back, metres; angles that count as there, rad.
-_STANDS, _BACK, _REACHED = 0.02, 0.35, 0.04
+_LOOKS = 0.4  # seconds between two looks
+_STUCK = 4.0  # seconds without getting on
+_A_METRE = 60.0  # seconds of pushing a metre, at most
+_STALE = 25.0  # seconds of any other stage, at most
+_STANDS = 0.02  # m/s below which nothing moves
+_BACK = 0.35  # metres that one goes back
+_REACHED = 0.04  # rad off that count as there
 # Of its speed an arm goes with; how near to what was seen it comes, in a grid coarser than the room there is, metres.
 _SHARE, _CLOSE = 0.8, -0.03
 

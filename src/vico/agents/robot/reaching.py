@@ -151,12 +151,12 @@ def plan_carry(
         return _free_path(arm, now, body.rest)
     for place in _CARRY_POINTS:
         for turn in TURNS:
-            goal = np.column_stack([held.turned(turn), place])
+            goal = np.column_stack([held.rotation_after_turn(turn), place])
             way = _level_path(arm, body, now, goal)
             if way is not None:
                 return way
     for place in _CARRY_POINTS:
-        goals = [np.column_stack([held.turned(turn), place]) for turn in TURNS]
+        goals = [np.column_stack([held.rotation_after_turn(turn), place]) for turn in TURNS]
         found = collision_free_reach(arm, goals, now, posture=body.rest)
         way = None if found is None else _free_path(arm, now, found[0])
         if way is not None:

@@ -204,13 +204,13 @@ class Knowledge:
         seen = next((body for body in moment.view.within(_IN_VIEW) if body.agent == agent), None)
         return None if seen is None else (float(seen.position[0]), float(seen.position[1]))
 
-    def seen(self, agent: str) -> SeenPerson | None:
+    def last_seen(self, agent: str) -> SeenPerson | None:
         """Return when and where somebody was seen last."""
-        return self.memory.seen(agent)
+        return self.memory.last_seen(agent)
 
     def hearsay(self, name: str) -> Hearsay | None:
         """Return the last that one heard of where somebody was, at a place that the map has."""
-        for heard in reversed(self.memory.heard):
+        for heard in reversed(self.memory.messages):
             for claim in claims_in(heard.text):
                 about = claim.person or self.name_of(heard.speaker)
                 place = place_named(self.public_map, claim.place) if claim.kind in _HEARSAY else None
@@ -321,7 +321,7 @@ def about_person(agent: str, knows: Knowledge, moment: Moment) -> str:
     if there is not None:
         return sentences.say("see", person=name, **_direction_fields(there, moment, sentences))
     said = []
-    seen, told = knows.seen(agent), knows.hearsay(name)
+    seen, told = knows.last_seen(agent), knows.hearsay(name)
     if seen is not None:
         said.append(_sighting_sentence(seen, name, knows, sentences))
     if told is not None and told.claim.time is not None and (seen is None or told.claim.time > seen.time % DAY):

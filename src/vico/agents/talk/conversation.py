@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.talk.acquaintance import (
     GROWN_UP,
     Acquaintance,
@@ -83,7 +83,7 @@ class Errand:
     leaves: bool
 
 
-class Conversation:
+class Conversation(FieldState):
     """Decides whether to speak, and what to say.
 
     Parameters
@@ -96,33 +96,31 @@ class Conversation:
         Decides which words.
     """
 
+    _greeted: dict[str, float]
+    _said: dict[str, int]
+
     def __init__(self, resident: Speaker, known: Sequence[Acquaintance], generator: np.random.Generator) -> None:
         self._me = resident
         # Not everybody's author said these.
         self._gender, self._household = (str(getattr(resident, field, None) or "") for field in ("gender", "household"))
         self._known = {person.agent: person for person in known}
         self._rng = generator
-        self._greeted: dict[str, float] = {}
+        self._greeted, self._said = {}, {}
         #: Changes whenever somebody is spoken with.
         self.encounters = 0
-        self._said: dict[str, int] = {}
-
-    def state(self) -> AgentState:
-        """Return whom it greeted when, and how much it said; the generator is its owner's to save."""
-        return {"greeted": dict(self._greeted), "said": dict(self._said)}
 
     def restore(self, state: AgentState) -> None:
         """Remember what `state` returned."""
         self.encounters += 1
-        self._greeted, self._said = dict(state["greeted"]), dict(state["said"])
+        super().restore(state)
 
     @property
-    def known(self) -> Collection[str]:
+    def acquaintances(self) -> Collection[str]:
         """Agents whom the speaker knows."""
         return self._known.keys()
 
     @property
-    def greeted(self) -> Mapping[str, float]:
+    def greeting_times(self) -> Mapping[str, float]:
         """When the speaker last spoke with agents, seconds."""
         return self._greeted
 
@@ -181,7 +179,7 @@ class Conversation:
         if person is None:
             return _communicate(f"Hello! I'm {split_name(self._me.name)[1]}. Sorry, I'm {about.words}.")
         options = self._answers if "?" in text else self._last_words
-        return _communicate(self._choose(options(person, self._told(about, person), text)))
+        return _communicate(self._choose(options(person, self._errand_for(about, person), text)))
 
     def _greet(self, state: Mapping[str, Any], info: Info, errand: Callable[[], Errand]) -> Action | None:
         time = state["time"]
@@ -193,11 +191,11 @@ class Conversation:
             self._greeted[person.agent] = time
             self.encounters += 1
             self._said[person.agent] = 1
-            about = self._told(errand(), person)
+            about = self._errand_for(errand(), person)
             return _communicate(self._choose(self._greetings(person, time, about, indoors=bool(state["room"]))))
         return None
 
-    def _told(self, errand: Errand, person: Acquaintance) -> Errand:
+    def _errand_for(self, errand: Errand, person: Acquaintance) -> Errand:
         """Return what one is about as one tells a person: "having lunch with you", "with Dad"."""
         words = errand.words
         for one in self._known.values():
@@ -206,13 +204,13 @@ class Conversation:
                 words = re.sub(rf"(?<![\w-]){re.escape(one.first_name)}(?![\w-])", called, words)
         return replace(errand, words=words)
 
-    def _called(self, person: Acquaintance) -> tuple[str, bool]:
+    def _address_for(self, person: Acquaintance) -> tuple[str, bool]:
         """Return what one calls somebody, and whether that is formal."""
         other = address_of(person, age=self._me.age, household=self._household)
         return other, person.kind != "family" and other != person.first_name
 
     def _greetings(self, person: Acquaintance, time: float, errand: Errand, *, indoors: bool) -> list[str]:
-        other, _ = self._called(person)
+        other, _ = self._address_for(person)
         hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
         if min(self._me.age, person.age) < GROWN_UP:
@@ -233,7 +231,7 @@ class Conversation:
         self, person: Acquaintance, errand: Errand, hour: float, hello: str, *, indoors: bool
     ) -> list[str]:
         """Return what children say, and what is said to them."""
-        other, formal = self._called(person)
+        other, formal = self._address_for(person)
         if self._me.age >= GROWN_UP:
             school = "How was school?" if hour >= _SCHOOL_IS_OUT else "Have you got everything for school?"
             lines = [f"Hello, {other}! {school}"]
@@ -254,7 +252,7 @@ class Conversation:
 
     def _last_words(self, person: Acquaintance, errand: Errand, text: str) -> list[str]:
         """Return how a chat ends after what the other said: with a goodbye if either goes, else with something kind."""
-        other, formal = self._called(person)
+        other, formal = self._address_for(person)
         if not errand.leaves and not _GOES_PATTERN.search(text):
             return [f"Nice to see you, {other}!", *([f"Good to hear, {other}."] if _TELLS_PATTERN.search(text) else [])]
         if formal:
@@ -267,7 +265,7 @@ class Conversation:
 
     def _answers(self, person: Acquaintance, errand: Errand, text: str) -> list[str]:
         """Return what may be said to what the other asked."""
-        other, formal = self._called(person)
+        other, formal = self._address_for(person)
         child = self._me.age < GROWN_UP
         if _HOW_PATTERN.search(text):
             lines = [f"Fine, thanks, {other}. I'm {errand.words}."]

@@ -20,8 +20,10 @@ from vico.llm.prompts import read_prompt
 __all__ = ["MOST_SAID", "LlmTalk", "SpokenReply", "facts_for_model", "reply_faults"]
 #: Longest answer, characters.
 MOST_SAID = 300
-# So much of a message is shown, characters; so many people and messages are among the facts.
-_MOST_HEARD, _MOST_PEOPLE, _MOST_SEEN, _MOST_MESSAGES = 400, 24, 12, 6
+_MOST_HEARD = 400  # characters of a message that are shown
+_MOST_PEOPLE = 24  # people among the facts
+_MOST_SEEN = 12  # sightings among the facts
+_MOST_MESSAGES = 6  # messages among the facts
 # A server that failed so often in a row is not asked again.
 _GIVES_UP = 3
 # Shorter names may be words.
@@ -61,7 +63,7 @@ class LlmTalk:
         """Return what the model says, or the template's answer where it fails or says what the facts don't hold."""
         if self._failed < _GIVES_UP:
             try:
-                said = self._asked(heard, question, knows, moment)
+                said = self._ask_model(heard, question, knows, moment)
             except (SourceError, LlmReplyError, LlmBudgetError, InputError) as error:
                 self._failed = self._failed + 1 if isinstance(error, SourceError) else 0
                 self.reason = str(error)
@@ -72,12 +74,12 @@ class LlmTalk:
         self.fallbacks += 1
         return self._templates.reply(heard, question, knows, moment)
 
-    def _asked(self, heard: HeardMessage, question: Question | None, knows: Knowledge, moment: Moment) -> str:
+    def _ask_model(self, heard: HeardMessage, question: Question | None, knows: Knowledge, moment: Moment) -> str:
         facts = facts_for_model(question, knows, moment)
         prompt = read_prompt("talk", "reply", SpokenReply)
         told = [
             {"by": knows.name_of(one.speaker), "at": _clock_text(one.time), "text": one.text}
-            for one in knows.memory.heard
+            for one in knows.memory.messages
             if (one.time, one.speaker) != (heard.time, heard.speaker)
         ]
         shown = facts | {"what_was_said_to_them_or_near_them": told[-_MOST_MESSAGES:]}

@@ -31,8 +31,12 @@ __all__ = [
 ]
 #: Seconds between two times that one takes note of who is about, and the distance up to which one knows them, metres.
 LOOK_PERIOD, RECOGNITION_DISTANCE = 10.0, 20.0
-#: Most people, messages and visits that are remembered; what is oldest is forgotten first.
-MOST_PEOPLE, MOST_MESSAGES, MOST_VISITS = 64, 32, 48
+#: People that are remembered, at most; the oldest are forgotten first.
+MOST_PEOPLE = 64
+#: Messages, likewise.
+MOST_MESSAGES = 32
+#: Visits, likewise.
+MOST_VISITS = 48
 # So much of a message is remembered, characters.
 _MAX_TEXT = 300
 _PEOPLE = ("resident", "assistant")
@@ -86,10 +90,6 @@ class Visit:
     until: float | None = None
 
 
-def _no_sightings() -> None:
-    """Have nothing to tell."""
-
-
 def look_number(time: float) -> int:
     """Return the number of the ten seconds that a time lies in."""
     return int(time // LOOK_PERIOD)
@@ -109,7 +109,7 @@ class ResidentMemory:
         #: In which ten seconds one looked about last.
         self.tick = -1
         #: Tells whom one saw as one of a group, before it is asked for; see `vico.agents.talk.memory`.
-        self.settle: Callable[[], None] = _no_sightings
+        self.settle: Callable[[], None] = lambda: None
         # By agent, the one seen longest ago first.
         self._people: dict[str, tuple[float, float, float, str]] = {}
         self._heard: list[HeardMessage] = []
@@ -159,7 +159,7 @@ class ResidentMemory:
         if self._visits and self._visits[-1].until is None:
             self._visits[-1] = replace(self._visits[-1], until=time)
 
-    def seen(self, agent: str) -> SeenPerson | None:
+    def last_seen(self, agent: str) -> SeenPerson | None:
         """Return when and where somebody was seen last; None if they were not."""
         self.settle()
         found = self._people.get(agent)
@@ -172,7 +172,7 @@ class ResidentMemory:
         return self._people.keys()
 
     @property
-    def heard(self) -> Sequence[HeardMessage]:
+    def messages(self) -> Sequence[HeardMessage]:
         """What was said, in order."""
         return self._heard
 

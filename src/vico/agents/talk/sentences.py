@@ -255,8 +255,9 @@ def place_named(places: Iterable[PublicPlace] | PublicMap, name: str) -> PublicP
 
 # A way is looked at every so many metres; what is shorter than the second belongs to the leg before it.
 _SAMPLE, _SHORTEST = 4.0, 16.0
-# A turn is told from the way so many metres before and after it, and from so many degrees on.
-_COURSE_LENGTH, _TURN_ANGLE, _U_TURN_ANGLE = 12.0, 35.0, 150.0
+_COURSE_LENGTH = 12.0  # metres of the way before and after a turn from which it is told
+_TURN_ANGLE = 35.0  # degrees from which on it is a turn
+_U_TURN_ANGLE = 150.0  # degrees from which on one turns round
 # Most legs that are told of: nobody remembers more.
 MOST_LEGS = 6
 

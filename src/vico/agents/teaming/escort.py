@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation
 from vico.agents.robot.body import Drive, Stance
 from vico.agents.teaming.people import I_FOLLOW, LETS_GO
 from vico.agents.teaming.team_skills import find_in_view, ground_distance, messages_from, turn, turn_towards
@@ -27,12 +27,16 @@ from vico.world.walkable import OPEN, SIDEWALK
 
 Array = NDArray[np.float64]
 
-# How near one comes to call somebody, and to a spot, metres; seconds between two calls.
-_ESCORT_CALL_DISTANCE, _AT_SPOT, _ESCORT_CALL_PERIOD = 3.0, 0.5, 4.0
+_ESCORT_CALL_DISTANCE = 3.0  # metres from which somebody is called
+_AT_SPOT = 0.5  # metres at which a spot is reached
+_ESCORT_CALL_PERIOD = 4.0  # seconds between two calls
 # So near the door the robot leaves the person, who goes in, and goes to a spot beside it, metres.
 _LEAVES = 5.0
-# Spots beside a door: so far from it, with so much room, and so far off the way in, metres; directions that are tried.
-_RINGS, _ROOM, _OFF_WAY, _SIDES = (2.2, 2.8, 3.3), 0.6, 1.1, 16
+# Spots beside a door.
+_RINGS = (2.2, 2.8, 3.3)  # metres from the door, in the order in which they are tried
+_ROOM = 0.6  # metres of room
+_OFF_WAY = 1.1  # metres off the way in
+_SIDES = 16  # directions that are tried
 # The way in is kept free so far before the door, metres.
 _WAY_IN = 4.0
 _ESCORT_TURN_SPEED = 0.6
@@ -49,7 +53,7 @@ class EscortStage(StrEnum):
     WAIT = "wait"
 
 
-class Escort:
+class Escort(FieldState):
     """Goes to the person, calls, follows, leaves them before the door, and stands beside it.
 
     Parameters
@@ -60,6 +64,12 @@ class Escort:
         Whether it keeps near the person on the way; else it goes to the door as fast as it can.
     """
 
+    going: Drive
+    stage: EscortStage = EscortStage.MEET
+    _began: bool = False
+    _said: float = 0.0
+    _spot: int = 0
+
     def __init__(self, told: Mapping[str, Any], public_map: PublicMap, *, stays_near: bool = True) -> None:
         self.told, self.stays_near, self.period = dict(told), stays_near, float(told["period"])
         place = public_map.place_by_id[str(told["destination"]["place"])]
@@ -67,8 +77,6 @@ class Escort:
         self._before = np.array(place.position, np.float64)
         self._map = public_map
         self.going = Drive(period=self.period)
-        self.stage = EscortStage.MEET
-        self._began, self._said, self._spot = False, 0.0, 0
 
     @property
     def wants_picture(self) -> bool:
@@ -141,22 +149,6 @@ class Escort:
     def _next(self, stage: EscortStage) -> None:
         self.stage, self._began, self._said = stage, False, 0.0
 
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {
-            "going": self.going.state(),
-            "stage": str(self.stage),
-            "began": self._began,
-            "said": self._said,
-            "spot": self._spot,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self.going.restore(state["going"])
-        self.stage, self._began = EscortStage(state["stage"]), bool(state["began"])
-        self._said, self._spot = float(state["said"]), int(state["spot"])
-
 
 def waiting_spots(public_map: PublicMap, door: Array, before: Array, here: Array) -> list[Array]:
     """Return free ground beside a door where nobody who goes in or comes out is in the way, the nearest first.
@@ -198,15 +190,17 @@ _ESCORT_STAGES = {
 }
 
 
-# How near one comes to call somebody, to a corner of the way, to its end, and to where somebody was last, metres.
-_GUIDE_CALL_DISTANCE, _AT_CORNER, _AT_END, _AT_LOST = 2.5, 0.7, 1.0, 1.5
+_GUIDE_CALL_DISTANCE = 2.5  # metres from which somebody is called
+_AT_CORNER = 0.7  # metres at which a corner of the way is reached
+_AT_END = 1.0  # metres at which its end is
+_AT_LOST = 1.5  # metres at which the place is where somebody was last
 # Metres from one look round to the next; so near the person has to be for the robot to go on.
 _LEG, _NEAR = 4.0, 3.5
 # Who is farther off than this and calls is gone to, metres, until nearer than that.
 _FAR = 5.0
-# Seconds between two calls; of turning until it is sure to have looked all round; and of waiting for who is in view,
-# but does not come, until it goes to them.
-_GUIDE_CALL_PERIOD, _GUIDE_TURN_TIME, _PATIENCE = 4.0, 11.0, 30.0
+_GUIDE_CALL_PERIOD = 4.0  # seconds between two calls
+_GUIDE_TURN_TIME = 11.0  # seconds of turning until it has looked all round
+_PATIENCE = 30.0  # seconds until it goes to somebody in view who does not come
 _GUIDE_TURN_SPEED = 0.9
 
 

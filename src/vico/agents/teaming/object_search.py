@@ -33,12 +33,14 @@ Array = NDArray[np.float64]
 _HEIGHTS, _CLOSER = (6.0, 9.0, 13.0), 4.5
 # Viewpoints: the middle of the area, and rings about it, as shares of its radius, with so many points each.
 _RINGS = ((0.0, 1), (0.7, 6), (1.1, 8))
-# Metres from a point at which the drone is there; seconds until it counts as there anyway; metres a second to be calm.
-_AT_VIEWPOINT, _PATIENCE, _CALM = 1.0, 25.0, 0.6
+_AT_VIEWPOINT = 1.0  # metres from a viewpoint at which the drone is there
+_PATIENCE = 25.0  # seconds until it counts as there anyway
+_CALM = 0.6  # m/s below which it is calm
 # A full turn, rad/s and seconds.
 _SPOTTER_TURN_SPEED, _SPOTTER_TURN_TIME = 0.9, 7.2
-# Pixels that make a sighting, and a sure one; beside it one looks from so far off, metres.
-_SPOTTER_MIN_PIXELS, _SURE, _OFF = 6, 40, 3.0
+_SPOTTER_MIN_PIXELS = 6  # pixels of a sighting
+_SURE = 40  # pixels of a sure one
+_OFF = 3.0  # metres beside a thing from which one looks at it
 # Seconds between two messages; how often one looks closer.
 _TELLS_EVERY, _LOOKS = 4.0, 3
 
@@ -104,7 +106,7 @@ class Spotter:
         if not self._asked:
             point = self.viewpoints[self._view % len(self.viewpoints)]
             return self._ask(point, _HEIGHTS[self._level])
-        if self._refused(observation):
+        if self._was_refused(observation):
             self._level += 1
             if self._level == len(_HEIGHTS):
                 self._go_on()
@@ -131,7 +133,7 @@ class Spotter:
             off = here.position[:2] - self.found
             far = max(float(np.hypot(*off)), 1e-6)
             return self._ask(self.found + off * min(_OFF, far) / far, _CLOSER)
-        if self._refused(observation):
+        if self._was_refused(observation):
             self._next(SpotterStage.TELL)
             return {"type": "stop"}
         if not self._is_there(observation):
@@ -177,7 +179,7 @@ class Spotter:
         self._asked, self._clock = True, 0.0
         return {"type": "fly_to", "target": self._aim.tolist()}
 
-    def _refused(self, observation: Observation) -> bool:
+    def _was_refused(self, observation: Observation) -> bool:
         return self._clock <= 1.5 * self.period and observation["state"]["action_status"] == "refused"
 
     def _is_there(self, observation: Observation) -> bool:
@@ -229,10 +231,12 @@ _SPOTTER_STAGES = {
 
 # Metres from the thing at which it stops, so that it does not run into it; directions that it comes from.
 _STOPS, _SIDES = 1.3, 8
-# How near it comes to the spot it goes to, and to viewpoints, metres; of the thing it counts as there so near.
-_AT_SPOT, _AT_VIEW, _BESIDE_OBJECT = 0.35, 1.5, 1.8
-# A full turn, rad/s and seconds; pixels that make a sighting.
-_FINDER_TURN_SPEED, _FINDER_TURN_TIME, _FINDER_MIN_PIXELS = 0.8, 8.5, 12
+_AT_SPOT = 0.35  # metres at which it is at the spot it goes to
+_AT_VIEW = 1.5  # metres at which it is at a viewpoint
+_BESIDE_OBJECT = 1.8  # metres from the thing at which it counts as there
+_FINDER_TURN_SPEED = 0.8  # rad/s of a full turn
+_FINDER_TURN_TIME = 8.5  # seconds of a full turn
+_FINDER_MIN_PIXELS = 12  # pixels of a sighting
 # What was seen from nearer than this is more exact than what was told, metres.
 _OWN_EYES = 6.0
 

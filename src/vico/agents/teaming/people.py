@@ -105,8 +105,9 @@ def _finite_or_none(time: float) -> float | None:
 I_FOLLOW = "I follow you."
 WAIT_FOR_ME = "Please wait for me."
 GAVE_UP = "I have lost you, I give up."
-# Metres kept behind the robot; seconds between two calls, and until one turns to look elsewhere.
-_KEEPS_DISTANCE, _CALLS_EVERY, _LOOK_AFTER = 1.8, 6.0, 2.0
+_KEEPS_DISTANCE = 1.8  # metres kept behind the robot
+_CALLS_EVERY = 6.0  # seconds between two calls
+_LOOK_AFTER = 2.0  # seconds until one turns to look elsewhere
 
 
 class Newcomer:

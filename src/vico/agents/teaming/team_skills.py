@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation, wrap_angle
+from vico.agents.base import Action, FieldState, Info, Observation, wrap_angle
 from vico.agents.perception import Sighting, sightings
-from vico.agents.requester import CALL_DISTANCE
+from vico.agents.requester import CALL_DISTANCE, ROBOT_PREFIX
 from vico.agents.robot.body import Stance
 from vico.agents.talk.acquaintance import is_called
 
@@ -66,8 +66,6 @@ def ground_distance(a: Any, b: Any) -> float:
     return float(np.hypot(*(np.asarray(a, np.float64)[:2] - np.asarray(b, np.float64)[:2])))
 
 
-#: Names of the robots begin so.
-ROBOT_PREFIX = "robot_"
 _NUMBER = r"(-?\d+(?:\.\d+)?)"
 _LOCATION_PATTERN = re.compile(rf"^The (.+) lies at {_NUMBER} {_NUMBER}\.$")
 #: What a robot says that has been told where the thing lies.
@@ -109,7 +107,7 @@ def parse_object_location(text: str, thing: str) -> Array | None:
     return np.array([float(found[2]), float(found[3])])
 
 
-class IdleRobot:
+class IdleRobot(FieldState):
     """Stays where it is."""
 
     @property
@@ -120,10 +118,3 @@ class IdleRobot:
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
         return {"type": "wait"}
-
-    def state(self) -> AgentState:
-        """Return nothing: it remembers nothing."""
-        return {}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember nothing."""

@@ -122,12 +122,12 @@ class ModelChooser:
             return 0
         if self._failed >= _PATIENCE:
             self.drawn.append((number, "not asked: it gave no answer before"))
-        elif (index := self._chosen(question, candidates, number)) is not None:
+        elif (index := self._ask_choice(question, candidates, number)) is not None:
             return index
         chance = rng(self._seed, "model chooser", number)
         return seeded_chooser(chance)(question, candidates)
 
-    def _chosen(self, question: ChoiceQuestion, candidates: Sequence[str], number: int) -> int | None:
+    def _ask_choice(self, question: ChoiceQuestion, candidates: Sequence[str], number: int) -> int | None:
         def check(reply: ChosenCandidate) -> list[str]:
             if 0 <= reply.index < len(candidates):
                 return []

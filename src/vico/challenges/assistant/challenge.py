@@ -23,6 +23,7 @@ from vico.challenges.assistant.evaluate import CAUSES, CauseTracker, Judge
 from vico.challenges.assistant.generate import first_subtasks, generate_task
 from vico.challenges.assistant.tasks import CATEGORIES, RESIDENTS, STEPS, SUBTASKS, Category, Task
 from vico.challenges.episode_record import episode_record
+from vico.challenges.episodes import for_size
 from vico.challenges.records import EpisodeRecord, Job, Metric, Part, Progress, Setting
 from vico.clock import seconds_of_day
 from vico.community import build_community
@@ -192,7 +193,10 @@ def play_task(
     method = method.method if isinstance(method, PlayedByHand) else method
     _check_made_for(task, world, community)
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
-    played = _played_by_a_person(method, names)
+    methods = method.split("+")
+    played = [name for i, name in enumerate(names) if methods[i % len(methods)] == HUMAN]
+    if len(played) > 1:
+        raise InputError("eval: one person plays one assistant; name a planner for the other one: human+heuristic")
     if played and (theatre is None or recording is None):
         raise InputError("eval: a person plays at a page: vico eval assistant --method human, or vico play --task")
     env = make(
@@ -238,15 +242,6 @@ def play_task(
             for step, why in model_faults_of(planner):
                 runner.faults.add(step, name, "model", why)
     return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
-
-
-def _played_by_a_person(method: str, names: list[str]) -> list[str]:
-    """Return the assistants that a person plays: one, or nobody."""
-    methods = method.split("+")
-    found = [name for i, name in enumerate(names) if methods[i % len(methods)] == HUMAN]
-    if len(found) > 1:
-        raise InputError("eval: one person plays one assistant; name a planner for the other one: human+heuristic")
-    return found
 
 
 def _perform(runner: Runner, performance: Performance, judge: Judge, task: Task) -> None:
@@ -332,11 +327,6 @@ def _planners(
         except InputError as error:
             made[name] = AbsentAgent(str(error))
     return made
-
-
-def for_size(number: int, world: World) -> int:
-    """Return how many there are in a world, of so many in a window of 800 m."""
-    return min(number, round(number * (world.half / 400.0) ** 2))
 
 
 def set_up(simulation: Simulation, task: Task) -> None:

@@ -10,7 +10,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,38 +30,11 @@ from vico.challenges.assistant.tasks import (
 from vico.english import split_name
 from vico.geometry import distances
 from vico.runner.loop import Hook, Step
+from vico.runner.truth import GroundTruth
 from vico.world.world import World
 
 
-class StateView(Protocol):
-    """What an evaluator may look at: the truth, not any agent's view of it."""
-
-    def object_position(self, name: str) -> NDArray[np.float64]:
-        """Where the thing called `name` is, metres, shape ``(3,)``."""
-
-    def object_room(self, name: str) -> str | None:
-        """Id of the room it is in; None outdoors."""
-
-    def object_holder(self, name: str) -> str | None:
-        """Name of the agent that holds it; None if nobody does."""
-
-    def object_entity(self, name: str) -> int:
-        """Its entity, as pictures show it."""
-
-    def agent_entity(self, name: str) -> int:
-        """Entity of a person, as pictures show it."""
-
-    def agent_position(self, name: str) -> NDArray[np.float64]:
-        """Where a person stands, metres, shape ``(3,)``."""
-
-    def agent_place(self, name: str) -> str | None:
-        """Id of the place a person is in; None outdoors."""
-
-    def agent_room(self, name: str) -> str | None:
-        """Id of the room a person is in; None outdoors."""
-
-
-def is_delivered(name: str, region: Region, state: StateView, world: World, limits: Thresholds) -> bool:
+def is_delivered(name: str, region: Region, state: GroundTruth, world: World, limits: Thresholds) -> bool:
     """Whether a thing lies at its destination."""
     if state.object_holder(name) is not None:
         return False
@@ -72,7 +45,7 @@ def is_delivered(name: str, region: Region, state: StateView, world: World, limi
     return room is None and _ground_distance(state.object_position(name), region.centre) <= limits.destination_radius
 
 
-def is_carried_home(name: str, home: Region, state: StateView, world: World, limits: Thresholds) -> bool:
+def is_carried_home(name: str, home: Region, state: GroundTruth, world: World, limits: Thresholds) -> bool:
     """Whether a thing lies in a home, or before its entrance."""
     if state.object_holder(name) is not None:
         return False
@@ -82,7 +55,7 @@ def is_carried_home(name: str, home: Region, state: StateView, world: World, lim
     return _ground_distance(position, entrance_of(home, world)) <= limits.home_radius
 
 
-def has_arrived(person: str, home: Region, state: StateView, world: World, limits: Thresholds) -> bool:
+def has_arrived(person: str, home: Region, state: GroundTruth, world: World, limits: Thresholds) -> bool:
     """Whether somebody is at home, or before its entrance."""
     if state.agent_place(person) == home.place:
         return True
@@ -90,7 +63,7 @@ def has_arrived(person: str, home: Region, state: StateView, world: World, limit
     return outdoors and _ground_distance(state.agent_position(person), entrance_of(home, world)) <= limits.home_radius
 
 
-def is_in_view(name: str, who: str, observation: Mapping[str, Any], state: StateView, limits: Thresholds) -> bool:
+def is_in_view(name: str, who: str, observation: Mapping[str, Any], state: GroundTruth, limits: Thresholds) -> bool:
     """Whether so much of a thing is in an assistant's picture, from near enough."""
     # Through a door that stands open it counts as well.
     if _ground_distance(state.agent_position(who), state.object_position(name)) > limits.search_distance:
@@ -150,7 +123,7 @@ class Judge(Hook):
         Their agents' names.
     """
 
-    def __init__(self, task: Task, world: World, state: StateView, assistants: list[str]) -> None:
+    def __init__(self, task: Task, world: World, state: GroundTruth, assistants: list[str]) -> None:
         self.task, self.world, self.state, self.assistants = task, world, state, assistants
         self.limits = thresholds(advanced=task.advanced)
         names = {thing.id: thing.name for thing in task.objects}

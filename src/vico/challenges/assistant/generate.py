@@ -45,7 +45,7 @@ from vico.challenges.assistant.tasks import (
 )
 from vico.clock import clock_of, seconds_of_day
 from vico.community.folder import digest_of
-from vico.community.model import Community, Resident, ScheduleItem
+from vico.community.model import Community, Resident
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.world.model import Place
@@ -197,7 +197,8 @@ def _door(place: Place) -> NDArray[np.float64]:
 def _out_at(who: Resident, time: int, world: World) -> Place | None:
     """Return where somebody is expected at a time who is out then and for a while; None if they are not."""
     home = world.place_by_id[who.home]
-    during = [item for item in who.schedule if _overlaps(item, time, time + _OUT_FOR * STEPS)]
+    until = time + _OUT_FOR * STEPS
+    during = [item for item in who.schedule if seconds_of_day(item.start) < until and seconds_of_day(item.end) > time]
     if any(item.place == who.home for item in during):
         return None
     place = next((world.place_by_id[item.place] for item in during if item.place is not None), None)
@@ -206,10 +207,6 @@ def _out_at(who: Resident, time: int, world: World) -> Place | None:
     if float(np.hypot(*np.subtract(place.position[:2], home.position[:2]))) < APART:
         return None
     return place
-
-
-def _overlaps(item: ScheduleItem, since: float, until: float) -> bool:
-    return seconds_of_day(item.start) < until and seconds_of_day(item.end) > since
 
 
 def _spots(world: World, people: list[Resident], chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
@@ -278,7 +275,7 @@ class Draw:
         others += self.hood.spots_of(who, self.chance, radius=radius)
         near = self._others(source, others, target)[: 2 * (count - 1)]
         order = self.chance.permutation(len(near))[: count - 1]
-        return self._mixed(source, [near[int(k)] for k in order])
+        return self._shuffle(source, [near[int(k)] for k in order])
 
     def frequented_places(self, source: Region, who: Resident, home: Region, *, count: int) -> tuple[list[Region], int]:
         """Return the source among other places of somebody's day, `count` in all if there are so many.
@@ -292,7 +289,7 @@ class Draw:
         more = self._others(source, known, home)
         chosen = [days[int(k)] for k in self.chance.permutation(len(days))]
         apart = {region.centre: region for region in (*chosen, *more) if region.centre != source.centre}
-        return self._mixed(source, list(apart.values())[: count - 1])
+        return self._shuffle(source, list(apart.values())[: count - 1])
 
     def _others(self, source: Region, regions: list[Region], target: Region | None) -> list[Region]:
         """Return regions other than the source, where no thing is told to lie and none is brought to; nearest first."""
@@ -300,7 +297,7 @@ class Draw:
         others = [r for r in others if target is None or _are_apart(r, target)]
         return sorted(others, key=lambda r: float(np.hypot(*np.subtract(r.centre[:2], source.centre[:2]))))
 
-    def _mixed(self, source: Region, others: list[Region]) -> tuple[list[Region], int]:
+    def _shuffle(self, source: Region, others: list[Region]) -> tuple[list[Region], int]:
         regions = [source, *others]
         shuffled = self.chance.permutation(len(regions))
         return [regions[int(k)] for k in shuffled], int(np.flatnonzero(shuffled == 0)[0])
@@ -397,7 +394,7 @@ def _delivery(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
         draw.things.make(name, kind, in_region=source, middles=[*told_before, source, target])
     regions, right = draw.among_others(source, who, radius=SOURCE_RADIUS, count=limits.regions, target=target)
     text = (
-        f"{who.name} asks: bring {draw.things.described(names)} from {regions_text(regions)} to {region_text(target)}."
+        f"{who.name} asks: bring {draw.things.describe(names)} from {regions_text(regions)} to {region_text(target)}."
     )
     return _subtask(index, text, who, names, regions, right, target, candidates)
 
@@ -416,7 +413,7 @@ def _search(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     draw.things.make(names[0], kind, in_region=source, middles=[*told_before, source])
     count = thresholds(advanced=draw.advanced).regions
     regions, right = draw.among_others(source, who, radius=SEARCH_RADIUS, count=count)
-    text = f"{who.name} asks: find {draw.things.described(names)}, lost at {regions_text(regions)}."
+    text = f"{who.name} asks: find {draw.things.describe(names)}, lost at {regions_text(regions)}."
     return _subtask(index, text, who, names, regions, right, None, candidates)
 
 
@@ -436,7 +433,7 @@ def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
         draw.things.hand(name, kind, holder=who.id, near=source.centre)
     text = (
         f"Find {who.name}, {describe_appearance(who.appearance)}, often seen at {regions_text(regions)}; take "
-        f"{draw.things.described(names)} from them, follow them home to {region_text(home)} and put it down there."
+        f"{draw.things.describe(names)} from them, follow them home to {region_text(home)} and put it down there."
     )
     return _subtask(index, text, who, names, regions, right, home, candidates)
 

@@ -150,8 +150,10 @@ def regions_text(regions: Sequence[Region]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-# As the simulation looks for a spot beside: in rings, in so many directions, so far, metres.
-_RING, _DIRECTIONS, _WITHIN = 0.1, 16, 2.0
+# As the simulation looks for a spot beside.
+_RING = 0.1  # metres between two rings
+_DIRECTIONS = 16  # directions of each
+_WITHIN = 2.0  # metres to the last one
 # Surfaces of one height, and how deep things may be in each other, metres.
 _SAME_HEIGHT, _TOLERANCE = 0.02, 1e-3
 
@@ -276,7 +278,7 @@ class ThingPlacer:
         """Give a thing to somebody who holds it from the start; `near` is where they are expected."""
         return self._add(name, kind, near, room=None, holder=holder)
 
-    def described(self, names: Sequence[str]) -> str:
+    def describe(self, names: Sequence[str]) -> str:
         """Return things in words: a red bag and a blue cup."""
         things = [thing for thing in self.made if thing.id in names]
         return " and ".join(movable_kinds()[thing.kind].described(thing.colour) for thing in things)

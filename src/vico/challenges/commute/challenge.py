@@ -13,15 +13,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from vico.agents.base import Action, Agent, AgentState, Info, Observation, usage_of
+from vico.agents.base import Action, Agent, FieldState, Info, Observation, usage_of
 from vico.agents.commute import METHODS, make_planner
 from vico.challenges.commute import tasks
 from vico.challenges.commute.evaluate import CAUSES, DayJudge, part_of
 from vico.challenges.commute.generate import generate_commute
 from vico.challenges.commute.tasks import HOURS, LEGAL, MOST_ON_BIKE, MOST_ON_FOOT, CommuteTask
+from vico.challenges.episodes import for_size
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.clock import clock_of
-from vico.envs import CommunityEnv, Simulation, make
+from vico.envs import Simulation, make
 from vico.errors import InputError
 from vico.rules import ReasonCode, code_name
 from vico.runner.foreign import AbsentAgent, IsolatedAgent, foreign_agents
@@ -58,7 +59,7 @@ def refusal(action: object, vehicle: str) -> tuple[str, str] | None:
     return None
 
 
-class LegalAgent:
+class LegalAgent(FieldState):
     """Passes an agent's legal actions on; one that is not becomes a wait, is counted, and the agent is told.
 
     Parameters
@@ -74,11 +75,14 @@ class LegalAgent:
         How often each type of action was refused.
     """
 
+    inner: Agent
+    _last: tuple[str, str] | None = None
+    refused: Counter[str]
+
     def __init__(self, inner: Agent, commutes: CommuteInfo) -> None:
         self.inner = inner
-        self.refused: Counter[str] = Counter()
+        self.refused = Counter()
         self._commutes = commutes
-        self._last: tuple[str, str] | None = None
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the agent's action, or a wait."""
@@ -92,16 +96,6 @@ class LegalAgent:
             return action
         self.refused[str(action["type"])[:40]] += 1
         return {"type": "wait"}
-
-    def state(self) -> AgentState:
-        """Return what the agent remembers, and what was refused last."""
-        return {"inner": self.inner.state(), "last": self._last, "refused": dict(self.refused)}
-
-    def restore(self, state: AgentState) -> None:
-        """Go on from what `state` returned."""
-        self.inner.restore(state["inner"])
-        self._last = None if state["last"] is None else (state["last"][0], state["last"][1])
-        self.refused = Counter(state["refused"])
 
 
 class CommuteInfo:
@@ -137,7 +131,18 @@ def play_day(
         Called with a label, seconds of the day that are over, and how many there are.
     """
     began = time.perf_counter()
-    env = _env(world, task, job)
+    env = make(
+        world,
+        None,
+        seed=task.seed,
+        start=clock_of(task.appointments[0].end),
+        assistants=1,
+        cars=for_size(tasks.CARS, world),
+        pedestrians=for_size(tasks.PEDESTRIANS, world),
+        observe=() if job.method in METHODS else (AGENT,),
+        max_steps=task.seconds,
+        setup=partial(set_up, task=task),
+    )
     sim, public_map = env.sim, env.public_map
     told = task.instructions()
     info = CommuteInfo(told)
@@ -163,7 +168,34 @@ def play_day(
                 stay_until(sim, judge.logs[-1].item.end)
                 judge.release(float(sim.state.second))
                 info.index = len(judge.logs)
-    return _record(task, job, judge, runner, public_map, agent, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    logs, planner = judge.logs, getattr(inner, "planner", None)
+    usage, counts = usage_of(planner or inner), runner.faults.by_kind()
+    notes = {f"llm_{kind}": n for kind, n in sorted(getattr(planner, "fallbacks", {}).items())}
+    refused = {"illegal": agent.refused.total()} if agent.refused else {}
+    return EpisodeRecord(
+        challenge=job.challenge,
+        category=job.category,
+        method=job.method,
+        setting=job.setting,
+        world=task.world,
+        seed=task.seed,
+        metrics={
+            "travel_time": sum(log.travel for log in logs) / 60.0,
+            "price": round(sum(log.spent for log in logs), 2),
+            "walk_distance": sum(log.walked for log in logs) / 1000.0,
+            "late_rate": 100.0 * sum(log.late for log in logs) / len(logs),
+        },
+        parts=[part_of(log, k, public_map, last=k == len(logs)) for k, log in enumerate(logs, 1)],
+        steps=sim.metrics.steps,
+        limit=task.seconds,
+        wall_seconds=seconds,
+        state_hash=sim.state_hash(),
+        tokens=usage.tokens,
+        cost=usage.cost,
+        fault_counts={**counts, **refused, **notes},
+        faults=runner.faults.first,
+    )
 
 
 def stay_until(sim: Simulation, end: float) -> None:
@@ -195,30 +227,10 @@ class _DayProgress(Hook):
             self._progress(self._label, done, self._task.seconds)
 
 
-def _env(world: World, task: CommuteTask, job: Job) -> CommunityEnv:
-    return make(
-        world,
-        None,
-        seed=task.seed,
-        start=clock_of(task.appointments[0].end),
-        assistants=1,
-        cars=for_size(tasks.CARS, world),
-        pedestrians=for_size(tasks.PEDESTRIANS, world),
-        observe=() if job.method in METHODS else (AGENT,),
-        max_steps=task.seconds,
-        setup=partial(set_up, task=task),
-    )
-
-
 def set_up(simulation: Simulation, *, task: CommuteTask) -> None:
     """Stand the agent where the day begins, with its money."""
     simulation.scenario.place_agent(AGENT, (*task.appointments[0].position, 0.0))
     simulation.scenario.give_cash(AGENT, task.resident.cash)
-
-
-def for_size(number: int, world: World) -> int:
-    """Return how many there are in a world, of so many in a window of 800 m."""
-    return min(number, round(number * (world.half / 400.0) ** 2))
 
 
 def stops_of(public_map: PublicMap) -> list[tuple[float, float]]:
@@ -236,46 +248,6 @@ def _agent(job: Job, task: CommuteTask, world: World, public_map: PublicMap) -> 
         return foreign_agents(job.method, [seat], world, job.terms)[AGENT]
     except InputError as error:
         return AbsentAgent(str(error))
-
-
-def _record(
-    task: CommuteTask,
-    job: Job,
-    judge: DayJudge,
-    runner: Runner,
-    public_map: PublicMap,
-    agent: LegalAgent,
-    seconds: float,
-) -> EpisodeRecord:
-    logs, usage = judge.logs, usage_of(getattr(agent.inner, "planner", agent.inner))
-    counts = runner.faults.by_kind()
-    notes = {
-        f"llm_{kind}": n for kind, n in sorted(getattr(getattr(agent.inner, "planner", None), "fallbacks", {}).items())
-    }
-    refused = {"illegal": agent.refused.total()} if agent.refused else {}
-    return EpisodeRecord(
-        challenge=job.challenge,
-        category=job.category,
-        method=job.method,
-        setting=job.setting,
-        world=task.world,
-        seed=task.seed,
-        metrics={
-            "travel_time": sum(log.travel for log in logs) / 60.0,
-            "price": round(sum(log.spent for log in logs), 2),
-            "walk_distance": sum(log.walked for log in logs) / 1000.0,
-            "late_rate": 100.0 * sum(log.late for log in logs) / len(logs),
-        },
-        parts=[part_of(log, k, public_map, last=k == len(logs)) for k, log in enumerate(logs, 1)],
-        steps=runner.sim.metrics.steps,
-        limit=task.seconds,
-        wall_seconds=seconds,
-        state_hash=runner.sim.state_hash(),
-        tokens=usage.tokens,
-        cost=usage.cost,
-        fault_counts={**counts, **refused, **notes},
-        faults=runner.faults.first,
-    )
 
 
 CATEGORY = "commute"

@@ -5,27 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from vico.challenges.commute.tasks import ARRIVAL, LEFT, Appointment, CommuteTask
 from vico.challenges.records import Part
 from vico.rules import BIKE_ASTRAY, BIKE_RATE, ride_price
 from vico.runner.loop import Hook, Step
+from vico.runner.truth import GroundTruth
 from vico.world.public import PublicMap
 
 #: Who stands this near to where one waits for a bus or tram, metres, waits for one.
 _AT_STOP = 5.0
 _STILL = 0.05
-
-
-class Purse(Protocol):
-    """What the judge asks of the truth."""
-
-    def money(self, name: str) -> float:
-        """Return what an agent has, less what it owes."""
-
-    def bicycle_price(self, name: str) -> float:
-        """Return what it would pay if it left its bicycle here and now; 0 without one."""
 
 
 @dataclass
@@ -119,7 +110,7 @@ class DayJudge(Hook):
 
     task: CommuteTask
     name: str
-    purse: Purse
+    purse: GroundTruth
     stops: list[tuple[float, float]]
     logs: list[CommuteLog] = field(default_factory=list)
     stays: bool = False

@@ -56,9 +56,10 @@ __all__ = [
     "play_by_schedule",
     "time_line",
 ]
-# Seconds: one thinks again after so long where there is nobody to see; it takes so long to find somebody at a place,
-# and so long to say something and be answered; who is to come is late by so much.
-_THINK, _FIND, _ROUND, _LATE = 30.0, 30.0, 3.0, 30.0
+_THINK = 30.0  # seconds until one thinks again where there is nobody to see
+_FIND = 30.0  # seconds to find somebody at a place
+_ROUND = 3.0  # seconds to say something and be answered
+_LATE = 30.0  # seconds that whoever is to come is late
 
 
 @dataclass
@@ -157,7 +158,7 @@ def _talk(day: Day, mover: Mover, target: str, time: float, plans: dict[str, Day
         if answer is None or gone:
             mover.courtship.break_off(time, "on the way" if gone else "no answer")
             return time
-        mover.courtship.heard(answer)
+        mover.courtship.note_answer(answer)
 
 
 def time_line(day: Day) -> list[str]:
@@ -252,7 +253,21 @@ class Influence:
             talks += len({(u.listener, u.conversation) for u in counted})
             if folder is not None:
                 folder.mkdir(parents=True, exist_ok=True)
-                write_json(folder / _TALKS_FILE, _talk_record(day, verdict))
+                write_json(
+                    folder / _TALKS_FILE,
+                    {
+                        "schema_name": "vico.influence.talks",
+                        "version": 1,
+                        "task": day.task.record(),
+                        "strategies": {main: one.strategy.name for main, one in day.courtships.items()},
+                        "visits": {
+                            main: [visit.record() for visit in one.visits] for main, one in day.courtships.items()
+                        },
+                        "utterances": day.ledger.record(),
+                        "before": verdict.before,
+                        "after": verdict.after,
+                    },
+                )
         metrics = evaluate.metrics_of(verdicts) | {"talks": talks / len(verdicts)}
         return EpisodeRecord(
             challenge=NAME,
@@ -266,7 +281,7 @@ class Influence:
             steps=settings.steps * len(verdicts),
             limit=settings.steps * len(verdicts),
             wall_seconds=time.perf_counter() - began,
-            state_hash=_combined_hash(hashes),
+            state_hash=hashes[0] if len(hashes) == 1 else sha256("".join(hashes).encode()).hexdigest(),
             tokens=sum(asker.usage.tokens for asker in askers),
             cost=sum(asker.usage.cost for asker in askers),
             **_faults(faults, askers),
@@ -278,7 +293,7 @@ def _play_day(
 ) -> tuple[str, FaultLog]:
     """Play a day; return the hash of how it ended, and what agents did wrong."""
     if settings.simulation == "schedule":
-        play_by_schedule(day, _walks(world))
+        play_by_schedule(day, Walks(world) if world.path is None else _walks_of(world.path))
         return sha256(repr(day.ledger.utterances).encode()).hexdigest(), FaultLog()
     return _simulate_day(day, world, settings, recording, progress)
 
@@ -343,24 +358,6 @@ def _faults(logs: Sequence[FaultLog], askers: Sequence[Asker]) -> dict[str, Any]
     return {"fault_counts": counts, "faults": told}
 
 
-def _talk_record(day: Day, verdict: evaluate.Verdict) -> dict[str, Any]:
-    """Return what was said and how it was judged, as plain data."""
-    return {
-        "schema_name": "vico.influence.talks",
-        "version": 1,
-        "task": day.task.record(),
-        "strategies": {main: one.strategy.name for main, one in day.courtships.items()},
-        "visits": {main: [visit.record() for visit in one.visits] for main, one in day.courtships.items()},
-        "utterances": day.ledger.record(),
-        "before": verdict.before,
-        "after": verdict.after,
-    }
-
-
-def _combined_hash(hashes: Sequence[str]) -> str:
-    return hashes[0] if len(hashes) == 1 else sha256("".join(hashes).encode()).hexdigest()
-
-
 @lru_cache(maxsize=8)
 def _community(path: Path, seed: int) -> Community:
     return community_of(kept_world(path), seed)
@@ -369,7 +366,3 @@ def _community(path: Path, seed: int) -> Community:
 @lru_cache(maxsize=2)
 def _walks_of(path: Path) -> Walks:
     return Walks(kept_world(path))
-
-
-def _walks(world: World) -> Walks:
-    return Walks(world) if world.path is None else _walks_of(world.path)

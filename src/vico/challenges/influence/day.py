@@ -45,7 +45,7 @@ def profiles_of(community: Community) -> list[Profile]:
         ties[second].append(Tie(first, str(relation.kind), relation.strength))
     found = []
     for resident in community.residents:
-        five = [float(getattr(resident.personality, name)) for name in BIG_FIVE]
+        o, c, e, a, n = (float(getattr(resident.personality, name)) for name in BIG_FIVE)
         found.append(
             Profile(
                 id=resident.id,
@@ -53,7 +53,7 @@ def profiles_of(community: Community) -> list[Profile]:
                 age=resident.age,
                 occupation=resident.occupation,
                 values=tuple(resident.values),
-                five=(five[0], five[1], five[2], five[3], five[4]),
+                five=(o, c, e, a, n),
                 traits=tuple(resident.personality.traits),
                 hobbies=tuple(resident.hobbies),
                 groups=tuple(group.name for group in community.groups_of(resident.id)),
@@ -179,7 +179,10 @@ class Ledger:
     def is_meant(self, member: str, text: str) -> bool:
         """Return whether a message is meant for a member: theirs is the first name in it."""
         words = words_of(text[:LONGEST_TEXT])
-        places = {name: _first_occurrence(words, spoken) for name, spoken in self._names.items()}
+        places = {
+            name: next((k for k in range(len(words) - len(spoken) + 1) if words[k : k + len(spoken)] == spoken), None)
+            for name, spoken in self._names.items()
+        }
         named = {name: at for name, at in places.items() if at is not None}
         # "Ada" and "Ada Berg" may begin at the same word: the longer name is meant.
         return bool(named) and member == min(named, key=lambda name: (named[name], -len(self._names[name])))
@@ -198,10 +201,10 @@ class Ledger:
         """
         text = text[:LONGEST_TEXT]
         conversation, number = self._place_of(time, speaker, member)
-        ignored = self._ignored(time, distance, on_the_way, number)
+        ignored = self._reason_to_ignore(time, distance, on_the_way, number)
         message = HeardMessage(time, speaker, member, text, conversation, number)
         reception = self.model.reception(message, self.heard)
-        answer = self._said(message, ignored, reception)
+        answer = self._reply(message, ignored, reception)
         if ignored in ("", "enough"):
             self.heard.append(message)
             self.receptions.append(reception)
@@ -236,7 +239,7 @@ class Ledger:
             return last.conversation + 1, 0
         return last.conversation, last.round + 1
 
-    def _ignored(self, time: float, distance: float, on_the_way: bool, number: int) -> Ignored:
+    def _reason_to_ignore(self, time: float, distance: float, on_the_way: bool, number: int) -> Ignored:
         if time > self._ends:
             return "day over"
         if distance > TALKING_DISTANCE:
@@ -245,7 +248,7 @@ class Ledger:
             return "on the way"
         return "enough" if number >= ROUNDS else ""
 
-    def _said(self, message: HeardMessage, ignored: Ignored, reception: float) -> str | None:
+    def _reply(self, message: HeardMessage, ignored: Ignored, reception: float) -> str | None:
         if ignored in ("too far", "day over"):
             return None
         listener, speaker = self.model.profiles[message.listener], self.model.profiles[message.speaker]
@@ -255,13 +258,13 @@ class Ledger:
         if ignored:
             return line("on_the_way" if ignored == "on the way" else "enough")
         if self.language is not None:
-            told = self._asked(message, listener, speaker)
+            told = self._ask_model(message, listener, speaker)
             if told is not None:
                 return told
         words = line(self.model.tone(reception))
         return f"{words} {line(self._stance(message, rival, reception))}" if message.round == ROUNDS - 1 else words
 
-    def _asked(self, message: HeardMessage, listener: Profile, speaker: Profile) -> str | None:
+    def _ask_model(self, message: HeardMessage, listener: Profile, speaker: Profile) -> str | None:
         assert self.language is not None
         said = [*self.talks_of(listener.id, speaker.id), {"speaker": speaker.id, "said": message.text, "answer": ""}]
         told = self.language.answer(listener, speaker, list(said))
@@ -278,11 +281,6 @@ class Ledger:
         opinions = self.model.opinions(heard, now=message.time, variant=variant, receptions=receptions)
         ahead = opinions[message.listener, message.speaker] - opinions[message.listener, rival.id]
         return "undecided" if abs(ahead) < _DRAW else "stands_with_you" if ahead > 0 else "stands_with_rival"
-
-
-def _first_occurrence(words: list[str], wanted: list[str]) -> int | None:
-    """Return where some words first stand one after another."""
-    return next((k for k in range(len(words) - len(wanted) + 1) if words[k : k + len(wanted)] == wanted), None)
 
 
 #: Makes what asks a language model, by what for: ``target``, ``dialogue`` or ``member``.

@@ -41,12 +41,12 @@ class Verdict:
     talked: frozenset[str]
     visits: dict[str, list[Ending]] = field(default_factory=dict)
 
-    def won(self, judge: str) -> tuple[int, int]:
+    def rankings_won(self, judge: str) -> tuple[int, int]:
         """Return how many rankings are won, of how many."""
         after = self.after[judge]
         return sum(first == self.main for first in after.values()), len(after)
 
-    def converted(self, judge: str) -> tuple[int, int]:
+    def rankings_converted(self, judge: str) -> tuple[int, int]:
         """Return how many that did not rank one first at the beginning do at the end, of how many."""
         others = [member for member, first in self.before[judge].items() if first != self.main]
         return sum(self.after[judge][member] == self.main for member in others), len(others)
@@ -101,7 +101,7 @@ def metrics_of(verdicts: Sequence[Verdict]) -> dict[str, float]:
     found["visits"] = endings.total() / len(verdicts)
     judges = verdicts[0].judges
     for judge_name in judges:
-        won, conv = [v.won(judge_name) for v in verdicts], [v.converted(judge_name) for v in verdicts]
+        won, conv = [v.rankings_won(judge_name) for v in verdicts], [v.rankings_converted(judge_name) for v in verdicts]
         found[f"win_{judge_name}"] = _share(won)
         if sum(of for _, of in conv):
             found[f"conv_{judge_name}"] = _share(conv)

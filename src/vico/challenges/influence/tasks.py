@@ -5,7 +5,6 @@ An episode has a community of fifteen, two of whom court the others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal, get_args
 
@@ -99,7 +98,8 @@ def settings_of(setting: Setting) -> InfluenceSettings:
         fits = isinstance(value, (int, float) if wanted is float else wanted) and not isinstance(value, bool)
         if not fits:
             raise InputError(f"influence: setting {name} is {value!r}; give a {wanted.__name__}")
-    found = InfluenceSettings(**_typed_setting(setting))
+    typed: dict[str, Any] = {name: float(value) if name == "hours" else value for name, value in setting.items()}
+    found = InfluenceSettings(**typed)
     _check_choice("assignment", found.assignment, ("both", *get_args(Assignment)))
     _check_choice("simulation", found.simulation, get_args(Simulated))
     _check_choice("members", found.members, ("model", "llm"))
@@ -108,10 +108,6 @@ def settings_of(setting: Setting) -> InfluenceSettings:
     if found.llm_tokens < 0:
         raise InputError(f"influence: llm_tokens is {found.llm_tokens}; it must not be negative")
     return found
-
-
-def _typed_setting(setting: Setting) -> Mapping[str, Any]:
-    return {name: float(value) if name == "hours" else value for name, value in setting.items()}
 
 
 def _check_choice(name: str, value: str, options: tuple[str, ...]) -> None:

@@ -12,11 +12,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from vico.agents.base import heading
 from vico.agents.single import action_function
-from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, for_size, residents_of_task, set_up
+from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, residents_of_task, set_up
 from vico.challenges.assistant.evaluate import Judge
 from vico.challenges.assistant.generate import generate_task
 from vico.challenges.assistant.tasks import STEPS, Category, Subtask, Task
+from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep
 from vico.clock import seconds_of_day
 from vico.community.model import Community
@@ -32,8 +34,10 @@ AGENT = "assistant_0"
 SUBTASKS, SOURCES = 6, 3
 # Of a subtask: whether it was reported, how many things it is about by two, directions of sources and destination.
 _ROW = 2 + (SOURCES + 1) * DIRECTION
-# Of the potential: what holding a thing is worth, bringing it nearer, and being near what is next, within metres.
-_HELD, _NEARER, _NEAR, _FAR = 0.25, 0.25, 0.25, 200.0
+_HELD = 0.25  # of the potential: holding a thing
+_NEARER = 0.25  # bringing it nearer
+_NEAR = 0.25  # being near to what is next
+_FAR = 200.0  # metres within which that counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +129,8 @@ class AssistantTask:
             reward += self._potential - before
         over = self._judge.over
         cut = not over and not self.env.agents
-        info: dict[str, Any] = {"done": self._done, "reported": self._reported()}
+        reported = sum(verdict is not None for verdict in self._judge.verdicts)
+        info: dict[str, Any] = {"done": self._done, "reported": reported}
         if over or cut:
             info["is_success"] = all(self._judge.final())
         return TaskStep(self._result, reward, terminated=over, truncated=cut, info=info)
@@ -146,7 +151,7 @@ class AssistantTask:
         """
         observation = result.observations[AGENT]
         pose = np.asarray(observation["pose"], np.float64)
-        heading = math.atan2(pose[4], pose[3])
+        yaw = heading(observation)
         rows = np.zeros((SUBTASKS, _ROW))
         for k, subtask in enumerate(self._task.subtasks[:SUBTASKS]):
             rows[k, 0] = self._judge.verdicts[k] is not None
@@ -154,7 +159,7 @@ class AssistantTask:
             regions = [*subtask.sources[:SOURCES], *[None] * (SOURCES - len(subtask.sources)), subtask.destination]
             for j, region in enumerate(regions):
                 if region is not None:
-                    rows[k, 2 + j * DIRECTION :][:DIRECTION] = direction(region.centre, pose, heading)
+                    rows[k, 2 + j * DIRECTION :][:DIRECTION] = direction(region.centre, pose, yaw)
         around = surroundings_of(observation, result.infos[AGENT], self.env.public_map)
         names = {name: k for k, things in enumerate(self._judge.things) for name in things}
         people = {s.person.agent: k for k, s in enumerate(self._task.subtasks)} if self.category == "carry" else {}
@@ -173,15 +178,12 @@ class AssistantTask:
             f"Hello {split_name(subtask.person.name)[1]}! May I help?" for subtask in self._task.subtasks[:SUBTASKS]
         ]
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the instructions, as planners get them."""
         return {"instructions": self._task.instructions()}
 
     def _count(self) -> int:
         return sum(self._judge.final())
-
-    def _reported(self) -> int:
-        return sum(verdict is not None for verdict in self._judge.verdicts)
 
     def _open(self) -> list[int]:
         return [k for k, verdict in enumerate(self._judge.verdicts) if verdict is None]

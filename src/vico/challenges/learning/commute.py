@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from vico.agents.commute.abstract_city import OBSERVATION_SIZE, STATE_SIZE, city_arrays, observe
 from vico.agents.commute.learning import CommuteVectorEnv, fill_state, training_city
 from vico.challenges.commute import tasks
-from vico.challenges.commute.challenge import AGENT, CommuteInfo, for_size, refusal, set_up, stay_until, stops_of
+from vico.challenges.commute.challenge import AGENT, CommuteInfo, refusal, set_up, stay_until, stops_of
 from vico.challenges.commute.evaluate import CommuteLog, DayJudge
 from vico.challenges.commute.generate import generate_commute
 from vico.challenges.commute.tasks import CommuteTask
+from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep
 from vico.clock import clock_of
 from vico.envs import CommunityEnv, StepResult, make
@@ -97,8 +98,8 @@ class ShardedCommuters:
         """Advance all by a second; see `CommuteVectorEnv.step`."""
         parts = np.split(np.ascontiguousarray(actions, np.int64), len(self._group))
         answers = self._group.ask([Call("step", (part,)) for part in parts])
-        seen, rewards, reached, given_up = (np.concatenate([one[k] for one in answers]) for k in range(4))
-        found = [one[4] for one in answers]
+        *arrays, found = zip(*answers, strict=True)
+        seen, rewards, reached, given_up = map(np.concatenate, arrays)
         return seen, rewards, reached, given_up, self._together(seen, found)
 
     def _together(self, seen: NDArray[np.float32], found: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -234,7 +235,7 @@ class CommuteTaskEnv:
         """Nothing is said."""
         return []
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the day."""
         start = clock_of(self._day.appointments[0].end)
         return {"instructions": self._day.instructions(), "starts": start}

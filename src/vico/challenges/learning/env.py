@@ -103,7 +103,7 @@ class LearningTask(Protocol):
     def phrases(self) -> list[str]:
         """Return what `communicate` says in this episode, beside the usual phrases."""
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return what the agent is told at the start, in words and names."""
 
 
@@ -167,8 +167,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         if isinstance(self._form, ArrayForm):
             self._form.allows = self.task.allows
             self._form.say(self.task.phrases())
-        observation, info = self._told(self._last)
-        return observation, {**info, **self.task.told(), "task": number}
+        observation, info = self._with_goal(self._last)
+        return observation, {**info, **self.task.instructions(), "task": number}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act until the agent is asked again.
@@ -182,7 +182,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             raise InputError("env: the episode is over (or has not begun); call reset() before step()")
         moment = self.task.act(self._form.decode(action))
         self._last, self._over = moment.result, moment.terminated or moment.truncated
-        observation, info = self._told(moment.result)
+        observation, info = self._with_goal(moment.result)
         return observation, float(moment.reward), moment.terminated, moment.truncated, {**info, **moment.info}
 
     def action_masks(self) -> NDArray[np.bool_]:
@@ -206,7 +206,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self.task.env.close()
         self._last, self._over = None, True
 
-    def _told(self, result: StepResult) -> tuple[Any, dict[str, Any]]:
+    def _with_goal(self, result: StepResult) -> tuple[Any, dict[str, Any]]:
         observation, info = self.task.env.told(self.task.agent, result)
         return with_goal(observation, self.task.goal(result), self.task.goal_space), info
 

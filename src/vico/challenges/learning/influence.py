@@ -111,11 +111,11 @@ class InfluenceEnv(gymnasium.Env[NDArray[np.float32], Any]):
         if seed is None and self._np_random is None:
             seed = self._seed
         super().reset(seed=seed)
-        number = self._begun(seed)
+        number = self._begin(seed)
         day = self._today
         names = {resident.id: resident.name for resident in day.community.residents}
         self._won = self._first()
-        return self._seen(), self._info() | {
+        return self._observe(), self._info() | {
             "task": number,
             "instructions": f"Court the others for {names[day.ours]}.",
             "members": [names[member] for member in day.task.members],
@@ -141,7 +141,7 @@ class InfluenceEnv(gymnasium.Env[NDArray[np.float32], Any]):
         if self._reward == "shaped" or over:
             before, self._won = self._won, self._first()
             reward = self._won - before
-        return self._seen(), float(reward), over, False, self._info()
+        return self._observe(), float(reward), over, False, self._info()
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return who can be met, as `sb3_contrib.MaskablePPO` asks for it."""
@@ -160,7 +160,7 @@ class InfluenceEnv(gymnasium.Env[NDArray[np.float32], Any]):
     def _is_over(self) -> bool:
         return self._mine.free_at >= self._today.task.ends
 
-    def _begun(self, seed: int | None) -> int:
+    def _begin(self, seed: int | None) -> int:
         if seed is not None:
             number = seed if self._tasks is None else seed % self._tasks
             self._make(number)
@@ -205,7 +205,7 @@ class InfluenceEnv(gymnasium.Env[NDArray[np.float32], Any]):
             mover.free_at, walks.position(mover.place), lambda place: walks.seconds(mover.place, place)
         )
 
-    def _seen(self) -> NDArray[np.float32]:
+    def _observe(self) -> NDArray[np.float32]:
         situation = self._situation()
         reachable = situation.reachable()
         left = max(0.0, situation.ends - situation.time) / (3600.0 * self._settings.hours)

@@ -12,8 +12,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from scipy import sparse
 
+from vico.agents.base import heading
 from vico.challenges.learning.env import TaskStep
-from vico.envs import CommunityEnv, Simulation, StepResult, make
+from vico.envs import CommunityEnv, StepResult, make
 from vico.envs.array_observations import DIRECTION, HIGH, LOW, direction
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
@@ -93,12 +94,12 @@ class PointGoal:
     def begin(self, seed: int) -> StepResult:
         """Draw start and goal."""
         chance = rng(seed, "point goal", self.env.world.digest)
-        start, self._goal = self._drawn(chance)
+        start, self._goal = self._draw(chance)
         yaw = float(chance.uniform(-math.pi, math.pi))
         if self.options.robot:
             self.env.arrange(robot_places={self.agent: (float(start[0]), float(start[1]), yaw)})
         else:
-            self.env.arrange(setup=lambda sim: _place(sim, self.agent, start, yaw))
+            self.env.arrange(setup=lambda sim: sim.scenario.place_agent(self.agent, (*start.tolist(), 0.0), yaw=yaw))
         result = self.env.begin(seed)
         self._away = self._way_from(self._position(result))
         return result
@@ -126,21 +127,22 @@ class PointGoal:
 
     def goal(self, result: StepResult) -> NDArray[np.float32]:
         """Return the direction of the goal; see `vico.envs.array_observations.DIRECTION`."""
-        pose = np.asarray(result.observations[self.agent]["pose"], np.float64)
-        return np.array(direction(self._goal, pose, math.atan2(pose[4], pose[3])), np.float32)
+        observation = result.observations[self.agent]
+        pose = np.asarray(observation["pose"], np.float64)
+        return np.array(direction(self._goal, pose, heading(observation)), np.float32)
 
     def phrases(self) -> list[str]:
         """Nothing is said."""
         return []
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the point, ENU metres."""
         return {"instructions": f"Go to the point {self._goal[0]:.1f} m east, {self._goal[1]:.1f} m north."}
 
     def _position(self, result: StepResult) -> NDArray[np.float64]:
         return np.asarray(result.observations[self.agent]["pose"][:2], np.float64)
 
-    def _drawn(self, chance: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _draw(self, chance: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Draw start and goal, and find the ways to the goal."""
         walkable, options = self.env.world.walkable, self.options
         room = 1.0 if options.robot else 0.5
@@ -209,7 +211,3 @@ def path_lengths_to(
     column, row = walkable.cell_of(goal).tolist()
     away = sparse.csgraph.dijkstra(graph, directed=False, indices=int(number[row - bottom, column - left]))
     return np.asarray(away, np.float64).reshape(rows, columns), (left, bottom)
-
-
-def _place(simulation: Simulation, agent: str, start: NDArray[np.float64], yaw: float) -> None:
-    simulation.scenario.place_agent(agent, (*start.tolist(), 0.0), yaw=yaw)

@@ -17,15 +17,17 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from vico.agents.base import Action, Agent, AgentState, Info, Observation
+from vico.agents.base import Action, Agent, FieldState, Info, Observation, heading
 from vico.agents.robot.body import Stance, view_points
 from vico.agents.robot.carrier import Carrier, call_message
 from vico.agents.robot.grasps import object_box, pose_of_box
 from vico.agents.single import action_function
 from vico.assets.robots import robot_model
-from vico.challenges.assistant.challenge import CARS, PEDESTRIANS, for_size
+from vico.challenges.assistant.challenge import CARS, PEDESTRIANS
 from vico.challenges.assistant.evaluate import entrance_of
+from vico.challenges.episodes import for_size
 from vico.challenges.learning.env import TaskStep, begin_episode, with_goal, with_goal_space
+from vico.challenges.learning.manipulation.tasks import PAPER_FARTHEST, PAPER_GRASP, PAPER_METRE, PAPER_PLACE
 from vico.challenges.robot.challenge import (
     CARRIER,
     MANIPULATOR,
@@ -52,8 +54,6 @@ from vico.world.world import World
 
 #: What ``goal`` holds, and how many numbers each has; ``other`` is the other robot.
 GOAL = {"source": DIRECTION, "destination": DIRECTION, "person": DIRECTION, "other": DIRECTION, "thing": 7}
-# The paper's reward: a metre costs so much a step, up to so many metres; holding and delivering are worth so much.
-_PENALTY, _FAR, _GRASP, _PLACE = 0.02, 10.0, 5.0, 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,8 +211,8 @@ class RobotTaskWorld:
         away = float(np.linalg.norm(Stance.of(observation).outside(hand) - thing.middle))
         missing = distance(thing.middle[:2], self.goal_at[:2])
         lifted = float(thing.middle[2]) - float(self.env.world.height(thing.middle[:2])) > 4.0 * float(thing.half[2])
-        reward = -_PENALTY * (min(away, _FAR) + min(missing, _FAR))
-        return reward + _GRASP * (self.is_held() and lifted) + _PLACE * self.success
+        reward = -PAPER_METRE * (min(away, PAPER_FARTHEST) + min(missing, PAPER_FARTHEST))
+        return reward + PAPER_GRASP * (self.is_held() and lifted) + PAPER_PLACE * self.success
 
     def goal(self, name: str, result: StepResult) -> NDArray[np.float32]:
         """Return what is asked of a robot and what it sees of it, in numbers.
@@ -224,14 +224,14 @@ class RobotTaskWorld:
         """
         observation, info = result.observations[name], result.infos[name]
         pose = np.asarray(observation["pose"], np.float64)
-        heading = math.atan2(pose[4], pose[3])
-        told = [direction(region.centre, pose, heading) for region in (self.task.source, self.task.destination)]
+        yaw = heading(observation)
+        told = [direction(region.centre, pose, yaw) for region in (self.task.source, self.task.destination)]
         around = surroundings_of(observation, info, self.env.public_map)
         names = (self.task.person.agent, self.task.person.name)
         person = next((one.position for one in around.people if one.name in names), None)
-        told.append([0.0] * DIRECTION if person is None else direction(person, pose, heading))
-        told.append(direction(self.bodies()[int(name == MANIPULATOR)], pose, heading))
-        return np.concatenate([*told, self._seen(observation, info)]).astype(np.float32)
+        told.append([0.0] * DIRECTION if person is None else direction(person, pose, yaw))
+        told.append(direction(self.bodies()[int(name == MANIPULATOR)], pose, yaw))
+        return np.concatenate([*told, self._thing_numbers(observation, info)]).astype(np.float32)
 
     def bodies(self) -> NDArray[np.float64]:
         """Return where the robots are, ENU metres, shape ``(2, 3)``."""
@@ -239,7 +239,7 @@ class RobotTaskWorld:
         assert robots is not None
         return np.asarray(robots.bodies().position, np.float64)
 
-    def _seen(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> NDArray[np.float64]:
+    def _thing_numbers(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> NDArray[np.float64]:
         if "depth" not in observation or "segmentation" not in observation:
             return np.zeros(GOAL["thing"])
         named = (int(e) for e, about in info["entities"].items() if about.get("name") == self.task.thing.name)
@@ -255,9 +255,9 @@ def is_usable(action: Mapping[str, Any]) -> bool:
     return bool(np.isfinite(np.asarray(action.get("vector", ()), np.float64)).all())
 
 
-# The carrier comes after the other robot once that is so far away, metres, to so far behind it, and not oftener than
-# every so many seconds.
-_COMES, _BEHIND, _EVERY = 4.0, 2.2, 5.0
+_COMES = 4.0  # metres from the other robot from which on the carrier comes after it
+_BEHIND = 2.2  # metres behind it to which it comes
+_EVERY = 5.0  # seconds between two times, at least
 
 
 class RobotWork:
@@ -305,7 +305,7 @@ class RobotWork:
         """Nothing is said."""
         return []
 
-    def told(self) -> Mapping[str, Any]:
+    def instructions(self) -> Mapping[str, Any]:
         """Return the instructions, as robots of the challenge get them."""
         return {"instructions": self.stage.task.instruction()}
 
@@ -313,7 +313,7 @@ class RobotWork:
         return Stance.of(self.stage.result.observations[MANIPULATOR])
 
 
-class _FollowingCarrier:
+class _FollowingCarrier(FieldState):
     """A carrier that comes after the other robot, which has no words where it acts in numbers.
 
     Parameters
@@ -326,9 +326,11 @@ class _FollowingCarrier:
         Seconds between two actions.
     """
 
+    _carrier: Carrier
+    _since: float = _EVERY
+
     def __init__(self, carrier: Carrier, leader: Callable[[], Stance], period: float) -> None:
         self._carrier, self._leader, self._period = carrier, leader, period
-        self._since = _EVERY
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming period."""
@@ -340,15 +342,6 @@ class _FollowingCarrier:
             call = {"speaker": MANIPULATOR, "text": call_message(x, y)}
             observation = {**observation, "events": [*observation["events"], call]}
         return self._carrier.act(observation, info)
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        return {"carrier": self._carrier.state(), "since": self._since}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._carrier.restore(state["carrier"])
-        self._since = float(state["since"])
 
 
 class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
@@ -428,9 +421,11 @@ class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
         """
         if seed is not None:
             self._random = rng(seed, "robot team episodes")
-        number, result = begin_episode(self._begin, seed, tasks=self._tasks, random=self._random)
+        number, result = begin_episode(
+            lambda number: self.stage.begin(number, {}), seed, tasks=self._tasks, random=self._random
+        )
         self.agents = list(self.possible_agents)
-        return self._told(result, {"task": number, "instructions": self.stage.task.instruction()})
+        return self._results_for(result, {"task": number, "instructions": self.stage.task.instruction()})
 
     def step(
         self, actions: Mapping[str, Any]
@@ -456,7 +451,7 @@ class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
         if over or cut:
             self.agents = []
             info |= {"is_success": stage.success and usable, "cause": cause}
-        observations, infos = self._told(stage.result, info)
+        observations, infos = self._results_for(stage.result, info)
         return (
             observations,
             dict.fromkeys(names, reward),
@@ -478,10 +473,9 @@ class RobotTeamEnv(ParallelEnv):  # type: ignore[misc]
         self.stage.env.close()
         self.agents = []
 
-    def _begin(self, number: int) -> StepResult:
-        return self.stage.begin(number, {})
-
-    def _told(self, result: StepResult, more: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    def _results_for(
+        self, result: StepResult, more: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Return what each is told; in the array form infos hold numbers alone, which libraries make tensors of."""
         observations: dict[str, Any] = {}
         infos: dict[str, dict[str, Any]] = {}

@@ -20,7 +20,7 @@ from vico.agents.robot.body import Stance
 from vico.agents.robot.increments import INCREMENTS, JOINTS, PERIOD, STATE, arm_state, increments_of
 from vico.assets.models.movable import movable_prototype, movable_surfaces
 from vico.assets.robots import robot_model
-from vico.challenges.pick_place.tasks import NEXT_TO, TABLE, PickPlaceTask, TaskThing, draw_task, world_of_task
+from vico.challenges.pick_place.tasks import NEXT_TO, TABLE, PickPlaceTask, draw_task, level_field
 from vico.challenges.robot_tasks import arm_body
 from vico.clock import clock_of
 from vico.envs import Simulation, make
@@ -49,8 +49,9 @@ __all__ = [
 ROBOT = "robot_0"
 #: Side of its pictures unless told, pixels, as in the paper.
 SIDE = 224
-# Metres that a thing may be off the height of what it lies on; m/s of one that lies still; newtons of a finger on it.
-_HEIGHT, _STILL, _TOUCHED = 0.05, 0.02, 0.5
+_HEIGHT = 0.05  # metres that a thing may be off the height of what it lies on
+_STILL = 0.02  # m/s below which it lies still
+_TOUCHED = 0.5  # newtons of a finger that touches it
 # Seconds that a thing is given to come to rest once the robot is done.
 _RESTS = 1.0
 
@@ -149,7 +150,7 @@ def play(
         if seen is not None:
             seen(observation)
         observation = _step(sim, action)
-        lifted = lifted or _rise(sim, task) > 0.05
+        lifted = lifted or float(sim.ground_truth.object_position("thing")[2] - task.thing.position[2]) > 0.05
         if observation["sensors"]["fallen"][0]:
             cause = Verdict.FALLEN
             break
@@ -180,7 +181,7 @@ def play(
 def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, outputs: tuple[str, ...]) -> Simulation:
     """Return the simulation of a task before its first step: the robot, the thing and the one beside it."""
     env = make(
-        world_of_task(task, world),
+        level_field(task.seed, table=task.table) if world is None else world,
         seed=task.seed,
         residents=0,
         robots=("manipulator",),
@@ -199,18 +200,14 @@ def simulation_of(task: PickPlaceTask, world: World | None, *, side: int, output
 
 def _set_up(sim: Simulation, task: PickPlaceTask) -> None:
     for name, thing in (("thing", task.thing), ("landmark", task.landmark)):
-        _add(sim, name, thing)
-
-
-def _add(sim: Simulation, name: str, thing: TaskThing) -> None:
-    sim.scenario.add_object(
-        name,
-        movable_prototype(thing.kind, thing.colour),
-        movable_surfaces(thing.kind, thing.colour),
-        thing.position,
-        size=thing.size,
-        yaw=thing.yaw,
-    )
+        sim.scenario.add_object(
+            name,
+            movable_prototype(thing.kind, thing.colour),
+            movable_surfaces(thing.kind, thing.colour),
+            thing.position,
+            size=thing.size,
+            yaw=thing.yaw,
+        )
 
 
 def _step(sim: Simulation, action: dict[str, Any]) -> Observation:
@@ -219,11 +216,6 @@ def _step(sim: Simulation, action: dict[str, Any]) -> Observation:
     sim.advance(PERIOD)
     observations, _ = sim.observe([ROBOT])
     return observations[ROBOT]
-
-
-def _rise(sim: Simulation, task: PickPlaceTask) -> float:
-    """Return how much higher the thing is than where it lay, metres."""
-    return float(sim.ground_truth.object_position("thing")[2] - task.thing.position[2])
 
 
 def _judge(sim: Simulation, task: PickPlaceTask, observation: Observation, *, lifted: bool) -> tuple[str, float]:
@@ -249,8 +241,11 @@ def _judge(sim: Simulation, task: PickPlaceTask, observation: Observation, *, li
 
 #: What it is called in the records of a dataset.
 METHOD = "arm_worker"
-# Nearer than that the arm's own skills bring the base up, metres; on the way there, m/s and rad/s.
-_NEAR, _FASTEST, _TURNS, _GAIN, _AHEAD = 1.2, 0.5, 0.8, 1.5, 0.15
+_NEAR = 1.2  # metres from which on the arm's own skills bring the base up
+_FASTEST = 0.5  # m/s on the way there
+_TURNS = 0.8  # rad/s on the way there
+_GAIN = 1.5  # of turning, 1/s
+_AHEAD = 0.15  # rad off its heading at which it goes ahead
 
 
 class Demonstrator:
@@ -362,12 +357,14 @@ def demonstrate(
     task = draw_task(seed, world, seconds=seconds)
     count = 0
 
-    def told(observation: Observation) -> None:
+    def count_observation(observation: Observation) -> None:
         nonlocal count
         if seen is not None:
             seen(count, observation)
         count += 1
 
-    played = play(task, world, Demonstrator(period=PERIOD), side=max(side, SIDE), seen=told, to_the_end=True)
+    played = play(
+        task, world, Demonstrator(period=PERIOD), side=max(side, SIDE), seen=count_observation, to_the_end=True
+    )
     largest = np.abs(played.actions).max(axis=1, initial=0.0)
     return DemonstratedEpisode(task, played, np.flatnonzero(largest >= drop_below))

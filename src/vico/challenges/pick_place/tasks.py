@@ -126,8 +126,9 @@ NEXT_TO = 0.6
 _TALLEST = 0.5
 # The robot's heading is off its thing by as much at most, rad: what it is told of is in its picture.
 _OFF = 0.6
-# Of ground on streets: room all round, how far it may rise, metres, and how often a place is tried.
-_ROOM, _RISE, _TRIES = 2.6, 0.04, 200
+_ROOM = 2.6  # metres of room all round, of ground on streets
+_RISE = 0.04  # metres that it may rise
+_TRIES = 200  # how often a place is tried
 _DAYLIGHT, _WEATHER = (9 * 3600, 17 * 3600), ("clear", "fair", "overcast")
 
 
@@ -278,11 +279,6 @@ def draw_task(seed: int, world: World | None = None, *, seconds: int = SECONDS) 
         weather=_WEATHER[int(chance.integers(len(_WEATHER)))],
         seconds=seconds,
     )
-
-
-def world_of_task(task: PickPlaceTask, world: World | None) -> World:
-    """Return the world that a task is set in: the one that is given, or a field as the task says."""
-    return level_field(task.seed, table=task.table) if world is None else world
 
 
 #: Three of four episodes begin on the ground, two of four end there beside a thing.

@@ -271,7 +271,9 @@ def policy_setting(method: str, path: str) -> Setting:
         raise InputError(f"robot: {method} needs --policy with what {writes} has written")
     if method == "vla":
         _imitator(Path(path), seed=0)
-        return {"policy": path, "policy_sha256": _digest(_files_of(Path(path)))}
+        whole = Path(path)
+        files = sorted(one for one in whole.iterdir() if one.is_file()) if whole.is_dir() else [whole]
+        return {"policy": path, "policy_sha256": _digest(files)}
     files = _files(method, path)
     _controllers(method, path)
     return {"policy": path, "policy_sha256": _digest(files)}
@@ -417,10 +419,6 @@ def _imitator(path: Path, *, seed: int) -> ChunkActor | LeRobotActor:
             f"policy: {path} looks at pictures of {policy.shape.side} pixels; robots of the challenge see {PICTURE}"
         )
     return ChunkActor(policy, every=max(1, policy.shape.chunk // 2))
-
-
-def _files_of(path: Path) -> list[Path]:
-    return sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]
 
 
 def _digest(files: list[Path]) -> str:

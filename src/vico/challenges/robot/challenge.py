@@ -28,7 +28,6 @@ from vico.challenges.robot.tasks import CATEGORIES, PACE_HOME, PERIOD, RESIDENTS
 from vico.challenges.robot_episodes import (
     ReportedSeconds,
     RobotsChallenge,
-    Verdict,
     foreign_robots,
     make_episode_env,
     place_waiting,
@@ -129,11 +128,14 @@ def play_robot_task(
     )
     if learned is not None and learned.broken:
         judge.ended_by = UNUSABLE
+    more = {"force": judge.story.force, "drops": float(judge.story.drops)}
+    if task.category == "carry":
+        more["together"] = judge.together()
     return record_of(
         task,
         runner,
         robots,
-        _verdict(task, judge),
+        verdict_on(task.thing.name, judge.done_at, judge.cause(), task.steps, more),
         challenge="robot",
         method=method,
         setting=setting,
@@ -200,13 +202,6 @@ def truth_of(sim: Simulation, task: RobotTask) -> PoseOracle:
         return ObjectPose(objects.position[k] + rotation[:, 2] * half[2], rotation, half)
 
     return pose
-
-
-def _verdict(task: RobotTask, judge: RobotJudge) -> Verdict:
-    more = {"force": judge.story.force, "drops": float(judge.story.drops)}
-    if task.category == "carry":
-        more["together"] = judge.together()
-    return verdict_on(task.thing.name, judge.done_at, judge.cause(), task.steps, more)
 
 
 _SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0, about="success rate: episodes in which the thing was brought")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from vico.challenges.robot.tasks import (
 )
 from vico.geometry import distances
 from vico.runner.loop import Hook, Step
+from vico.runner.truth import GroundTruth, RobotPopulation
 from vico.world.world import World
 
 #: Why a task fails, in the order in which a table lists them.
@@ -41,45 +42,6 @@ CAUSES = (
 _ON_DECK, _OF_DECK = 0.15, 0.9
 # Share of the way home on which the person is to be near a robot.
 _TOGETHER = 0.5
-
-
-class Truth(Protocol):
-    """What the judge may look at: the state itself, no agent's view of it."""
-
-    def object_position(self, name: str) -> NDArray[np.float64]:
-        """Where a thing is, metres, shape ``(3,)``."""
-
-    def object_room(self, name: str) -> str | None:
-        """Id of the room a thing is in; None outdoors."""
-
-    def object_holder(self, name: str) -> str | None:
-        """Name of the person who has it in hand."""
-
-    def object_entity(self, name: str) -> int:
-        """Its entity, as pictures show it."""
-
-    def agent_position(self, name: str) -> NDArray[np.float64]:
-        """Where a person stands, metres, shape ``(3,)``."""
-
-    def agent_place(self, name: str) -> str | None:
-        """Id of the place a person is in; None outdoors."""
-
-
-class Robots(Protocol):
-    """What the judge looks at of the robots: names, where they are, what their jaws hold, whether they lie."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Of the robots."""
-
-    def bodies(self) -> Any:
-        """Positions and more of all robots."""
-
-    def in_hand(self, robot: int) -> int:
-        """Entity of the thing in a jaw; 0 for nothing."""
-
-    def observation(self, robot: int) -> dict[str, NDArray[Any]]:
-        """Return what a robot feels of itself."""
 
 
 @dataclass
@@ -121,7 +83,7 @@ class RobotJudge(Hook):
     """
 
     def __init__(
-        self, task: RobotTask, world: World, truth: Truth, robots: Robots, seconds: Callable[[], float]
+        self, task: RobotTask, world: World, truth: GroundTruth, robots: RobotPopulation, seconds: Callable[[], float]
     ) -> None:
         self.task, self.world, self.truth, self.robots, self._seconds = task, world, truth, robots, seconds
         self.story = RobotEpisodeLog()

@@ -40,9 +40,12 @@ PACE_HOME, WAITS = 0.6, 60.0
 SEEN_PIXELS, SEEN_DISTANCE = 20, 10.0
 #: A robot with an arm came to the thing within this distance, metres.
 REACHED = 1.2
-#: Tasks are drawn where the manipulator can come so near to the thing, and to where it is to be, and the carrier to
-#: both, metres.
-ARM_COMES, GOAL_COMES, CARRIER_COMES = 0.6, 2.0, 4.0
+#: Tasks are drawn where the manipulator can come so near to the thing, metres.
+ARM_COMES = 0.6
+#: ... and so near to where the thing is to be, metres.
+GOAL_COMES = 2.0
+#: ... and where the carrier can come so near to both, metres.
+CARRIER_COMES = 4.0
 
 #: Things lie, and are put down, on ground that rises by so much a metre at most.
 LEVEL = 0.1
@@ -50,8 +53,11 @@ LEVEL = 0.1
 #: People who live in the world.
 RESIDENTS = 15
 
-#: The jaw is so much wider than a thing, metres, on each side; things are so high at least and at most, metres.
-JAW_ROOM, LOWEST, HIGHEST = 0.025, 0.05, 0.6
+#: Metres that the jaw is wider than a thing, on each side.
+JAW_ROOM = 0.025
+#: Heights of things, at least and at most, metres.
+LOWEST = 0.05
+HIGHEST = 0.6
 
 
 SCHEMA, VERSION = "vico.robot_task", 1

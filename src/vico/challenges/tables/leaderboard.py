@@ -41,7 +41,7 @@ class BoardMetric(_Strict):
     better: Literal["higher", "lower"]
 
     @model_validator(mode="after")
-    def _ordered(self) -> BoardMetric:
+    def _check_interval(self) -> BoardMetric:
         if (self.low is None) != (self.high is None):
             raise ValueError("an interval has two ends, or none")
         if self.low is not None and self.high is not None and not self.low <= self.mean <= self.high:
@@ -87,7 +87,7 @@ class Entry(_Strict):
     date: str | None = Field(default=None, pattern=_DATE)
 
     @model_validator(mode="after")
-    def _ranked(self) -> Entry:
+    def _check_rank_metric(self) -> Entry:
         if self.rank_by not in self.metrics:
             raise ValueError(f"rank_by names {self.rank_by!r}, which is none of its metrics")
         return self

@@ -15,7 +15,7 @@ from pydantic import Field, StrictBool, StrictFloat, StrictInt
 
 from vico.challenges.episodes import Outcome, code_digest, label_of, record_of
 from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting
-from vico.challenges.tables.summary import Average, Difference, Estimate, Row, Summary, summarise
+from vico.challenges.tables.summary import Difference, Estimate, Row, Summary, summarise
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.io.files import FolderKind, read_json, write_bytes, write_json
@@ -273,13 +273,10 @@ def _average_section(challenge: Challenge, summary: Summary, published: Sequence
         cells = [f"{value:.{metric.digits}f}" for value in values if value is not None]
         body.append([other.label, *cells, f"{other.average:.{metric.digits}f}", _NOTHING])
     for average in summary.averages:
-        body.append(_average_row(average, metric, [row for row in summary.rows if row.method == average.method]))
+        rows = [row for row in summary.rows if row.method == average.method]
+        cells = [f"{row.metrics[metric.key].mean:.{metric.digits}f}" for row in rows]
+        body.append([average.method, *cells, _mean(average.mean, metric), _change(average.difference, metric)])
     return ["## All categories", "", *table(head, body), ""]
-
-
-def _average_row(average: Average, metric: Metric, rows: Sequence[Row]) -> list[str]:
-    cells = [f"{row.metrics[metric.key].mean:.{metric.digits}f}" for row in rows]
-    return [average.method, *cells, _mean(average.mean, metric), _change(average.difference, metric)]
 
 
 def _title(metric: Metric) -> str:
@@ -352,19 +349,6 @@ def results_content(challenge: Challenge, summary: Summary, outcomes: Sequence[O
     }
 
 
-def timing_content(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Return what ``timing.json`` holds: the seconds of each episode, by the clock of the machine that played it."""
-    return {
-        "schema_name": TIMING,
-        "version": TIMING_VERSION,
-        "episodes": [
-            {**dict(zip(_WHICH, _which(o.job.world.name, o.record), strict=True)), _SECONDS: o.record.wall_seconds}
-            for o in outcomes
-            if o.record is not None
-        ],
-    }
-
-
 def _files_of(_: Path) -> list[str]:
     """Return the files of an evaluation; a day of influence may have a run an assignment, its talks beside it."""
     from vico.runner.recording import RUN_FOLDER  # simulations are slow to import
@@ -388,7 +372,18 @@ def write_results(
 ) -> Summary:
     """Write results and timing of the outcomes of one setting; return the summary."""
     summary = summarise(challenge, outcomes, reference=reference)
-    write_json(folder / "timing.json", timing_content(outcomes))
+    write_json(
+        folder / "timing.json",
+        {
+            "schema_name": TIMING,
+            "version": TIMING_VERSION,
+            "episodes": [
+                {**dict(zip(_WHICH, _which(o.job.world.name, o.record), strict=True)), _SECONDS: o.record.wall_seconds}
+                for o in outcomes
+                if o.record is not None
+            ],
+        },
+    )
     write_json(folder / "results.json", results_content(challenge, summary, outcomes))
     write_bytes(folder / "results.md", results_page(challenge, summary, outcomes, published=published).encode())
     return summary

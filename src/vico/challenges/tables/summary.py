@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from vico.challenges.episodes import Outcome
-from vico.challenges.records import Challenge, EpisodeRecord, Metric, Setting, setting_of_task
+from vico.challenges.records import Challenge, Metric, Setting, setting_of_task
 from vico.runner.gather import FAULT_KINDS
 
 
@@ -39,7 +39,7 @@ class Estimate:
     count: int
     clusters: int
 
-    def clipped(self, low: float, high: float) -> Estimate:
+    def clip(self, low: float, high: float) -> Estimate:
         """Return it with an interval that does not leave some bounds."""
         if self.low is None or self.high is None:
             return self
@@ -208,12 +208,13 @@ def summarise(challenge: Challenge, outcomes: Sequence[Outcome], *, reference: s
 
 
 def _row(challenge: Challenge, category: str, method: str, outcomes: Sequence[Outcome]) -> Row:
-    records = _records(outcomes)
+    records = [outcome.record for outcome in outcomes if outcome.record is not None]
     metrics = {}
     for metric in challenge.metrics(category):
         values = _values(outcomes, metric.key)
         if values:
-            metrics[metric.key] = _mean(metric, values)
+            mean = estimate([value for value, _ in values], [world for _, world in values])
+            metrics[metric.key] = mean.clip(metric.low, metric.high)
     parts = [part for record in records for part in record.parts]
     counted = Counter(part.cause for part in parts if not part.success)
     faults = {kind: sum(record.fault_counts.get(kind, 0) for record in records) for kind in FAULT_KINDS}
@@ -265,12 +266,8 @@ def _averages(
         difference = None
         if method != reference and all(pairs):
             difference = estimate_of_means([[v for v, _ in p] for p in pairs], [[w for _, w in p] for p in pairs])
-        averages.append(Average(method, key, mean.clipped(first[0].low, first[0].high), difference))
+        averages.append(Average(method, key, mean.clip(first[0].low, first[0].high), difference))
     return averages
-
-
-def _records(outcomes: Sequence[Outcome]) -> list[EpisodeRecord]:
-    return [outcome.record for outcome in outcomes if outcome.record is not None]
 
 
 def _values(outcomes: Sequence[Outcome], key: str) -> list[tuple[float, str]]:
@@ -298,8 +295,3 @@ def _task(outcome: Outcome) -> tuple[str, int]:
 
 def _world(outcome: Outcome) -> str:
     return str(outcome.job.world)
-
-
-def _mean(metric: Metric, values: Sequence[tuple[float, str]]) -> Estimate:
-    found = estimate([value for value, _ in values], [world for _, world in values])
-    return found.clipped(metric.low, metric.high)

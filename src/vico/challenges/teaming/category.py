@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from vico.challenges.assistant.tasks import Person, Region
 from vico.challenges.robot_tasks import Draw
 from vico.challenges.teaming.tasks import LEAST_AREA, MOST_WALK, PACES, STILL, UPRIGHT, Member, TeamingTask, Walk
 from vico.community.model import Resident
+from vico.runner.truth import RobotPopulation
 
 Array = NDArray[np.float64]
 
@@ -79,39 +80,6 @@ def walk_task(
     )
 
 
-class Truth(Protocol):
-    """What the judge may look at of people and things: the state itself, no agent's view of it."""
-
-    def agent_position(self, name: str) -> Array:
-        """Where a person stands, metres, shape ``(3,)``."""
-
-    def agent_place(self, name: str) -> str | None:
-        """Id of the place a person is in; None outdoors."""
-
-    def agent_room(self, name: str) -> str | None:
-        """Id of the room a person is in; None outdoors."""
-
-    def object_position(self, name: str) -> Array:
-        """Where a thing is, metres, shape ``(3,)``."""
-
-    def object_entity(self, name: str) -> int:
-        """Its entity, as pictures show it."""
-
-
-class Robots(Protocol):
-    """What the judge looks at of the robots."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Of the robots."""
-
-    def bodies(self) -> Any:
-        """Positions and more of all robots."""
-
-    def observation(self, robot: int) -> dict[str, NDArray[Any]]:
-        """Return what a robot feels of itself."""
-
-
 @dataclass(frozen=True)
 class JudgeSample:
     """How things stand.
@@ -146,14 +114,9 @@ class JudgeSample:
     shown: tuple[int, ...] = ()
 
 
-def standing_robots(robots: Robots) -> tuple[bool, ...]:
+def standing_robots(robots: RobotPopulation) -> tuple[bool, ...]:
     """Return which robots are upright and still."""
     return tuple(_stands(robots.observation(k)) for k in range(len(robots.names)))
-
-
-def has_fallen(robots: Robots) -> bool:
-    """Return whether a robot lies on the ground, or is on its way up from there."""
-    return any(bool(robots.observation(k)["fallen"][0]) for k in range(len(robots.names)))
 
 
 def _stands(felt: dict[str, NDArray[Any]]) -> bool:

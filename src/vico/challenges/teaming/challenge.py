@@ -19,7 +19,6 @@ from vico.challenges.records import EpisodeRecord, Metric, Progress, Setting
 from vico.challenges.robot_episodes import (
     ReportedSeconds,
     RobotsChallenge,
-    Verdict,
     foreign_robots,
     make_episode_env,
     place_waiting,
@@ -143,7 +142,13 @@ def play_teaming_task(
     )
     sim = env.sim
     terms = terms or Terms()
-    robots = _robots(method, task, world, terms, period)
+    # Robots that can't be made fail at each step of the episode.
+    told = task.instruction() | {"period": period}
+    if method in METHODS:
+        robots = make_team(method, told, PublicMap.from_world(world), seed=task.seed)
+    else:
+        names = [f"robot_{k}" for k in range(len(task.team))]
+        robots = foreign_robots(method, names, told, world, terms, seed=task.seed)
     residents = _residents(task, community, env.public_map)
     system = sim.state.robots
     assert system is not None
@@ -162,11 +167,17 @@ def play_teaming_task(
         period=period,
         recording=recording,
     )
+    more: dict[str, float] = {}
+    match judge.rules:
+        case Accompany() | Guide():
+            more["together"] = judge.rules.company.share()
+        case Spot(seen_at=float(seen)):
+            more["seen"] = seen
     return record_of(
         task,
         runner,
         robots,
-        _verdict(task, judge),
+        verdict_on(task.category, judge.done_at, judge.cause(), task.steps, more),
         challenge="teaming",
         method=method,
         setting=setting,
@@ -197,25 +208,6 @@ def _residents(task: TeamingTask, community: Community, public_map: PublicMap) -
             who, public_map, pace=walk.pace, pauses=pauses, within=FOLLOWS_WITHIN, gives_up=GIVES_UP, seed=task.seed
         )
     return residents
-
-
-def _robots(method: str, task: TeamingTask, world: World, terms: Terms, period: float) -> dict[str, Agent]:
-    """Make the robots of an episode; those that can't be made fail at each of its steps."""
-    told = task.instruction() | {"period": period}
-    if method in METHODS:
-        return make_team(method, told, PublicMap.from_world(world), seed=task.seed)
-    names = [f"robot_{k}" for k in range(len(task.team))]
-    return foreign_robots(method, names, told, world, terms, seed=task.seed)
-
-
-def _verdict(task: TeamingTask, judge: TeamingJudge) -> Verdict:
-    more: dict[str, float] = {}
-    match judge.rules:
-        case Accompany() | Guide():
-            more["together"] = judge.rules.company.share()
-        case Spot(seen_at=float(seen)):
-            more["seen"] = seen
-    return verdict_on(task.category, judge.done_at, judge.cause(), task.steps, more)
 
 
 _SR = Metric("SR", "SR", "%", "higher", 0.0, 100.0, about="success rate: episodes whose task was done")

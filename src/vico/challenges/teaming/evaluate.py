@@ -8,9 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from vico.challenges.teaming import accompany, guide, spot
-from vico.challenges.teaming.category import JudgeSample, Robots, Truth, ground_distance, has_fallen, standing_robots
+from vico.challenges.teaming.category import JudgeSample, ground_distance, standing_robots
 from vico.challenges.teaming.tasks import SEEN_DISTANCE, Category, TeamingTask
 from vico.runner.loop import Hook, Step
+from vico.runner.truth import GroundTruth, RobotPopulation
 from vico.world.world import World
 
 FALLEN = "fallen"
@@ -66,7 +67,7 @@ class TeamingJudge(Hook):
     """
 
     def __init__(
-        self, task: TeamingTask, world: World, truth: Truth, robots: Robots, seconds: Callable[[], float]
+        self, task: TeamingTask, world: World, truth: GroundTruth, robots: RobotPopulation, seconds: Callable[[], float]
     ) -> None:
         self.task, self.truth, self.robots, self._seconds = task, truth, robots, seconds
         self.rules = RULES[task.category](task, world)
@@ -79,11 +80,13 @@ class TeamingJudge(Hook):
         action = step.actions.get(self.task.person.agent, {})
         if action.get("type") == "communicate":
             self._said.append(str(action["text"]))
-        self.fallen = self.fallen or has_fallen(self.robots)
+        self.fallen = self.fallen or any(
+            bool(self.robots.observation(k)["fallen"][0]) for k in range(len(self.robots.names))
+        )
         second = self._seconds() - self._start
         if int(second) > self._looked and not self.fallen:
             self._looked = int(second)
-            self.rules.look(self._seen(step, second))
+            self.rules.look(self._sample(step, second))
             self._said = []
 
     @property
@@ -100,7 +103,7 @@ class TeamingJudge(Hook):
         """Return why it failed; "" if it did not."""
         return FALLEN if self.fallen else self.rules.cause()
 
-    def _seen(self, step: Step, second: float) -> JudgeSample:
+    def _sample(self, step: Step, second: float) -> JudgeSample:
         task, positions = self.task, self.robots.bodies().position
         walks = task.walk is not None
         who = task.person.agent
@@ -114,10 +117,10 @@ class TeamingJudge(Hook):
             outdoors=walks and self.truth.agent_room(who) is None,
             said=tuple(self._said),
             thing=thing,
-            shown=self._shown(step),
+            shown=self._pixels_shown(step),
         )
 
-    def _shown(self, step: Step) -> tuple[int, ...]:
+    def _pixels_shown(self, step: Step) -> tuple[int, ...]:
         """Return how many pixels of the thing each robot sees that is near enough."""
         if self.task.thing is None:
             return ()

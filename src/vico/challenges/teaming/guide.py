@@ -17,7 +17,6 @@ import numpy as np
 
 from vico.agents.teaming.people import GAVE_UP, I_FOLLOW
 from vico.challenges.assistant.placement import place_region
-from vico.challenges.assistant.tasks import Region
 from vico.challenges.robot_tasks import Draw, person_of
 from vico.challenges.teaming.category import (
     Accompaniment,
@@ -70,9 +69,10 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
     if not has_routes(draw, ROBOT, hood.start, (waits, WAITS_WITHIN[0]), (goal, ARRIVED / 3)):
         return None
     person = person_of(who)
+    where = f"the door of {target.name}" if target.place else target.name
     text = (
         f"{who.name}, {person.looks}, waits near by and does not know the way: go there and call them, lead them "
-        f"{_to(target)}, and see that they come along."
+        f"to {where}, and see that they come along."
     )
     return walk_task(
         draw,
@@ -88,10 +88,6 @@ def draw_task(draw: Draw, frame: dict[str, Any]) -> TeamingTask | None:
             pauses=_pauses(draw, hood.distance(target.centre)),
         ),
     )
-
-
-def _to(region: Region) -> str:
-    return f"to the door of {region.name}" if region.place else f"to {region.name}"
 
 
 def _pauses(draw: Draw, walk: float) -> tuple[Pause, ...]:

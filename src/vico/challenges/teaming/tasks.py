@@ -24,15 +24,21 @@ WAITS_WITHIN, BESIDE = (3.0, 8.0), (2.0, 6.0)
 #: Walking pace of the people, metres a second (the old are slower, as they are else).
 PACES = (0.5, 0.8)
 
-#: A robot is upright that leans no more than this, cosine of the angle; slower than this it stands, metres a second,
-#: and for so long it has to, seconds.
-UPRIGHT, STILL, STANDS_FOR = 0.9, 0.15, 2.0
+#: Cosine of the angle that an upright robot leans, at most.
+UPRIGHT = 0.9
+#: Speed below which it stands, m/s.
+STILL = 0.15
+#: Seconds for which it has to.
+STANDS_FOR = 2.0
 
 #: Accompany: nearer than this to the person one walks with them, metres; for this share of the way at least.
 WITH_DISTANCE, WITH_SHARE = 4.0, 0.8
-#: Nearer than this to the door one waits at it, metres; one is to be there so soon after the person went in, seconds,
-#: and for this share of the time from then until they come out.
-DOOR_DISTANCE, DOOR_GRACE, DOOR_SHARE = 4.0, 20.0, 0.9
+#: Metres from the door at which one waits at it.
+DOOR_DISTANCE = 4.0
+#: Seconds after the person went in until one has to be there.
+DOOR_GRACE = 20.0
+#: Share of the time from then until they come out for which one has to.
+DOOR_SHARE = 0.9
 #: Who comes out again stays inside for so long, seconds.
 STAYS = (25.0, 45.0)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vico.challenges.learning.manipulation.observation import PRESSING, Bools, Readings, poses_in
 from vico.challenges.learning.manipulation.scene import (
     ACTIONS,
+    JAW,
     PHYSICS_STEP,
     SUBSTEPS,
     Array,
@@ -157,7 +158,9 @@ class BatchedScene:
             raise InputError(f"env: actions have shape {actions.shape}; it has to be {(len(self), ACTIONS)}")
         refused: Bools = ~np.asarray(np.isfinite(actions).all(axis=1))
         before, state = self.targets.copy(), self.state.copy()
-        self.targets = self._motors.moved(self.targets, self._joints()[0], np.where(refused[:, None], 0.0, actions))
+        self.targets = self._motors.move_targets(
+            self.targets, self._joints()[0], np.where(refused[:, None], 0.0, actions)
+        )
         if self.options.oracle_grasp:
             self._fasten()
         self._step(before)
@@ -168,14 +171,14 @@ class BatchedScene:
         }
         self.state[broken], self.targets[broken] = state[broken], before[broken]
         self.steps += 1
-        return BatchStep(self._counted(), broken, causes)
+        return BatchStep(self._count_steps(), broken, causes)
 
     def _step(self, before: Array) -> None:
         """Have MuJoCo move everything on, while the servos' targets go from where they were to where they are."""
         shares = (np.arange(SUBSTEPS) + 1.0) / SUBSTEPS
         path = before[:, None] + shares[None, :, None] * (self.targets - before)[:, None]
-        self._control[:, :, :8] = path
-        self._control[:, :, 8] = path[:, :, 7]  # both fingers
+        self._control[:, :, :ACTIONS] = path
+        self._control[:, :, ACTIONS] = path[:, :, JAW]  # the other finger
         # Nothing is kept of what the solver found last: what a copy does depends on its state alone.
         self._rollout.rollout(
             self.models, self._data, self.state, self._control, control_spec=self._spec, skip_checks=True,
@@ -192,7 +195,7 @@ class BatchedScene:
 
     def _fasten(self) -> None:
         """Fasten boxes that both pads press on to closing hands, and let go of those whose jaw is opened."""
-        jaw, closing = self._joints()[0][:, 7], self.targets[:, 7]
+        jaw, closing = self._joints()[0][:, JAW], self.targets[:, JAW]
         holds = ~np.isnan(self.fastened)
         lets_go = holds & (closing > np.where(holds, self.fastened, 0.0) + _RELEASE_MARGIN)
         self.fastened[lets_go] = np.nan
@@ -223,11 +226,11 @@ class BatchedScene:
         both = [np.column_stack([part[:, :7], part[:, 7:9].mean(axis=1)]) for part in (positions, rates)]
         return both[0], both[1]
 
-    def _counted(self) -> Readings:
+    def _count_steps(self) -> Readings:
         """Return readings after a step, with what is counted over steps moved on."""
         r = self.readings()
         self.at_goal = np.where(r.goal_distance < NEAR, self.at_goal + 1, 0)
-        self.was_lifted = self.was_lifted | (r.gripped & (r.clearance > _LIFT))
+        self.was_lifted = self.was_lifted | (r.is_gripped & (r.clearance > _LIFT))
         return r._replace(at_goal=self.at_goal.copy(), was_lifted=self.was_lifted.copy())
 
     def readings(self) -> Readings:

@@ -91,7 +91,7 @@ class ManipulationEnv(gymnasium.Env[Numbers, Numbers]):
             self.copies.episodes[0] += 1
         self._begun, self._over = True, False
         self.copies.begin([0])
-        return self._observed(self.readings), {"episode": int(self.copies.episodes[0])}
+        return self._observe(self.readings), {"episode": int(self.copies.episodes[0])}
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
         """Act for a twentieth of a second.
@@ -112,7 +112,7 @@ class ManipulationEnv(gymnasium.Env[Numbers, Numbers]):
         info: dict[str, Any] = {name: bool(value[0]) for name, value in found.items()}
         info |= {"is_success": success, **({"cause": done.causes[0]} if done.causes else {})}
         reward = float(reward_of(self.task, self.options, done)[0])
-        return self._observed(done.readings), reward, ended, cut, info
+        return self._observe(done.readings), reward, ended, cut, info
 
     def evaluate(self) -> dict[str, bool]:
         """Say what of the task's rule holds now, by name."""
@@ -133,13 +133,13 @@ class ManipulationEnv(gymnasium.Env[Numbers, Numbers]):
         """
         self.copies.restore(saved)
         self._begun, self._over = True, bool(np.asarray(saved.get("over", [False]))[0])
-        return self._observed(self.readings)
+        return self._observe(self.readings)
 
     def close(self) -> None:
         """Let go of the copy."""
         self.copies.close()
 
-    def _observed(self, readings: Readings) -> Numbers:
+    def _observe(self, readings: Readings) -> Numbers:
         return observe(readings, self.options.observation)[0]
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.challenges.learning.manipulation.scene import OPENING, PAD, Array, Scene, ready_angles
+from vico.challenges.learning.manipulation.scene import JAW, OPENING, PAD, Array, Scene, ready_angles
 from vico.exact import each
 from vico.io.compiled import compiled
 from vico.kinematics.arm import hand_pose
@@ -139,7 +139,7 @@ class Readings(NamedTuple):
     @property
     def gap(self) -> Array:
         """Between each pad and the side of the box if that is in the middle of the jaw, metres, shape ``(n,)``."""
-        return np.asarray(self.joints[:, 7] + PAD - self.gripped_half)
+        return np.asarray(self.joints[:, JAW] + PAD - self.gripped_half)
 
     @property
     def touching(self) -> Bools:
@@ -147,7 +147,7 @@ class Readings(NamedTuple):
         return np.asarray((self.pressure > PRESSING).any(axis=1))
 
     @property
-    def gripped(self) -> Bools:
+    def is_gripped(self) -> Bools:
         """Whether both pads press on the box, shape ``(n,)``."""
         return np.asarray((self.pressure > PRESSING).all(axis=1))
 
@@ -269,24 +269,24 @@ def observe(readings: Readings, observation: str) -> NDArray[np.float32]:
     """
     r = readings
 
-    def seen(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    def in_base_frame(vector: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.einsum("nij,ni->nj", r.base_rotation, vector)
 
     parts = [
         r.joints,
         r.joint_rates,
         r.base,
-        seen(r.thing - r.base),
-        seen(r.thing - r.hand),
-        seen(r.goal - r.thing),
-        seen(r.goal - r.hand),
+        in_base_frame(r.thing - r.base),
+        in_base_frame(r.thing - r.hand),
+        in_base_frame(r.goal - r.thing),
+        in_base_frame(r.goal - r.hand),
     ]
     if observation == "full":
         turn = 4.0 * r.jaw_turn
         parts += [
             r.level_half,
             np.column_stack([np.sin(turn), np.cos(turn), r.gap]),
-            seen(r.hand_rotation[:, :, 2]),
+            in_base_frame(r.hand_rotation[:, :, 2]),
             (r.pressure > PRESSING).astype(np.float64),
         ]
     return np.clip(np.concatenate(parts, axis=1), -BOUND, BOUND).astype(np.float32)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from itertools import accumulate
@@ -24,6 +24,7 @@ from vico.challenges.learning.manipulation.environment import ManipulationEnv
 from vico.challenges.learning.manipulation.observation import FULL, PRESSING, Readings, hand_poses, observe
 from vico.challenges.learning.manipulation.scene import (
     ACTIONS,
+    JAW,
     PAD,
     Array,
     ManipulationOptions,
@@ -134,16 +135,6 @@ def read_policy(path: Path | str, *, inputs: int | None = None, outputs: int | N
             f"policy: {path} is no archive of plain arrays (pickled objects are refused); write it with "
             "scripts/train_manipulation.py"
         ) from None
-    policy = _policy_of(path, arrays)
-    for what, has, wanted in (("inputs", policy.inputs, inputs), ("outputs", policy.outputs, outputs)):
-        if wanted is not None and has != wanted:
-            raise SchemaError(
-                f"policy: {path} has {has} {what}, not {wanted}: it was trained on another task or observation"
-            )
-    return policy
-
-
-def _policy_of(path: Path, arrays: Mapping[str, NDArray[Any]]) -> ArrayPolicy:
     count = sum(name.startswith("weight_") for name in arrays)
     names = {f"{kind}{k}" for kind in _KNOWN for k in range(count)} | {"mean", "deviation"}
     if not count or names != set(arrays):
@@ -164,14 +155,21 @@ def _policy_of(path: Path, arrays: Mapping[str, NDArray[Any]]) -> ArrayPolicy:
         width = bias.shape
     if arrays["deviation"].shape != arrays["mean"].shape or not (arrays["deviation"] > 0.0).all():
         raise SchemaError(f"policy: {path}: deviation has to have the shape of mean, and to be above 0")
-    return ArrayPolicy(weights, biases, arrays["mean"], arrays["deviation"])
+    policy = ArrayPolicy(weights, biases, arrays["mean"], arrays["deviation"])
+    for what, has, wanted in (("inputs", policy.inputs, inputs), ("outputs", policy.outputs, outputs)):
+        if wanted is not None and has != wanted:
+            raise SchemaError(
+                f"policy: {path} has {has} {what}, not {wanted}: it was trained on another task or observation"
+            )
+    return policy
 
 
 _ENDS = list(accumulate(FULL.values()))
 #: Where in an observation its entries are.
 PLACES = {name: slice(end - FULL[name], end) for name, end in zip(FULL, _ENDS, strict=True)}
-# Metres above where it stood that a lifted box is to be, that it counts as lifted from, and as dropped below.
-_GOAL, _LIFTED, _DROPPED = 0.2, 0.12, 0.03
+_GOAL = 0.2  # metres above where it stood that a lifted box is to be
+_LIFTED = 0.12  # metres from which on it counts as lifted
+_DROPPED = 0.03  # metres below which it counts as dropped
 _NEAR = 0.1
 
 
@@ -281,8 +279,8 @@ class ArmController:
         joints = np.append(moment.joints[:7], moment.joints[7:9].mean())[None]
         before = joints if self._targets is None else self._targets
         action = np.asarray(self._policy(self.observation(moment)), np.float64)
-        self._targets = self._motors.moved(before, joints, action)
-        return np.append(self._targets[0], self._targets[0, 7])
+        self._targets = self._motors.move_targets(before, joints, action)
+        return np.append(self._targets[0], self._targets[0, JAW])
 
     def observation(self, moment: ArmState) -> NDArray[np.float32]:
         """Return what the policy is told, shape ``(1, size)``."""
@@ -316,9 +314,11 @@ class ArmController:
 #: Tilts of the hand that are tried, rad, and turns about the vertical of what is put down.
 _TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 _TURNS = tuple(k * math.pi / 4 for k in (0, 1, -1, 2, -2, 3, -3, 4))
-# What the jaw is wider than the box by on each side; how near a joint has to come, rad; steps that closing takes at
-# most, and that pads press before the hand goes up; metres that a box is let go of above its ground.
-_ROOM, _THERE, _CLOSING, _PRESSES, _DROP = 0.02, 0.02, 40, 3, 0.006
+_ROOM = 0.02  # metres that the jaw is wider than the box, on each side
+_THERE = 0.02  # rad to which a joint has to come near
+_CLOSING = 40  # steps that closing takes, at most
+_PRESSES = 3  # steps that pads press before the hand goes up
+_DROP = 0.006  # metres above its ground at which a box is let go
 
 
 class ExpertPhase(Enum):
@@ -341,7 +341,7 @@ class ScriptedExpert:
         self._chain, self._stand = env.copies.scene.chain, env.copies.scene.stand
         self._task = env.task.name
         self._waited = self._pressed = 0
-        self._opening = float(env.readings.targets[0, 7])
+        self._opening = float(env.readings.targets[0, JAW])
         self._way: list[Array] = []
         self._up: list[Array] = []
         self.stage = ExpertPhase.DOWN
@@ -421,10 +421,10 @@ class ScriptedExpert:
     def _is_in_the_way(self, r: Readings) -> bool:
         """Return whether the jaw has still to open before the hand goes down the last bit."""
         low = r.hand[0, 2] < r.grasp_point[0, 2] + 0.12
-        return bool(low and r.joints[0, 7] < self._opening - 0.01)
+        return bool(low and r.joints[0, JAW] < self._opening - 0.01)
 
     def _jaw_of(self, r: Readings) -> float:
-        now, step = float(r.targets[0, 7]), self.env.options.finger_step
+        now, step = float(r.targets[0, JAW]), self.env.options.finger_step
         if self.stage in (ExpertPhase.DOWN, ExpertPhase.OPEN):
             return (self._opening - now) / step
         return -1.0 if self.stage in (ExpertPhase.CLOSE, ExpertPhase.UP, ExpertPhase.CARRY) else 0.0
@@ -433,10 +433,10 @@ class ScriptedExpert:
         """Return whether the stage is over, as the way is."""
         self._waited += 1
         if self.stage is ExpertPhase.CLOSE:
-            self._pressed = self._pressed + 1 if bool(r.gripped[0]) else 0
+            self._pressed = self._pressed + 1 if bool(r.is_gripped[0]) else 0
             return self._pressed >= _PRESSES or self._waited > _CLOSING
         if self.stage is ExpertPhase.OPEN:
-            return bool(r.joints[0, 7] > self._opening - 0.004) or self._waited > _CLOSING
+            return bool(r.joints[0, JAW] > self._opening - 0.004) or self._waited > _CLOSING
         return bool(np.abs(r.joints[0, :7] - r.targets[0, :7]).max() < _THERE) or self._waited > _CLOSING
 
     def _next(self, r: Readings) -> None:
@@ -451,7 +451,7 @@ class ScriptedExpert:
             self._plan_carry(r)
         elif self.stage is ExpertPhase.CARRY:
             self.stage = ExpertPhase.OPEN
-            self._opening = float(r.joints[0, 7]) + _ROOM
+            self._opening = float(r.joints[0, JAW]) + _ROOM
         elif self.stage is ExpertPhase.OPEN:
             self.stage, self._way = ExpertPhase.BACK, self._up
         elif self.stage is ExpertPhase.BACK:

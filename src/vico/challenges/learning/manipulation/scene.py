@@ -194,7 +194,16 @@ def compile_scene(base: str) -> Scene:
     box = {**solid, "friction": [0.8, 0.02, 0.001], "condim": 4, "priority": 1, "solref": [0.01, 1.0]}
     thing.add_geom(name="thing", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.05] * 3, mass=0.5, **box)
     if base == "fixed":
-        _put_brakes_on(spec)
+        # The base is fixed to the ground, without wheels.
+        for joint in list(spec.body("base").joints):
+            spec.delete(joint)
+        for actuator in list(spec.actuators):
+            if actuator.name in ("forward", "yaw"):
+                spec.delete(actuator)
+        for tendon in list(spec.tendons):
+            spec.delete(tendon)
+        for wheel in ("left_wheel", "right_wheel"):
+            spec.delete(spec.body(wheel))
     fingers = robot.motors[7:9]
     for name in fingers:
         pad = spec.body(name).geoms[1]
@@ -213,19 +222,6 @@ def compile_scene(base: str) -> Scene:
     )
     weld.active = False
     return _scene_of_model(spec.compile(), robot, base)
-
-
-def _put_brakes_on(spec: Any) -> None:
-    """Fix the base to the ground, without wheels."""
-    for joint in list(spec.body("base").joints):
-        spec.delete(joint)
-    for actuator in list(spec.actuators):
-        if actuator.name in ("forward", "yaw"):
-            spec.delete(actuator)
-    for tendon in list(spec.tendons):
-        spec.delete(tendon)
-    for name in ("left_wheel", "right_wheel"):
-        spec.delete(spec.body(name))
 
 
 def _scene_of_model(model: Any, robot: RobotModel, base: str) -> Scene:
@@ -275,15 +271,13 @@ def silence_warnings() -> None:
     Motion that breaks down is noticed by its numbers.
     """
     if mujoco.get_mju_user_warning() is None:
-        mujoco.set_mju_user_warning(_ignore)
-
-
-def _ignore(message: str) -> None:
-    """Say nothing: MuJoCo calls from C, on any thread."""
+        mujoco.set_mju_user_warning(lambda message: None)
 
 
 #: Of an action: the arm's joints and the jaw.
 ACTIONS = 8
+#: Column of the jaw in joints, targets and actions: it stands behind the arm's seven.
+JAW = 7
 # Targets run ahead of joints by no more, rad, and fingers past what they press on, metres: 150 Nm and 60 N.
 _AHEAD, _PAST = 0.1, 0.03
 
@@ -295,7 +289,7 @@ class Motors(NamedTuple):
     high: Array
     step: Array
 
-    def moved(self, targets: Array, joints: Array, actions: Array) -> Array:
+    def move_targets(self, targets: Array, joints: Array, actions: Array) -> Array:
         """Return targets moved by actions, within bounds and not far ahead of the joints; shape ``(n, 8)`` each."""
         wanted = targets + np.clip(actions, -1.0, 1.0) * self.step
         ahead = np.append(np.full(7, _AHEAD), _PAST)
@@ -376,13 +370,6 @@ def ready_angles() -> tuple[float, ...]:
     return tuple(found.tolist())
 
 
-def first_angles(chance: np.random.Generator, options: ManipulationOptions) -> Array:
-    """Draw the arm's angles, rad, shape ``(7,)``."""
-    rest = np.array(ready_angles()) if options.start == "ready" else robot_model("manipulator").rest[:7]
-    chain = hand_of_robot().chain
-    return np.clip(rest + chance.uniform(-NOISE, NOISE, 7), chain.low, chain.high)
-
-
 def draw_spot(chance: np.random.Generator) -> Array:
     """Draw a place in front of the base, metres, shape ``(2,)``."""
     away, bearing = chance.uniform(*DISTANCE), chance.uniform(-BEARING, BEARING)
@@ -409,7 +396,9 @@ def standing_box(chance: np.random.Generator, options: ManipulationOptions) -> E
     thing = BoxParameters(half, mass, friction, height if on_table else 0.0)
     place, yaw = draw_spot(chance), float(chance.uniform(-math.pi, math.pi))
     position = np.array([*place, thing.surface + half[2]])
-    arm = first_angles(chance, options)
+    rest = np.array(ready_angles()) if options.start == "ready" else robot_model("manipulator").rest[:7]
+    chain = hand_of_robot().chain
+    arm = np.clip(rest + chance.uniform(-NOISE, NOISE, 7), chain.low, chain.high)
     return EpisodeDraw(thing, position, yaw_quaternion(yaw), position.copy(), arm, OPENING, OPENING)
 
 

@@ -54,7 +54,11 @@ class ManipulationTask:
 NEAR, STAY = 0.1, 100
 #: Metres that a box is lifted.
 LIFTED = 0.1
-_FAR, _PENALTY, _GRASP, _PLACE = 10.0, 0.02, 5.0, 100.0
+# The paper's reward.
+PAPER_METRE = 0.02  # cost of a metre from hand to thing, and from thing to goal, each step
+PAPER_FARTHEST = 10.0  # metres up to which these distances count
+PAPER_GRASP = 5.0  # reward of holding the thing, each step
+PAPER_PLACE = 100.0  # reward of a thing that is placed
 # Metres above the grasp point where a hand is to be until it is ready to go down.
 _HOVER = 0.12
 # From so far off a hand is rewarded for coming nearer, metres.
@@ -72,14 +76,14 @@ def paper_reward(r: Readings, terms: Collection[str]) -> Array:
     """
     total = np.zeros(len(r.hand))
     if "object" in terms:
-        total -= np.minimum(np.linalg.norm(r.hand - r.thing, axis=1), _FAR) * _PENALTY
+        total -= np.minimum(np.linalg.norm(r.hand - r.thing, axis=1), PAPER_FARTHEST) * PAPER_METRE
     if "goal" in terms:
-        total -= np.minimum(r.goal_distance, _FAR) * _PENALTY
+        total -= np.minimum(r.goal_distance, PAPER_FARTHEST) * PAPER_METRE
     if "grasp" in terms:
         height = r.thing[:, 2] - r.surface
-        total += _GRASP * ((height > 2.0 * 2.0 * r.height_half) & r.gripped)
+        total += PAPER_GRASP * ((height > 2.0 * 2.0 * r.height_half) & r.is_gripped)
     if "place" in terms:
-        total += _PLACE * (r.at_goal == STAY)
+        total += PAPER_PLACE * (r.at_goal == STAY)
     return total
 
 
@@ -134,7 +138,7 @@ def lifting_share(r: Readings) -> Array:
     """Return how far a gripped box has been lifted and is held still, from 0 to 1."""
     up = share_between(r.clearance, 0.0, 0.15)
     still = (r.clearance > LIFTED) * nearness(r.thing_speed[:, 0], 0.25)
-    return np.asarray(r.gripped * (0.6 * up + 0.4 * still))
+    return np.asarray(r.is_gripped * (0.6 * up + 0.4 * still))
 
 
 def carrying_share(r: Readings) -> Array:
@@ -142,12 +146,8 @@ def carrying_share(r: Readings) -> Array:
     level = np.linalg.norm((r.goal - r.thing)[:, :2], axis=1)
     there = share_between(-level, -0.12, -0.03)
     high = there + (1.0 - there) * nearness(np.abs(r.goal[:, 2] + 0.1 - r.thing[:, 2]), 0.1)
-    return np.asarray(r.gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * lowering_share(r, there)))
-
-
-def lowering_share(r: Readings, there: Array) -> Array:
-    """Return how near a box over its goal is to what it is to stand on, from 0 to 1."""
-    return np.asarray(there * nearness(np.abs(r.clearance), 0.06))
+    low = there * nearness(np.abs(r.clearance), 0.06)
+    return np.asarray(r.is_gripped * (0.4 * nearness(level, 0.2) + 0.2 * high + 0.4 * low))
 
 
 def is_placed(r: Readings) -> Bools:
@@ -162,7 +162,10 @@ def releasing_share(r: Readings) -> Array:
     return np.asarray(stands * share_between(r.gap, -0.01, 0.03))
 
 
-_REACH_NEAR, _REACH_TILT, _REACH_TURN, _REACH_MOVED = 0.04, 0.35, 0.26, 0.05
+_REACH_NEAR = 0.04  # metres between hand and grasp
+_REACH_TILT = 0.35  # rad off straight down
+_REACH_TURN = 0.26  # rad off the box
+_REACH_MOVED = 0.05  # metres that the box may have been moved
 
 
 def evaluate_reach(r: Readings) -> dict[str, Bools]:
@@ -189,13 +192,13 @@ def begin_lift(chance: np.random.Generator, options: ManipulationOptions) -> Epi
 def evaluate_lift(r: Readings) -> dict[str, Bools]:
     """Say what of the rule holds."""
     lifted, slow = r.clearance >= LIFTED, r.thing_speed[:, 0] < _LIFT_SLOW
-    return {"gripped": r.gripped, "lifted": lifted, "still": slow, "success": r.gripped & lifted & slow}
+    return {"gripped": r.is_gripped, "lifted": lifted, "still": slow, "success": r.is_gripped & lifted & slow}
 
 
 def staged_lift_reward(r: Readings) -> Array:
     """Return the staged reward: once the box is gripped, all of the approach counts as done."""
-    before = np.where(r.gripped, 1.0, approach_share(r))
-    grip = np.where(r.gripped, 1.0, closing_share(r))
+    before = np.where(r.is_gripped, 1.0, approach_share(r))
+    grip = np.where(r.is_gripped, 1.0, closing_share(r))
     return np.asarray(0.25 * before + 0.25 * grip + 0.5 * lifting_share(r))
 
 
@@ -231,13 +234,13 @@ def begin_pick_place(chance: np.random.Generator, options: ManipulationOptions) 
 
 def evaluate_pick_place(r: Readings) -> dict[str, Bools]:
     """Say what of the rule holds."""
-    found = {"gripped": r.gripped, "was_lifted": r.was_lifted, "at_goal": r.goal_distance < NEAR}
+    found = {"gripped": r.is_gripped, "was_lifted": r.was_lifted, "at_goal": r.goal_distance < NEAR}
     return {**found, "released": ~r.touching, "success": is_placed(r) & r.was_lifted}
 
 
 def staged_pick_place_reward(r: Readings) -> Array:
     """Return the staged reward: lifting, and carrying once the box has been lifted."""
-    held_or_there = r.gripped | (r.goal_distance < NEAR)
+    held_or_there = r.is_gripped | (r.goal_distance < NEAR)
     later = r.was_lifted & held_or_there
     return np.asarray(np.where(later, 0.4 + 0.6 * staged_place_reward(r), 0.4 * staged_lift_reward(r)))
 
