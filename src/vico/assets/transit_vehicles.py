@@ -361,16 +361,6 @@ def tram_cabin() -> Cabin:
     )
 
 
-def _tram_spans() -> list[tuple[float, float]]:
-    """Return the stretches of a side between the doors."""
-    edges = [
-        -_TRAM_END,
-        *(x for middle in sorted(TRAM_DOORS) for x in (middle - _TRAM_LEAF, middle + _TRAM_LEAF)),
-        _TRAM_END,
-    ]
-    return list(zip(edges[::2], edges[1::2], strict=True))
-
-
 def _tram_sides() -> list[Surface]:
     parts: list[Surface] = []
 
@@ -391,7 +381,13 @@ def _tram_sides() -> list[Surface]:
             )
         )
 
-    for a, b in _tram_spans():
+    # The edges of the stretches of a side between the doors
+    edges = [
+        -_TRAM_END,
+        *(x for middle in sorted(TRAM_DOORS) for x in (middle - _TRAM_LEAF, middle + _TRAM_LEAF)),
+        _TRAM_END,
+    ]
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
         wall(a, b, _TRAM_SILL, _TRAM_BELT, TRAM_PAINT)
         cuts = [a, *(x for pane in _TRAM_PANES if a <= pane[0] and pane[1] <= b for x in pane), b]
         for c, d in zip(cuts[::2], cuts[1::2], strict=True):

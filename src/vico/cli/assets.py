@@ -25,7 +25,6 @@ from vico.io.cache import cache_folder
 if TYPE_CHECKING:
     from vico.assets.motions import MotionClip
     from vico.assets.object_generation import GeneratedObject, GenerationRequest
-    from vico.assets.packages import Package
 Pack = Literal["people", "robots", "viewer", "things", "llm", "all"]
 
 
@@ -106,7 +105,18 @@ def print_status(*, json: bool = False) -> int:
     rows += [("robots", package, installed_folder(package) is not None) for package in robot_packages()]
     rows.append(("viewer", THREE, installed_folder(THREE) is not None))
     if json:
-        print_json([*(_pack_row(pack, package, ready) for pack, package, ready in rows), *_thing_rows()])
+        packages = [
+            {
+                "pack": pack,
+                "package": package.name,
+                "version": package.version,
+                "installed": ready,
+                "licence": package.licence,
+                "credits": package.credits,
+            }
+            for pack, package, ready in rows
+        ]
+        print_json([*packages, *_thing_rows()])
         return 0
     table = Table("pack", "package", "", "licence", "credits")
     for pack, package, ready in rows:
@@ -133,17 +143,6 @@ def _thing_rows() -> list[dict[str, object]]:
          "credits": c.words}
         for c in credits_of(read_things()[0])
     ]  # fmt: skip
-
-
-def _pack_row(pack: str, package: Package, ready: bool) -> dict[str, object]:
-    return {
-        "pack": pack,
-        "package": package.name,
-        "version": package.version,
-        "installed": ready,
-        "licence": package.licence,
-        "credits": package.credits,
-    }
 
 
 @dataclass(frozen=True)
@@ -244,33 +243,6 @@ class GenerateOptions:
             raise InputError("generate: give --picture or --text-to-image, not both")
 
 
-def generate_thing(options: GenerateOptions) -> int:
-    """Make the thing and write it; say where it is and how worlds come to show it."""
-    from vico.assets.object_generation import GenerationRequest, ObjectEntry, check_name_free, object_name, write_entry
-
-    entry = ObjectEntry(options.name or object_name(options.prompt), options.kind, not options.passable, options.tag)
-    check_name_free(entry, options.out, force=options.force)
-    request = GenerationRequest(
-        options.prompt, options.size, options.seed, along=options.size_of, turn=options.turn, faces=options.faces
-    )
-    thing = (
-        _thing_of_words(options, request) if options.mesh is None else _thing_of_mesh(options.mesh, options, request)
-    )
-    model = write_entry(thing, entry, options.out, force=options.force)
-    size = [round(float(v), 3) for v in thing.surface.positions.max(axis=0) - thing.surface.positions.min(axis=0)]
-    result = {
-        "name": entry.name, "model": str(model), "size": size, "triangles": len(thing.surface.triangles),
-        "licence": thing.licence, "credit": thing.credit,
-    }  # fmt: skip
-    if options.json:
-        print_json(result)
-        return 0
-    print(f"{entry.name}: {' x '.join(f'{v:g}' for v in size)} m, {len(thing.surface.triangles)} triangles, in {model}")
-    print(f"{thing.credit}; licence {thing.licence}")
-    print(f"export VICO_DATA={options.out.resolve()}   # worlds built from now on know {entry.name}")
-    return 0
-
-
 def _thing_of_mesh(mesh: Path, options: GenerateOptions, request: GenerationRequest) -> GeneratedObject:
     from vico.assets.mesh_cleaning import read_mesh_file
     from vico.assets.object_generation import generate_from_mesh
@@ -340,7 +312,29 @@ def assets_generate(options: Annotated[GenerateOptions, tyro.conf.arg(name="")])
 
     Example: vico assets generate "a kiosk" --size 2.7 --mesh kiosk.glb --licence MIT --credit "Jo Doe" --out my-data
     """
-    return generate_thing(options)
+    from vico.assets.object_generation import GenerationRequest, ObjectEntry, check_name_free, object_name, write_entry
+
+    entry = ObjectEntry(options.name or object_name(options.prompt), options.kind, not options.passable, options.tag)
+    check_name_free(entry, options.out, force=options.force)
+    request = GenerationRequest(
+        options.prompt, options.size, options.seed, along=options.size_of, turn=options.turn, faces=options.faces
+    )
+    thing = (
+        _thing_of_words(options, request) if options.mesh is None else _thing_of_mesh(options.mesh, options, request)
+    )
+    model = write_entry(thing, entry, options.out, force=options.force)
+    size = [round(float(v), 3) for v in thing.surface.positions.max(axis=0) - thing.surface.positions.min(axis=0)]
+    result = {
+        "name": entry.name, "model": str(model), "size": size, "triangles": len(thing.surface.triangles),
+        "licence": thing.licence, "credit": thing.credit,
+    }  # fmt: skip
+    if options.json:
+        print_json(result)
+        return 0
+    print(f"{entry.name}: {' x '.join(f'{v:g}' for v in size)} m, {len(thing.surface.triangles)} triangles, in {model}")
+    print(f"{thing.credit}; licence {thing.licence}")
+    print(f"export VICO_DATA={options.out.resolve()}   # worlds built from now on know {entry.name}")
+    return 0
 
 
 motion = SubcommandApp()

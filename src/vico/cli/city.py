@@ -81,7 +81,12 @@ def city_build(options: Annotated[CityBuildOptions, _FLAT]) -> int:
 
     box = _box(options.bbox) if options.bbox else None
     if options.center:
-        lat, lon = _degrees(options.center)
+        try:
+            lat, lon = map(float, options.center.split(","))
+        except ValueError:
+            raise InputError(
+                f"center: {options.center!r}; give latitude and longitude, as in --center 60.1690,24.9435"
+            ) from None
     elif box is not None:
         lat, lon = (box[1] + box[3]) / 2, (box[0] + box[2]) / 2
     else:
@@ -201,15 +206,6 @@ def city_export(
     counts = export_city(read_city(path), to, out, rooms=rooms, force=force)
     print_export(out, to, counts, json=json)
     return 0
-
-
-def _degrees(text: str) -> tuple[float, float]:
-    parts = text.split(",")
-    try:
-        lat, lon = map(float, parts)
-    except ValueError:
-        raise InputError(f"center: {text!r}; give latitude and longitude, as in --center 60.1690,24.9435") from None
-    return lat, lon
 
 
 def _box(text: str) -> tuple[float, float, float, float]:

@@ -256,9 +256,15 @@ def bench(what: str, *, table: Path | None = None, json: bool = False, options: 
         )
     with tempfile.TemporaryDirectory(prefix="vico-") as folder:
         here = Path(folder)
-        _prepare(here, _BENCHMARK_INPUTS[what])
+        parts = _BENCHMARK_INPUTS[what]
+        place = packaged_extract()
+        with redirect_stdout(io.StringIO()):
+            if "world" in parts:
+                world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=place.half)
+            if "people" in parts:
+                community.build(CommunityBuildOptions(here / "world", here / "people", residents=RESIDENTS))
         report = here / "report.md"
-        given = [str(here / name) for name in _BENCHMARK_INPUTS[what]]
+        given = [str(here / name) for name in parts]
         command = [sys.executable, str(script), *given, "--table", str(report), *options]
         # Stdout is ours: the report is printed once, from the file.
         done = subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
@@ -275,15 +281,6 @@ def bench(what: str, *, table: Path | None = None, json: bool = False, options: 
     else:
         print(f"{text}\nSeconds and megabytes: less is better. Times real time: more is better.\n\n{speeds}")
     return 0
-
-
-def _prepare(here: Path, parts: tuple[str, ...]) -> None:
-    place = packaged_extract()
-    with redirect_stdout(io.StringIO()):
-        if "world" in parts:
-            world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=place.half)
-        if "people" in parts:
-            community.build(CommunityBuildOptions(here / "world", here / "people", residents=RESIDENTS))
 
 
 def tables_of(text: str) -> list[dict[str, object]]:

@@ -57,11 +57,6 @@ class Diagnosis:
     mend: str = ""
 
 
-def _python() -> Diagnosis:
-    ok = (3, 11) <= sys.version_info[:2] < (3, 15)
-    return Diagnosis("Python", ok, True, platform.python_version(), "install Python 3.11, 3.12, 3.13 or 3.14")
-
-
 def _packages() -> list[Diagnosis]:
     """Look for the packages of the default install, and import each: what is installed may not load."""
     try:
@@ -201,7 +196,12 @@ def findings(*, thorough: bool = False) -> list[Diagnosis]:
     thorough
         Also draw, write a film and simulate. The first time that compiles for a minute or more.
     """
-    found = [_python(), *_packages(), _netconvert()]
+    is_supported = (3, 11) <= sys.version_info[:2] < (3, 15)
+    found = [
+        Diagnosis("Python", is_supported, True, platform.python_version(), "install Python 3.11, 3.12, 3.13 or 3.14"),
+        *_packages(),
+        _netconvert(),
+    ]
     checks: list[Callable[[], Diagnosis]] = [_memory, _disk]
     if all(one.ok or not one.needed for one in found):  # what follows needs the packages
         checks += [_compiled_code, *((_frame, _film, _physics) if thorough else ())]

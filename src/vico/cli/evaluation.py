@@ -281,7 +281,13 @@ def evaluate_influence(options: Annotated[InfluenceOptions, _FLAT]) -> int:
 
     Example: vico eval influence --method llm+llm --target-model o1 --dialogue-model gpt-4o --worlds helsinki --out llm
     """
-    return judge_influence(options)
+    # Judge strategies that compete for a community's friendship
+    if not options.hours >= 0:
+        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
+    usual = InfluenceOptions(options.common)
+    names = [field.name for field in fields(options) if field.name != "common"]
+    asked = {name: getattr(options, name) for name in names if getattr(options, name) != getattr(usual, name)}
+    return judge("influence", None, asked, options.common)
 
 
 @evaluation.command(name="commute")
@@ -290,7 +296,10 @@ def evaluate_commute(options: Annotated[CommuteOptions, _FLAT]) -> int:
 
     Example: vico eval commute --method rule --method ours --worlds helsinki monaco --seeds 10 --compare --out results
     """
-    return judge_commute(options)
+    # Judge how agents get around on a day of commutes
+    if not options.hours >= 0:
+        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
+    return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
 
 
 @evaluation.command(name="robot")
@@ -300,7 +309,16 @@ def evaluate_robot(options: Annotated[RobotOptions, _FLAT]) -> int:
     Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
     Example: vico eval robot --method rl --policy runs/whole/policy.npz --worlds helsinki --out results
     """
-    return judge_robot(options)
+    # Judge robots that bring things, and go along with people
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    from vico.challenges.robot.arm_policies import policy_settings  # physics is slow to import
+
+    by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
+    setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
+    policies = policy_settings(options.common.method, options.policy)
+    return judge("robot", categories, setting, options.common, methods=("heuristic",), of_method=policies)
 
 
 @evaluation.command(name="teaming")
@@ -309,7 +327,12 @@ def evaluate_teaming(options: Annotated[TeamingOptions, _FLAT]) -> int:
 
     Example: vico eval teaming --category guide --method heuristic --method alone --worlds helsinki --out results
     """
-    return judge_teaming(options)
+    # Judge robots at work with a person or with each other
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    setting: Setting = {"steps": options.steps, "period": options.period}
+    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
 
 
 #: `evaluate` with all but where to, and who is told.
@@ -334,62 +357,19 @@ def judge_assistant(options: AssistantOptions) -> int:
         setting = {**setting, "subtasks": options.subtasks}
     categories = None if options.category == "all" else (options.category,)
     if any("human" in method.split("+") for method in options.common.method):
-        return _by_hand(categories, setting, options)
+        # Judge a person, who plays at a page of this machine, one episode after the other, each recorded
+        from vico.cli.live import city_of, print_address
+        from vico.viewer import human_evaluation
+
+        if options.common.ray is not None:
+            raise InputError("eval: --method human is played at this machine; leave out --ray")
+        require_server()
+        human_evaluation.AT_THE_PAGE.open(
+            city=city_of, announce=print_address, port=options.port, waits=options.waits, hosts=options.allow_host
+        )
+        common = replace(options.common, workers=1, record=True)
+        return judge(human_evaluation.CHALLENGE, categories, setting, common)
     return judge("assistant", categories, setting, options.common, methods=("heuristic",))
-
-
-def _by_hand(categories: Sequence[str] | None, setting: Setting, options: AssistantOptions) -> int:
-    """Judge a person, who plays at a page of this machine, one episode after the other, each recorded."""
-    from vico.cli.live import city_of, print_address
-    from vico.viewer import human_evaluation
-
-    if options.common.ray is not None:
-        raise InputError("eval: --method human is played at this machine; leave out --ray")
-    require_server()
-    human_evaluation.AT_THE_PAGE.open(
-        city=city_of, announce=print_address, port=options.port, waits=options.waits, hosts=options.allow_host
-    )
-    common = replace(options.common, workers=1, record=True)
-    return judge(human_evaluation.CHALLENGE, categories, setting, common)
-
-
-def judge_influence(options: InfluenceOptions) -> int:
-    """Judge strategies that compete for a community's friendship."""
-    if not options.hours >= 0:
-        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
-    usual = InfluenceOptions(options.common)
-    names = [field.name for field in fields(options) if field.name != "common"]
-    asked = {name: getattr(options, name) for name in names if getattr(options, name) != getattr(usual, name)}
-    return judge("influence", None, asked, options.common)
-
-
-def judge_commute(options: CommuteOptions) -> int:
-    """Judge how agents get around on a day of commutes."""
-    if not options.hours >= 0:
-        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
-    return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
-
-
-def judge_teaming(options: TeamingOptions) -> int:
-    """Judge robots at work with a person or with each other."""
-    if options.steps < 1:
-        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
-    categories = None if options.category == "all" else (options.category,)
-    setting: Setting = {"steps": options.steps, "period": options.period}
-    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
-
-
-def judge_robot(options: RobotOptions) -> int:
-    """Judge robots that bring things, and go along with people."""
-    if options.steps < 1:
-        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
-    categories = None if options.category == "all" else (options.category,)
-    from vico.challenges.robot.arm_policies import policy_settings  # physics is slow to import
-
-    by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
-    setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
-    policies = policy_settings(options.common.method, options.policy)
-    return judge("robot", categories, setting, options.common, methods=("heuristic",), of_method=policies)
 
 
 def judge(

@@ -543,11 +543,6 @@ def _leave(code: int, sentence: str = "") -> NoReturn:
     sys.exit(code)
 
 
-def _verbs() -> dict[str, list[str]]:
-    """Return the first words of all verbs, and what may come after each that has several."""
-    return {name: list(_GROUPS[name]._subcommands) if name in _GROUPS else [] for name in app._subcommands}
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; a sentence for whatever goes wrong, never a traceback."""
     gc.set_threshold(20_000, 20, 20)  # what is imported is never garbage: imports alone take a seventh less
@@ -557,7 +552,8 @@ def main(arguments: list[str] | None = None) -> None:
         if given == ["--version"]:
             print(__version__)
             _leave(0)
-        check_verb(given, _verbs())
+        verbs = {name: list(_GROUPS[name]._subcommands) if name in _GROUPS else [] for name in app._subcommands}
+        check_verb(given, verbs)
         with ended_by_signals():
             code = app.cli(
                 prog="vico",

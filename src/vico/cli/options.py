@@ -150,7 +150,13 @@ class WorldBuildOptions:
         if self.center is not None:
             if self.lat is not None or self.lon is not None:
                 raise InputError("world build: give --center or --lat and --lon, not both")
-            return lat_lon(self.center, "--center")
+            try:
+                lat, lon = (float(part) for part in self.center.split(","))
+            except ValueError:
+                raise InputError(
+                    f"--center: {self.center!r} is not LAT,LON; write for example 60.1690,24.9435"
+                ) from None
+            return lat, lon
         if self.lat is None and self.lon is None:
             return None
         if self.lat is None or self.lon is None:
@@ -393,21 +399,6 @@ class RunOptions:
     idle: float = 0.0
     force: bool = False
     json: bool = False
-
-
-def lat_lon(text: str, option: str) -> tuple[float, float]:
-    """Return the two numbers of ``LAT,LON``.
-
-    Raises
-    ------
-    InputError
-        If it is anything else; the message names the option.
-    """
-    try:
-        lat, lon = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"{option}: {text!r} is not LAT,LON; write for example 60.1690,24.9435") from None
-    return lat, lon
 
 
 def with_ray_address(words: Sequence[str]) -> list[str]:

@@ -117,8 +117,23 @@ def run(options: RunOptions) -> int:
         shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
         print_table(str(options.out), shown, _MEANINGS)
     if talk is not None:
-        print(_talk_summary(talk), file=sys.stderr)
-    return _exit_code(metrics)
+        why = f" ({talk.reason})" if talk.reason else ""
+        tokens = talk.usage.read + talk.usage.written
+        print(
+            f"{talk.answered} answers of residents by the language model, {tokens} tokens; "
+            f"{talk.fallbacks} left to templates{why}",
+            file=sys.stderr,
+        )
+    overlaps = metrics.get("overlaps", {"count": 0})
+    if not overlaps["count"]:
+        return 0
+    first = overlaps["first"][0]
+    print(
+        f"{overlaps['pairs']} pairs overlapped in {overlaps['count']} of {overlaps['sub_steps']} sub-steps, the first: "
+        f"{first['who']} with {first['with']} at {first['where']}, {1000 * first['depth']:.0f} mm; see metrics.json",
+        file=sys.stderr,
+    )
+    return 1
 
 
 def named_or_read(text: str) -> str | dict[str, Any]:
@@ -140,29 +155,6 @@ def _talk_of(options: RunOptions) -> LlmTalk | None:
         return LlmTalk(LanguageModel.from_environment(sampling=Sampling(seed=options.seed, temperature=0.0)))
     except InputError as error:
         raise InputError(f"run: --talk llm: {error}; or leave --talk out") from None
-
-
-def _talk_summary(talk: LlmTalk) -> str:
-    """Say how many answers were the model's."""
-    why = f" ({talk.reason})" if talk.reason else ""
-    return (
-        f"{talk.answered} answers of residents by the language model, {talk.usage.read + talk.usage.written} tokens; "
-        f"{talk.fallbacks} left to templates{why}"
-    )
-
-
-def _exit_code(metrics: dict[str, Any]) -> int:
-    """Return the exit code: 1 with overlaps, which are told in a sentence."""
-    overlaps = metrics.get("overlaps", {"count": 0})
-    if not overlaps["count"]:
-        return 0
-    first = overlaps["first"][0]
-    print(
-        f"{overlaps['pairs']} pairs overlapped in {overlaps['count']} of {overlaps['sub_steps']} sub-steps, the first: "
-        f"{first['who']} with {first['with']} at {first['where']}, {1000 * first['depth']:.0f} mm; see metrics.json",
-        file=sys.stderr,
-    )
-    return 1
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import webbrowser
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -329,7 +328,29 @@ def view(
         browser: Open it in the browser.
         json: Print the address as JSON.
     """
-    return show_run(path, world=world, port=port, hosts=allow_host, browser=browser, json=json)
+    from vico.cli.live import city_of, print_address, wait_for_interrupt
+
+    require_server()
+    from vico.viewer.server.serve import ViewerServer
+    from vico.viewer.server.state import ViewerState
+    from vico.viewer.sources.source import Source
+    from vico.viewer.sources.views import RecordedViews
+
+    source = Source.recorded(path, world=world)
+    run = source.tables.run
+    assert run is not None
+    city = None if source.world is None else city_of(source.world)
+    with ViewerServer(
+        ViewerState(source, RecordedViews(run).view, city=city), port=port, keep=path, hosts=allow_host
+    ) as server:
+        if json:
+            print_json({"url": server.url})
+        else:
+            print_address(server.url)
+        if browser:
+            webbrowser.open(server.url)
+        wait_for_interrupt(f"{path}: steps 0 to {source.last}; Ctrl+C ends")
+    return 0
 
 
 def live(options: Annotated[LiveOptions, _FLAT]) -> int:
@@ -355,64 +376,6 @@ def play(options: Annotated[PlayOptions, _FLAT]) -> int:
 
     Example: vico play helsinki --task delivery --seed 0
     """
-    return play_at_page(options)
-
-
-def show_run(path: Path, *, world: Path | None, port: int, hosts: Sequence[str] = (), browser: bool, json: bool) -> int:
-    """Show a run until Ctrl+C.
-
-    Parameters
-    ----------
-    path
-        Run folder.
-    world
-        The world it ran in, if it is no longer where it was.
-    port
-        To listen on; 0 takes the one it was shown on before, or a free one.
-    hosts
-        Names of hosts, beside this machine's own, under which the page is shown.
-    browser
-        Open it there.
-    json
-        Print the address as JSON.
-    """
-    from vico.cli.live import city_of, print_address, wait_for_interrupt
-
-    require_server()
-    from vico.viewer.server.serve import ViewerServer
-    from vico.viewer.server.state import ViewerState
-    from vico.viewer.sources.source import Source
-    from vico.viewer.sources.views import RecordedViews
-
-    source = Source.recorded(path, world=world)
-    run = source.tables.run
-    assert run is not None
-    city = None if source.world is None else city_of(source.world)
-    with ViewerServer(
-        ViewerState(source, RecordedViews(run).view, city=city), port=port, keep=path, hosts=hosts
-    ) as server:
-        if json:
-            print_json({"url": server.url})
-        else:
-            print_address(server.url)
-        if browser:
-            webbrowser.open(server.url)
-        wait_for_interrupt(f"{path}: steps 0 to {source.last}; Ctrl+C ends")
-    return 0
-
-
-# There are as many assistants as it takes for the one who is played.
-_ASSISTANT = re.compile(r"assistant_\d{1,4}")
-
-
-def play_at_page(options: PlayOptions) -> int:
-    """Open the page, and run until the time is up, somebody stops it, or the task is done.
-
-    Raises
-    ------
-    InputError
-        If nobody is called as asked, or a number is not usable.
-    """
     require_server()
     if options.task != "none":
         return _play_task(options, options.task)
@@ -420,10 +383,6 @@ def play_at_page(options: PlayOptions) -> int:
         raise InputError("play: give WORLD and COMMUNITY, or WORLD and --task; see vico play --help")
     if not 1 <= options.seconds <= 1_000_000:
         raise InputError(f"play: --seconds {options.seconds}; it has to be 1 to 1000000")
-    return _play_freely(options, options.community)
-
-
-def _play_freely(options: PlayOptions, community: Path) -> int:
     from vico.agents.human import PERIOD, HumanAgent, Mailbox
     from vico.cli.run import Job, names_of
     from vico.sim.config import find_by_name
@@ -432,13 +391,17 @@ def _play_freely(options: PlayOptions, community: Path) -> int:
     robots = [name.strip() for name in options.robots.split(",") if name.strip() not in ("", "none")]
     played = options.played or ("robot_0" if robots else "assistant_0")
     if not _ASSISTANT.fullmatch(played):
-        played = find_by_name(played, names_of(community, robots, assistants=1), option="play: --as")
+        played = find_by_name(played, names_of(options.community, robots, assistants=1), option="play: --as")
     human = HumanAgent(Mailbox(), steer=_steering(robots, played))
     given = options.run_options(played, round(options.seconds / PERIOD))
     assert given.out is not None
-    Job.of(given, options.world, community, given.out, played=PlayedAgent(played, human)).done()
+    Job.of(given, options.world, options.community, given.out, played=PlayedAgent(played, human)).done()
     print(given.out)
     return 0
+
+
+# There are as many assistants as it takes for the one who is played.
+_ASSISTANT = re.compile(r"assistant_\d{1,4}")
 
 
 def _steering(robots: list[str], played: str):  # type: ignore[no-untyped-def]

@@ -157,7 +157,11 @@ def connect(address: str, processors: int) -> None:
     try:
         found = _known_address() if address == "auto" else address
         if found in ("", "local"):
-            _start(ray, processors, how)
+            # A cluster on this machine listens on all interfaces, whatever it is told: with a token nobody gets in
+            # unasked. Ray (2.60 on) would write its own into the home folder; this one lasts as long as the process.
+            if not {"RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & set(os.environ):
+                os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
+            ray.init("local", num_cpus=processors, include_dashboard=False, **how)
         else:
             _check_answer(found)  # Ray itself tries for minutes
             ray.init(found, **how)
@@ -189,14 +193,6 @@ def _check_answer(address: str) -> None:
             socket.create_connection((host.strip("[]"), int(port)), timeout=_KNOCK).close()
         except OSError as error:
             raise ConnectionError(f"nothing answers at {address} ({error.strerror or error})") from None
-
-
-def _start(ray: Any, processors: int, how: dict[str, Any]) -> None:
-    """Start a cluster on this machine; whatever Ray is told it listens on all interfaces, so nobody gets in unasked."""
-    # It asks for a word (Ray 2.60 on) that would be written into the home folder; Ray keeps it as long as the process.
-    if not {"RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & set(os.environ):
-        os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
-    ray.init("local", num_cpus=processors, include_dashboard=False, **how)
 
 
 def ray_module() -> Any:

@@ -251,15 +251,11 @@ def data_block(name: str, value: Any, *, where: str = "data") -> str:
     if len(text) > _MOST_DATA:
         raise InputError(f"{where}: {len(text):,} characters; at most {_MOST_DATA:,} can be put into a prompt")
     # Marks are the only angle brackets: in JSON these are written as escapes, which say the same.
-    escaped = "".join(_ESCAPES.get(c, c if c.isprintable() else _escape(c)) for c in text)
+    escaped = "".join(_ESCAPES.get(c, c if c.isprintable() else json.dumps(c, ensure_ascii=True)[1:-1]) for c in text)
     return f'<data name="{name}">\n{escaped}\n</data>'
 
 
 _ESCAPES = {"<": "\\u003c", ">": "\\u003e"}
-
-
-def _escape(character: str) -> str:
-    return json.dumps(character, ensure_ascii=True)[1:-1]
 
 
 def _fill_placeholders(text: str, said: Mapping[str, str]) -> str:

@@ -143,11 +143,6 @@ def is_motion_noticeable(scene: Any, camera: Any, light: Any, coarse: Any, scrat
     return bool(_may_avatar_be_noticed(scene, camera, coarse, model_view, box))
 
 
-def new_scratch() -> tuple[Record, Record, Record]:
-    """Return empty `CASTER`, `MODEL_VIEW` and `BOX` records."""
-    return new_caster(), np.zeros(1, MODEL_VIEW)[0], np.zeros(1, BOX)[0]
-
-
 @inlined
 def _may_box_be_seen(camera: Any, tiles: Any, blocks: Any, box: Any) -> bool:
     return in_view(box, camera) and not is_hidden(box, camera, tiles, blocks)
@@ -263,7 +258,7 @@ class Background:
 
     def take(self, scene: Scene, camera: Record, light: Light, buffers: Buffers, out: ViewOutputs) -> bool:
         """Take pictures of a camera, as little as possible being done anew; return whether they were but copied."""
-        scratch = new_scratch()
+        scratch = new_caster(), np.zeros(1, MODEL_VIEW)[0], np.zeros(1, BOX)[0]
         if self._is_all(scene, camera, light, scratch):
             self._copy_to(out)
             return True

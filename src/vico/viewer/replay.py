@@ -122,7 +122,10 @@ _SILENT = {"refused", "collision"}
 
 def recording_of(run: Run) -> Recording:
     """Read what the page and the film show out of a run: its state at every whole second."""
-    chosen = _whole_seconds(run)
+    # The last recorded step of each second since the start: every step, where all agents act once a second.
+    times = run.times - run.times[0]
+    seconds = np.arange(int(times[-1] + 1e-6) + 1)
+    chosen = np.searchsorted(times, seconds + 1e-6) - 1
     tracks = run.tracks()
     cast = {int(entity): run.cast[int(entity)] for entity in tracks.entity}
     bodies = [RecordedBody(e, b.kind, b.name, b.size[0], b.size[1], b.agent) for e, b in cast.items()]
@@ -149,13 +152,6 @@ def recording_of(run: Run) -> Recording:
         metrics=run.metrics,
         state_hash=run.hashes[-1],
     )
-
-
-def _whole_seconds(run: Run) -> NDArray[np.int64]:
-    """Return the last recorded step of each second since the start: every step, where all agents act once a second."""
-    times = run.times - run.times[0]
-    seconds = np.arange(int(times[-1] + 1e-6) + 1)
-    return np.searchsorted(times, seconds + 1e-6) - 1
 
 
 def _agent_record(agent: dict[str, Any], shown: str) -> dict[str, Any]:

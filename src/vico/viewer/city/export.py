@@ -306,7 +306,9 @@ def write_city(world: World, folder: Path) -> None:
     write_json(folder / "rooms.json", write_rooms(world, textures, folder))
     write_bytes(folder / "outlook.bin", outlook.bytes())
     write_bytes(folder / "models.bin", shapes.bytes())
-    write_bytes(folder / "ground.jpg", _jpeg(ground_picture(world, textures)))
+    jpeg = io.BytesIO()
+    ground_picture(world, textures).save(jpeg, "JPEG", quality=88)
+    write_bytes(folder / "ground.jpg", jpeg.getvalue())
     write_json(
         folder / MANIFEST,
         {
@@ -360,9 +362,3 @@ def _write_textures(folder: Path, textures: TextureLayers) -> list[dict[str, Any
         entries.append(entry | {"offset": blob.add(content), "size": len(content)})
     write_bytes(folder / "textures.bin", blob.bytes())
     return entries
-
-
-def _jpeg(image: Image.Image) -> bytes:
-    out = io.BytesIO()
-    image.save(out, "JPEG", quality=88)
-    return out.getvalue()

@@ -90,7 +90,10 @@ class TextureLayers:
         assert material.texture is not None
         key = repr((material.texture.shape, material.cutout)).encode() + material.texture.tobytes()
         if key not in self._known:
-            picture = _with_alpha(material)
+            picture = material.texture
+            if picture.shape[2] != 4:  # without an alpha channel: opaque
+                alpha = np.full((*picture.shape[:2], 1), 255, np.uint8)
+                picture = np.concatenate([picture, alpha], axis=2)
             array = _array_for(*picture.shape[:2])
             if len(self.pictures[array]) >= 255:
                 # More pictures than a byte can number: the mean colour is left of the rest.
@@ -108,15 +111,6 @@ class TextureLayers:
                 yield {"array": array, "layer": number, "what": "colour"}, _encode(picture[:, :, :3], "JPEG")
                 if picture[:, :, 3].min() < 255:
                     yield {"array": array, "layer": number, "what": "alpha"}, _encode(picture[:, :, 3], "PNG")
-
-
-def _with_alpha(material: Material) -> NDArray[np.uint8]:
-    texture = material.texture
-    assert texture is not None
-    if texture.shape[2] == 4:
-        return texture
-    alpha = np.full((*texture.shape[:2], 1), 255, np.uint8)
-    return np.concatenate([texture, alpha], axis=2)
 
 
 def _array_for(height: int, width: int) -> int:

@@ -156,7 +156,7 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
     body = body_of(look)
     columns: list[NDArray[Any]] = []
     head: dict[str, Any] = {"height": float(body.height), "parents": PARENTS.tolist(), "meshes": []}
-    for mesh in (body, _far_body(body)):
+    for mesh in (body, simplify_body(body, _FAR_TRIANGLES)):
         head["meshes"].append(
             {
                 "vertices": len(mesh.vertices),
@@ -179,10 +179,6 @@ def _rows_of(table: NDArray[Any]) -> list[list[float]]:
     """Return the rows of a table, to a tenth of a millimetre."""
     rows: list[list[float]] = np.round(table.astype(np.float64), 4).tolist()
     return rows
-
-
-def _far_body(body: SkinnedBody) -> SkinnedBody:
-    return simplify_body(body, _FAR_TRIANGLES)
 
 
 def _mesh_columns(mesh: SkinnedBody) -> list[NDArray[Any]]:

@@ -187,19 +187,15 @@ def frames_between(tables: StepTables, skylight: Skylight, first: int, last: int
     chunk = max(_CHUNK // every, 1)
     for begin in range(0, len(wanted), chunk):
         steps = wanted[begin : begin + chunk]
-        yield from _frames(tables, skylight, steps)
-
-
-def _frames(tables: StepTables, skylight: Skylight, steps: range) -> Iterator[Frame]:
-    first, last = steps[0], steps[-1]
-    times = tables.stored("steps", first, last)["time"]
-    weather = tables.stored("weather", first, last)
-    rows = {name: _ByStep(tables.stored(name, first, last)) for name in FRAME_COLUMNS}
-    for step in steps:
-        time = float(times[step - first])
-        air = {key: values[step - first] for key, values in weather.items()} if len(weather["step"]) else None
-        found = {name: rows[name].of(step, FRAME_COLUMNS[name]) for name in FRAME_COLUMNS}
-        yield Frame(step, time, skylight.sky(time, air), found)
+        begin_step, end_step = steps[0], steps[-1]
+        times = tables.stored("steps", begin_step, end_step)["time"]
+        weather = tables.stored("weather", begin_step, end_step)
+        rows = {name: _ByStep(tables.stored(name, begin_step, end_step)) for name in FRAME_COLUMNS}
+        for step in steps:
+            time = float(times[step - begin_step])
+            air = {key: values[step - begin_step] for key, values in weather.items()} if len(weather["step"]) else None
+            found = {name: rows[name].of(step, FRAME_COLUMNS[name]) for name in FRAME_COLUMNS}
+            yield Frame(step, time, skylight.sky(time, air), found)
 
 
 class _ByStep:
