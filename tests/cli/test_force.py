@@ -9,7 +9,7 @@ import pytest
 
 from command_line import vico
 from vico.challenges.tables.results import EVALUATION_FOLDER
-from vico.cli.demo import EVENING
+from vico.cli.demo import evening_folder
 from vico.community.folder import COMMUNITY_FOLDER
 from vico.datasets.folder import DATASET_FOLDER
 from vico.errors import OutputExistsError
@@ -124,7 +124,8 @@ def test_an_export_is_replaced_and_a_world_is_not_by_an_export(
 
 
 @pytest.mark.parametrize(
-    "kind", [WORLD_FOLDER, COMMUNITY_FOLDER, RUN_FOLDER, EVENING, DATASET_FOLDER, EXPORT_FOLDER, EVALUATION_FOLDER]
+    "kind",
+    [WORLD_FOLDER, COMMUNITY_FOLDER, RUN_FOLDER, evening_folder(), DATASET_FOLDER, EXPORT_FOLDER, EVALUATION_FOLDER],
 )
 def test_every_kind_takes_an_empty_folder_and_no_file(kind: FolderKind, tmp_path: Path) -> None:
     kind.require(tmp_path)

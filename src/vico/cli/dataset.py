@@ -9,18 +9,15 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import Files, RayAddress
+from vico.cli.options import FLAT, Files, RayAddress, split_names
 from vico.errors import InputError, OutputExistsError
 
 if TYPE_CHECKING:
     from vico.challenges.records import Setting
     from vico.datasets.build import BuildRequest
-
-_FLAT = tyro.conf.arg(name="")
 
 dataset = SubcommandApp()
 
@@ -116,7 +113,7 @@ class DatasetOptions:
 
 
 @dataset.command(name="build")
-def dataset_build(options: Annotated[DatasetOptions, _FLAT]) -> int:
+def dataset_build(options: Annotated[DatasetOptions, FLAT]) -> int:
     """Make a dataset of demonstrations: episodes played for it, or runs that were recorded. Exit 1 if some are missing.
 
     Example: vico dataset build --world helsinki --episodes 200 --subtasks 1 --steps 150 --to lerobot --out demos
@@ -253,7 +250,7 @@ def request_of(options: DatasetOptions) -> BuildRequest:
     from vico.runner.foreign import Terms
     from vico.threads import workers as processors
 
-    outputs = () if options.outputs.strip() == "none" else tuple(_names(options.outputs))
+    outputs = () if options.outputs.strip() == "none" else tuple(split_names(options.outputs))
     if not 0 <= options.workers <= 256:
         raise InputError(f"--workers {options.workers}; give a number of processes in 1..256, or 0 for one a processor")
     if not 1 <= options.assistants <= 2 or options.steps < 1:
@@ -279,10 +276,6 @@ def request_of(options: DatasetOptions) -> BuildRequest:
         workers=options.workers or processors(),
         ray=options.ray,
     )
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _rows(about: Mapping[str, Any]) -> dict[str, Any]:

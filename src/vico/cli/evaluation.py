@@ -22,7 +22,7 @@ from tyro.extras import SubcommandApp
 
 from vico.cli.console import check_output, print_json
 from vico.cli.leaderboard import add_to_leaderboard
-from vico.cli.options import Hosts, RayAddress, Words
+from vico.cli.options import FLAT, Hosts, RayAddress, Words
 from vico.errors import InputError, OutputError, OutputExistsError
 from vico.io.files import is_being_written, new_folder, write_errors
 from vico.threads import workers as processors
@@ -105,7 +105,7 @@ class EvaluationOptions:
     json: bool = False
 
 
-Common = Annotated[EvaluationOptions, tyro.conf.arg(name="")]
+Common = Annotated[EvaluationOptions, FLAT]
 
 
 @dataclass(frozen=True)
@@ -250,14 +250,11 @@ class RobotOptions:
     policy: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
 
 
-# The fields of a record are options of the verb itself, not of a part of it.
-_FLAT = tyro.conf.arg(name="")
-
 evaluation = SubcommandApp()
 
 
 @evaluation.command(name="assistant")
-def evaluate_assistant(options: Annotated[AssistantOptions, _FLAT]) -> int:
+def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
     """Judge planners on the community assistant tasks.
 
     Exit 0 if every episode was played, 1 if some were not (the table says why), 2 for bad input. The same command goes
@@ -270,77 +267,6 @@ def evaluate_assistant(options: Annotated[AssistantOptions, _FLAT]) -> int:
 
     Example: vico eval assistant --category search --method my_module:MyAgent --worlds helsinki --record --out mine
     """
-    return judge_assistant(options)
-
-
-@evaluation.command(name="influence")
-def evaluate_influence(options: Annotated[InfluenceOptions, _FLAT]) -> int:
-    """Judge strategies that compete for a community's friendship; a method is a pair, ours+nearest.
-
-    Example: vico eval influence --method ours+random --method ours+nearest --worlds helsinki monaco --out results
-
-    Example: vico eval influence --method llm+llm --target-model o1 --dialogue-model gpt-4o --worlds helsinki --out llm
-    """
-    # Judge strategies that compete for a community's friendship
-    if not options.hours >= 0:
-        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
-    usual = InfluenceOptions(options.common)
-    names = [field.name for field in fields(options) if field.name != "common"]
-    asked = {name: getattr(options, name) for name in names if getattr(options, name) != getattr(usual, name)}
-    return judge("influence", None, asked, options.common)
-
-
-@evaluation.command(name="commute")
-def evaluate_commute(options: Annotated[CommuteOptions, _FLAT]) -> int:
-    """Judge how agents get around on a day of commutes.
-
-    Example: vico eval commute --method rule --method ours --worlds helsinki monaco --seeds 10 --compare --out results
-    """
-    # Judge how agents get around on a day of commutes
-    if not options.hours >= 0:
-        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
-    return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
-
-
-@evaluation.command(name="robot")
-def evaluate_robot(options: Annotated[RobotOptions, _FLAT]) -> int:
-    """Judge robots with an arm and a deck that bring things, and go along with people, by real contact.
-
-    Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
-    Example: vico eval robot --method rl --policy runs/whole/policy.npz --worlds helsinki --out results
-    """
-    # Judge robots that bring things, and go along with people
-    if options.steps < 1:
-        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
-    categories = None if options.category == "all" else (options.category,)
-    from vico.challenges.robot.arm_policies import policy_settings  # physics is slow to import
-
-    by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
-    setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
-    policies = policy_settings(options.common.method, options.policy)
-    return judge("robot", categories, setting, options.common, methods=("heuristic",), of_method=policies)
-
-
-@evaluation.command(name="teaming")
-def evaluate_teaming(options: Annotated[TeamingOptions, _FLAT]) -> int:
-    """Judge a humanoid, a quadruped and a drone at work with a person or another robot.
-
-    Example: vico eval teaming --category guide --method heuristic --method alone --worlds helsinki --out results
-    """
-    # Judge robots at work with a person or with each other
-    if options.steps < 1:
-        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
-    categories = None if options.category == "all" else (options.category,)
-    setting: Setting = {"steps": options.steps, "period": options.period}
-    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
-
-
-#: `evaluate` with all but where to, and who is told.
-Play = Callable[..., "list[Outcome]"]
-
-
-def judge_assistant(options: AssistantOptions) -> int:
-    """Judge planners on the community assistant tasks."""
     from vico.challenges.assistant.tasks import SUBTASKS
 
     if not 1 <= options.assistants <= 2:
@@ -357,7 +283,7 @@ def judge_assistant(options: AssistantOptions) -> int:
         setting = {**setting, "subtasks": options.subtasks}
     categories = None if options.category == "all" else (options.category,)
     if any("human" in method.split("+") for method in options.common.method):
-        # Judge a person, who plays at a page of this machine, one episode after the other, each recorded
+        # A person plays at a page of this machine, one episode after the other, each recorded.
         from vico.cli.live import city_of, print_address
         from vico.viewer import human_evaluation
 
@@ -370,6 +296,68 @@ def judge_assistant(options: AssistantOptions) -> int:
         common = replace(options.common, workers=1, record=True)
         return judge(human_evaluation.CHALLENGE, categories, setting, common)
     return judge("assistant", categories, setting, options.common, methods=("heuristic",))
+
+
+@evaluation.command(name="influence")
+def evaluate_influence(options: Annotated[InfluenceOptions, FLAT]) -> int:
+    """Judge strategies that compete for a community's friendship; a method is a pair, ours+nearest.
+
+    Example: vico eval influence --method ours+random --method ours+nearest --worlds helsinki monaco --out results
+
+    Example: vico eval influence --method llm+llm --target-model o1 --dialogue-model gpt-4o --worlds helsinki --out llm
+    """
+    if not options.hours >= 0:
+        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
+    usual = InfluenceOptions(options.common)
+    names = [field.name for field in fields(options) if field.name != "common"]
+    asked = {name: getattr(options, name) for name in names if getattr(options, name) != getattr(usual, name)}
+    return judge("influence", None, asked, options.common)
+
+
+@evaluation.command(name="commute")
+def evaluate_commute(options: Annotated[CommuteOptions, FLAT]) -> int:
+    """Judge how agents get around on a day of commutes.
+
+    Example: vico eval commute --method rule --method ours --worlds helsinki monaco --seeds 10 --compare --out results
+    """
+    if not options.hours >= 0:
+        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
+    return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
+
+
+@evaluation.command(name="robot")
+def evaluate_robot(options: Annotated[RobotOptions, FLAT]) -> int:
+    """Judge robots with an arm and a deck that bring things, and go along with people, by real contact.
+
+    Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
+    Example: vico eval robot --method rl --policy runs/whole/policy.npz --worlds helsinki --out results
+    """
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    from vico.challenges.robot.arm_policies import policy_settings  # physics is slow to import
+
+    by_oracle: Setting = {"oracle_grasp": True} if options.oracle_grasp else {}
+    setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
+    policies = policy_settings(options.common.method, options.policy)
+    return judge("robot", categories, setting, options.common, methods=("heuristic",), of_method=policies)
+
+
+@evaluation.command(name="teaming")
+def evaluate_teaming(options: Annotated[TeamingOptions, FLAT]) -> int:
+    """Judge a humanoid, a quadruped and a drone at work with a person or another robot.
+
+    Example: vico eval teaming --category guide --method heuristic --method alone --worlds helsinki --out results
+    """
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    setting: Setting = {"steps": options.steps, "period": options.period}
+    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
+
+
+#: `evaluate` with all but where to, and who is told.
+Play = Callable[..., "list[Outcome]"]
 
 
 def judge(

@@ -21,6 +21,8 @@ RayAddress = Annotated[str | None, tyro.conf.arg(metavar="[ADDRESS]")]
 Hosts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME")]
 Words = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="WORLD...")]
 Files = Annotated[tuple[tuple[Path, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE...")]
+#: The fields of a record are options of the verb itself, not of a part of it.
+FLAT = tyro.conf.arg(name="")
 _RAY_ADDRESS = re.compile(r"auto|local|ray://.+|[^/\s]+:\d+")
 
 
@@ -399,6 +401,11 @@ class RunOptions:
     idle: float = 0.0
     force: bool = False
     json: bool = False
+
+
+def split_names(text: str) -> list[str]:
+    """Return the names of ``A,B,...``."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def with_ray_address(words: Sequence[str]) -> list[str]:

@@ -28,7 +28,7 @@ from vico.cli.console import (
     stopped_between_steps,
 )
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
-from vico.cli.options import RunOptions
+from vico.cli.options import RunOptions, split_names
 from vico.clock import seconds_of_day
 from vico.community import Community, read_community, read_names
 from vico.errors import InputError, OutputExistsError, SchemaError
@@ -581,5 +581,5 @@ def _places(kind: str, given: Path | None, world: World, played: PlayedAgent | N
 
 
 def _names(text: str) -> tuple[str, ...]:
-    names = tuple(part.strip() for part in text.split(",") if part.strip())
+    names = tuple(split_names(text))
     return () if names == ("none",) else names

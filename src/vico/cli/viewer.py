@@ -17,8 +17,8 @@ import tyro
 from tyro.conf import Positional
 
 from vico.cli.console import print_json
-from vico.cli.evaluation import AssistantOptions, EvaluationOptions
-from vico.cli.options import CommaSeparated, Hosts, RunOptions
+from vico.cli.evaluation import AssistantOptions, EvaluationOptions, evaluate_assistant
+from vico.cli.options import FLAT, CommaSeparated, Hosts, RunOptions
 from vico.errors import InputError
 from vico.viewer.server import require_server
 
@@ -201,110 +201,6 @@ class PlayOptions:
         return RunOptions(**given, live=True, speed=1.0)
 
 
-@dataclass(frozen=True)
-class FilmOptions:
-    """What `vico film` is asked for.
-
-    Attributes
-    ----------
-    run
-        Run folder.
-    follow
-        Whom the camera follows: a person by name ("Ann Lee", or Ann), resident_3, a robot, a thing, or "car 3".
-    shots
-        Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
-    out
-        File to write (.mp4).
-    size
-        WIDTHxHEIGHT, pixels.
-    start
-        HH:MM:SS, or seconds since the run began; without it, its beginning.
-    stop
-        Likewise; without it, its end.
-    fps
-        Frames a second.
-    view
-        From where.
-    samples
-        Rays a pixel, along each side: 1 is quick, 2 smooth.
-    quality
-        plain, or fine: soft shadows, darker corners, mirroring glass.
-    world
-        The world it ran in, if it is no longer where it was.
-    community
-        Its community, if it is no longer where it was.
-    force
-        Replace the file if it is there.
-    headless
-        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
-    """
-
-    run: Positional[Path]
-    follow: str = ""
-    shots: Path | None = None
-    out: Path = Path("film.mp4")
-    size: str = "1920x1080"
-    start: str = ""
-    stop: str = ""
-    fps: int = 25
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
-    samples: int = 2
-    quality: Literal["plain", "fine"] = "fine"
-    world: Path | None = None
-    community: Path | None = None
-    force: bool = False
-    headless: bool = False
-
-
-@dataclass(frozen=True)
-class StillOptions:
-    """What `vico still` is asked for.
-
-    Attributes
-    ----------
-    run
-        Run folder.
-    follow
-        Who is in its middle, as for `vico film`: "Ann Lee", resident_3, "car 3".
-    at
-        HH:MM:SS, or seconds since the run began; without it, its end.
-    out
-        File to write (.png or .jpg).
-    size
-        WIDTHxHEIGHT, pixels.
-    view
-        From where.
-    samples
-        Rays a pixel, along each side.
-    quality
-        plain, or fine: soft shadows, darker corners, mirroring glass.
-    world
-        The world it ran in, if it is no longer where it was.
-    community
-        Its community, if it is no longer where it was.
-    force
-        Replace the file if it is there.
-    headless
-        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
-    """
-
-    run: Positional[Path]
-    follow: str
-    at: str = ""
-    out: Path = Path("still.png")
-    size: str = "1920x1080"
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
-    samples: int = 3
-    quality: Literal["plain", "fine"] = "fine"
-    world: Path | None = None
-    community: Path | None = None
-    force: bool = False
-    headless: bool = False
-
-
-_FLAT = tyro.conf.arg(name="")
-
-
 def view(
     path: Positional[Path],
     world: Path | None = None,
@@ -353,7 +249,7 @@ def view(
     return 0
 
 
-def live(options: Annotated[LiveOptions, _FLAT]) -> int:
+def live(options: Annotated[LiveOptions, FLAT]) -> int:
     """Start a simulation with a page beside it, from which it can be paused, looked into and changed.
 
     Example: vico live helsinki people
@@ -365,7 +261,7 @@ def live(options: Annotated[LiveOptions, _FLAT]) -> int:
     return verb.run(options.run_options())
 
 
-def play(options: Annotated[PlayOptions, _FLAT]) -> int:
+def play(options: Annotated[PlayOptions, FLAT]) -> int:
     """Walk through a world among its people, from a page in the browser; or do a task there, and be judged.
 
     Example: vico play helsinki people
@@ -416,8 +312,6 @@ def _steering(robots: list[str], played: str):  # type: ignore[no-untyped-def]
 
 def _play_task(options: PlayOptions, category: Literal["carry", "delivery", "search"]) -> int:
     """Play one task as `vico eval assistant --method human` does, and tell the verdict."""
-    from vico.cli.evaluation import judge_assistant
-
     if options.played not in ("", "assistant_0"):
         raise InputError(f"play: --as {options.played}; tasks are for assistant_0")
     if not 0 <= options.seed <= 10_000:
@@ -439,4 +333,4 @@ def _play_task(options: PlayOptions, category: Literal["carry", "delivery", "sea
         waits=options.waits,
         allow_host=options.allow_host,
     )
-    return judge_assistant(asked)
+    return evaluate_assistant(asked)
