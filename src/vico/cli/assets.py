@@ -48,90 +48,35 @@ def _thing_rows() -> list[dict[str, object]]:
 
 @dataclass(frozen=True)
 class GenerateOptions:
-    """What `vico assets generate` is asked for.
+    """What `vico assets generate` is asked for."""
 
-    Attributes
-    ----------
-    prompt
-        The thing, in words.
-    size
-        Metres: its height.
-    out
-        Folder of your own data (VICO_DATA); made if it is not there.
-    seed
-        Of the noise that picture and mesh start from.
-    name
-        Of the model; made of the words without. One that there is already takes the other's place in worlds.
-    kind
-        What it is, such as post_box; the name without.
-    tag
-        Tags of the map: things mapped so look like this, as in amenity=post_box.
-    passable
-        Bodies are not stopped by it.
-    size_of
-        What the size says: the height, or the longest side.
-    turn
-        Degrees counter-clockwise, so that its front looks along +x.
-    faces
-        How many triangles it may have.
-    text_to_image
-        Model that makes the picture: a folder, or a name on the hub.
-    image_to_mesh
-        Model that makes the mesh, of ShapEImg2ImgPipeline: a folder, or a name on the hub.
-    picture
-        A picture of the thing, instead of a model that makes one.
-    mesh
-        A mesh of the thing (GLB, OBJ, PLY, STL, OFF), instead of both models.
-    up
-        Which axis of that mesh is up; y for GLB and OBJ, else z.
-    licence
-        Of that mesh.
-    credit
-        Whom to thank for that mesh.
-    steps
-        Denoising steps of the picture.
-    mesh_steps
-        Denoising steps of the mesh.
-    cells
-        Cells a side of the grid that the mesh is read from.
-    side
-        Pixels a side of the picture.
-    device
-        Where the models run.
-    accept_licence
-        Use models whatever their licence: you say that you may.
-    force
-        Replace what has the name in the folder.
-    json
-        Print the result as JSON.
-    """
-
-    prompt: Positional[str]
-    size: float
-    out: Path
-    seed: int = 0
+    prompt: Positional[str]  # The thing, in words.
+    size: float  # Metres: its height.
+    out: Path  # Folder of your own data (VICO_DATA); made if it is not there.
+    seed: int = 0  # Of the noise that picture and mesh start from.
+    #: Of the model; made of the words without. One that there is already takes the other's place in worlds.
     name: str = ""
-    kind: str = ""
-    tag: tuple[str, ...] = ()
-    passable: bool = False
-    size_of: Literal["height", "longest"] = "height"
-    turn: float = 0.0
-    faces: int = 1500
-    text_to_image: str = ""
-    image_to_mesh: str = ""
-    picture: Path | None = None
-    mesh: Path | None = None
-    up: Literal["", "y", "z"] = ""
-    licence: str = ""
-    credit: str = ""
-    steps: int = 30
-    mesh_steps: int = 64
-    cells: int = 128
-    side: int = 512
-    device: Literal["cpu", "cuda"] = "cpu"
-    accept_licence: bool = False
-    force: bool = False
-    json: bool = False
+    kind: str = ""  # What it is, such as post_box; the name without.
+    tag: tuple[str, ...] = ()  # Tags of the map: things mapped so look like this, as in amenity=post_box.
+    passable: bool = False  # Bodies are not stopped by it.
+    size_of: Literal["height", "longest"] = "height"  # What the size says: the height, or the longest side.
+    turn: float = 0.0  # Degrees counter-clockwise, so that its front looks along +x.
+    faces: int = 1500  # How many triangles it may have.
+    text_to_image: str = ""  # Model that makes the picture: a folder, or a name on the hub.
+    image_to_mesh: str = ""  # Model that makes the mesh, of ShapEImg2ImgPipeline: a folder, or a name on the hub.
+    picture: Path | None = None  # A picture of the thing, instead of a model that makes one.
+    mesh: Path | None = None  # A mesh of the thing (GLB, OBJ, PLY, STL, OFF), instead of both models.
+    up: Literal["", "y", "z"] = ""  # Which axis of that mesh is up; y for GLB and OBJ, else z.
+    licence: str = ""  # Of that mesh.
+    credit: str = ""  # Whom to thank for that mesh.
+    steps: int = 30  # Denoising steps of the picture.
+    mesh_steps: int = 64  # Denoising steps of the mesh.
+    cells: int = 128  # Cells a side of the grid that the mesh is read from.
+    side: int = 512  # Pixels a side of the picture.
+    device: Literal["cpu", "cuda"] = "cpu"  # Where the models run.
+    accept_licence: bool = False  # Use models whatever their licence: you say that you may.
+    force: bool = False  # Replace what has the name in the folder.
+    json: bool = False  # Print the result as JSON.
 
     def __post_init__(self) -> None:
         if self.mesh is not None and (self.picture is not None or self.text_to_image or self.image_to_mesh):

@@ -31,102 +31,44 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """What `vico film` is asked for.
+    """What `vico film` is asked for."""
 
-    Attributes
-    ----------
-    run
-        Run folder.
-    follow
-        Whom the camera follows: a person by name ("Ann Lee", or Ann), resident_3, a robot, a thing, or "car 3".
-    shots
-        Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
-    out
-        File to write (.mp4).
-    size
-        WIDTHxHEIGHT, pixels.
-    start
-        HH:MM:SS, or seconds since the run began; without it, its beginning.
-    stop
-        Likewise; without it, its end.
-    fps
-        Frames a second.
-    view
-        From where.
-    samples
-        Rays a pixel, along each side: 1 is quick, 2 smooth.
-    quality
-        plain, or fine: soft shadows, darker corners, mirroring glass.
-    world
-        The world it ran in, if it is no longer where it was.
-    community
-        Its community, if it is no longer where it was.
-    force
-        Replace the file if it is there.
-    headless
-        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
-    """
-
-    run: Positional[Path]
+    run: Positional[Path]  # Run folder.
+    #: Whom the camera follows: a person by name ("Ann Lee", or Ann), resident_3, a robot, a thing, or "car 3".
     follow: str = ""
+    #: Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
     shots: Path | None = None
-    out: Path = Path("film.mp4")
-    size: str = "1920x1080"
-    start: str = ""
-    stop: str = ""
-    fps: int = 25
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
-    samples: int = 2
-    quality: Literal["plain", "fine"] = "fine"
-    world: Path | None = None
-    community: Path | None = None
-    force: bool = False
+    out: Path = Path("film.mp4")  # File to write (.mp4).
+    size: str = "1920x1080"  # WIDTHxHEIGHT, pixels.
+    start: str = ""  # HH:MM:SS, or seconds since the run began; without it, its beginning.
+    stop: str = ""  # Likewise; without it, its end.
+    fps: int = 25  # Frames a second.
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"  # From where.
+    samples: int = 2  # Rays a pixel, along each side: 1 is quick, 2 smooth.
+    quality: Literal["plain", "fine"] = "fine"  # plain, or fine: soft shadows, darker corners, mirroring glass.
+    world: Path | None = None  # The world it ran in, if it is no longer where it was.
+    community: Path | None = None  # Its community, if it is no longer where it was.
+    force: bool = False  # Replace the file if it is there.
+    #: Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
     headless: bool = False
 
 
 @dataclass(frozen=True)
 class StillOptions:
-    """What `vico still` is asked for.
+    """What `vico still` is asked for."""
 
-    Attributes
-    ----------
-    run
-        Run folder.
-    follow
-        Who is in its middle, as for `vico film`: "Ann Lee", resident_3, "car 3".
-    at
-        HH:MM:SS, or seconds since the run began; without it, its end.
-    out
-        File to write (.png or .jpg).
-    size
-        WIDTHxHEIGHT, pixels.
-    view
-        From where.
-    samples
-        Rays a pixel, along each side.
-    quality
-        plain, or fine: soft shadows, darker corners, mirroring glass.
-    world
-        The world it ran in, if it is no longer where it was.
-    community
-        Its community, if it is no longer where it was.
-    force
-        Replace the file if it is there.
-    headless
-        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
-    """
-
-    run: Positional[Path]
-    follow: str
-    at: str = ""
-    out: Path = Path("still.png")
-    size: str = "1920x1080"
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
-    samples: int = 3
-    quality: Literal["plain", "fine"] = "fine"
-    world: Path | None = None
-    community: Path | None = None
-    force: bool = False
+    run: Positional[Path]  # Run folder.
+    follow: str  # Who is in its middle, as for `vico film`: "Ann Lee", resident_3, "car 3".
+    at: str = ""  # HH:MM:SS, or seconds since the run began; without it, its end.
+    out: Path = Path("still.png")  # File to write (.png or .jpg).
+    size: str = "1920x1080"  # WIDTHxHEIGHT, pixels.
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"  # From where.
+    samples: int = 3  # Rays a pixel, along each side.
+    quality: Literal["plain", "fine"] = "fine"  # plain, or fine: soft shadows, darker corners, mirroring glass.
+    world: Path | None = None  # The world it ran in, if it is no longer where it was.
+    community: Path | None = None  # Its community, if it is no longer where it was.
+    force: bool = False  # Replace the file if it is there.
+    #: Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
     headless: bool = False
 
 

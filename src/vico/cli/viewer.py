@@ -25,79 +25,35 @@ from vico.viewer.server import require_server
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What `vico live` is asked for; what else a run can be asked for, `vico run --live` is.
+    """What `vico live` is asked for; what else a run can be asked for, `vico run --live` is."""
 
-    Attributes
-    ----------
-    world
-        World folder.
-    community
-        Community folder, made for that world.
-    out
-        Folder to record into; without it, out/live, which is replaced.
-    robots
-        Names, separated by commas; none for no robots.
-    agent
-        Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
-    assistants
-        How many of them.
-    start
-        Time of day, HH:MM or HH:MM:SS.
-    date
-        Of the first day, YYYY-MM-DD; the community's day unless given.
-    weather
-        A kind of weather, "changing", or a weather file (.json).
-    events
-        Of the city: none, "changing", or a file of events (.json).
-    steps
-        Seconds to simulate at most.
-    cars
-        How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists
-        How many people nobody plays ride bicycles in the streets.
-    pedestrians
-        How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    observe
-        Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
-    speed
-        Simulated seconds a second at most; 0 is as fast as it goes.
-    paused
-        Wait before the first step until somebody lets it go on.
-    interventions
-        What was done to an earlier run (its interventions.jsonl), to be done again.
-    port
-        Where the page is, on this machine alone; 0 takes a free one.
-    allow_host
-        A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
-        times.
-    idle
-        Seconds without a page open after which the run waits for one; 0: it never waits.
-    seed
-        Decides everything that is left to chance.
-    """
-
-    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
-    community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]
-    out: Path | None = None
-    robots: CommaSeparated = "husky,go2"
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]  # World folder.
+    community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]  # Community folder, made for that world.
+    out: Path | None = None  # Folder to record into; without it, out/live, which is replaced.
+    robots: CommaSeparated = "husky,go2"  # Names, separated by commas; none for no robots.
+    #: Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
-    assistants: int = 0
-    start: str = "08:00"
-    date: str | None = None
-    weather: str = "fair"
-    events: str = "none"
-    steps: int = 86_400
-    cars: int | None = None
-    cyclists: int = 0
+    assistants: int = 0  # How many of them.
+    start: str = "08:00"  # Time of day, HH:MM or HH:MM:SS.
+    date: str | None = None  # Of the first day, YYYY-MM-DD; the community's day unless given.
+    weather: str = "fair"  # A kind of weather, "changing", or a weather file (.json).
+    events: str = "none"  # Of the city: none, "changing", or a file of events (.json).
+    steps: int = 86_400  # Seconds to simulate at most.
+    cars: int | None = None  # How many cars drive around; unset: 30, or as many as there is room for.
+    cyclists: int = 0  # How many people nobody plays ride bicycles in the streets.
+    #: How many people nobody plays walk around; unset: 30, or as many as there is room for.
     pedestrians: int | None = None
+    #: Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
     observe: CommaSeparated = "none"
-    speed: float = 1.0
-    paused: bool = False
-    interventions: Path | None = None
-    port: int = 0
+    speed: float = 1.0  # Simulated seconds a second at most; 0 is as fast as it goes.
+    paused: bool = False  # Wait before the first step until somebody lets it go on.
+    interventions: Path | None = None  # What was done to an earlier run (its interventions.jsonl), to be done again.
+    port: int = 0  # Where the page is, on this machine alone; 0 takes a free one.
+    #: A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
+    #: times.
     allow_host: Hosts = ()
-    idle: float = 300.0
-    seed: int = 0
+    idle: float = 300.0  # Seconds without a page open after which the run waits for one; 0: it never waits.
+    seed: int = 0  # Decides everything that is left to chance.
 
     def run_options(self) -> RunOptions:
         """Return the same as options of a run."""
@@ -109,74 +65,36 @@ class LiveOptions:
 
 @dataclass(frozen=True)
 class PlayOptions:
-    """What `vico play` is asked for.
+    """What `vico play` is asked for."""
 
-    Attributes
-    ----------
-    world
-        World folder.
-    community
-        Community folder, made for that world; tasks have people of their own and take none.
-    played
-        Who you are: a resident by name ("Ann Lee", or Ann), resident_3, assistant_0 or robot_0. Without it
-        assistant_0, or robot_0 where robots are given.
-    task
-        A task for the assistant, which is judged at the end.
-    advanced
-        The harder form of it.
-    out
-        Folder to record into; without it, out/play, which is replaced.
-    robots
-        Names, separated by commas; none for no robots.
-    start
-        Time of day, HH:MM or HH:MM:SS.
-    date
-        Of the first day, YYYY-MM-DD; the community's day unless given.
-    weather
-        A kind of weather, "changing", or a weather file (.json).
-    seconds
-        To simulate at most.
-    cars
-        How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists
-        How many people nobody plays ride bicycles in the streets.
-    pedestrians
-        How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    view
-        What whom you play sees is rendered and recorded, which a demonstration needs.
-    port
-        Where the page is, on this machine alone; 0 takes a free one.
-    allow_host
-        A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
-        times.
-    idle
-        Seconds without a page open after which the run waits for one; 0: it never waits.
-    waits
-        With a task: seconds that it waits for you at its page.
-    seed
-        Decides everything that is left to chance, and the task.
-    """
-
-    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]  # World folder.
+    #: Community folder, made for that world; tasks have people of their own and take none.
     community: Positional[Annotated[Path | None, tyro.conf.arg(metavar="COMMUNITY")]] = None
+    #: Who you are: a resident by name ("Ann Lee", or Ann), resident_3, assistant_0 or robot_0. Without it assistant_0,
+    #: or robot_0 where robots are given.
     played: Annotated[str, tyro.conf.arg(name="as", metavar="AGENT")] = ""
+    #: A task for the assistant, which is judged at the end.
     task: Literal["none", "carry", "delivery", "search"] = "none"
-    advanced: bool = False
-    out: Path | None = None
-    robots: CommaSeparated = "none"
-    start: str = "08:00"
-    date: str | None = None
-    weather: str = "fair"
-    seconds: int = 36_000
-    cars: int | None = None
-    cyclists: int = 0
+    advanced: bool = False  # The harder form of it.
+    out: Path | None = None  # Folder to record into; without it, out/play, which is replaced.
+    robots: CommaSeparated = "none"  # Names, separated by commas; none for no robots.
+    start: str = "08:00"  # Time of day, HH:MM or HH:MM:SS.
+    date: str | None = None  # Of the first day, YYYY-MM-DD; the community's day unless given.
+    weather: str = "fair"  # A kind of weather, "changing", or a weather file (.json).
+    seconds: int = 36_000  # To simulate at most.
+    cars: int | None = None  # How many cars drive around; unset: 30, or as many as there is room for.
+    cyclists: int = 0  # How many people nobody plays ride bicycles in the streets.
+    #: How many people nobody plays walk around; unset: 30, or as many as there is room for.
     pedestrians: int | None = None
+    #: What whom you play sees is rendered and recorded, which a demonstration needs.
     view: Literal["recorded", "none"] = "recorded"
-    port: int = 0
+    port: int = 0  # Where the page is, on this machine alone; 0 takes a free one.
+    #: A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
+    #: times.
     allow_host: Hosts = ()
-    idle: float = 60.0
-    waits: float = 600.0
-    seed: int = 0
+    idle: float = 60.0  # Seconds without a page open after which the run waits for one; 0: it never waits.
+    waits: float = 600.0  # With a task: seconds that it waits for you at its page.
+    seed: int = 0  # Decides everything that is left to chance, and the task.
 
     def run_options(self, played: str, steps: int) -> RunOptions:
         """Return the same as options of a run."""
