@@ -202,13 +202,13 @@ def _report_if_interrupted(out: Path, report: Report, rate: int) -> Iterator[Cal
 
     made, wanted = 0, 0
 
-    def told(done: int, count: int) -> None:
+    def report_frames(done: int, count: int) -> None:
         nonlocal made, wanted
         made, wanted = done, count
         report("film", done, count)
 
     try:
-        yield told
+        yield report_frames
     except KeyboardInterrupt as stop:
         if not made:
             raise

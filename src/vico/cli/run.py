@@ -109,7 +109,7 @@ def run(options: RunOptions) -> int:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
     talk = _talk_of(options)
     use_workers(options.workers)
-    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).done()
+    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).simulate()
     if options.json:
         print_json(metrics)
     else:
@@ -246,7 +246,7 @@ class Job:
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
         return cls(options, out, place, people, config, sources, found, talk, played)
 
-    def done(self) -> dict[str, Any]:
+    def simulate(self) -> dict[str, Any]:
         """Do it; return its metrics.
 
         Raises
@@ -271,7 +271,7 @@ class Job:
                     metrics = self._go(leg, control, viewer, report, asked)
                 if asked or control is None or control.switch is None:
                     break
-                leg = self._switched(leg, control)
+                leg = self._switch_branch(leg, control)
             if metrics["steps"] < options.steps:
                 kept = self._told_of_rest(leg, metrics["steps"])
                 if asked:
@@ -299,7 +299,7 @@ class Job:
         """Set the scene, and open the recording or go on with it."""
         sim, faults = self._simulation(), FaultLog()
         if goes_on:
-            return self._resumed(sim, agents, every, self.out, control)
+            return self._resume(sim, agents, every, self.out, control)
         # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
         check_replaceable(self.out, force=True, kind=RUN_FOLDER)
         remove_path(self.out)
@@ -307,7 +307,7 @@ class Job:
         how["notes"]["faults"] = faults.record()
         return Leg(sim, agents, Recorder(self.out, sim, **how), faults, every)
 
-    def _resumed(
+    def _resume(
         self, sim: Simulation, agents: Gatherer, every: int, out: Path, control: Control | None, **notes: Any
     ) -> Leg:
         """Go on with a recording from its last checkpoint."""
@@ -320,12 +320,12 @@ class Job:
             control.restore(checkpoint.notes, out=out, step=checkpoint.step)
         return Leg(sim, agents, recorder, faults, every)
 
-    def _switched(self, leg: Leg, control: Control) -> Leg:
+    def _switch_branch(self, leg: Leg, control: Control) -> Leg:
         """Go on from a checkpoint in a sibling of the run's folder; the run so far stays whole."""
         assert control.switch is not None
         step, name, _ = control.switch
         out = branched_run(leg.recorder.out, step, name)
-        return self._resumed(
+        return self._resume(
             self._simulation(),
             leg.agents,
             leg.every,

@@ -209,7 +209,7 @@ def play(options: Annotated[PlayOptions, FLAT]) -> int:
     human = HumanAgent(Mailbox(), steer=_steering(robots, played))
     given = options.run_options(played, round(options.seconds / PERIOD))
     assert given.out is not None
-    Job.of(given, options.world, options.community, given.out, played=PlayedAgent(played, human)).done()
+    Job.of(given, options.world, options.community, given.out, played=PlayedAgent(played, human)).simulate()
     print(given.out)
     return 0
 

@@ -287,7 +287,7 @@ class RayActors:
         pairs = [self._make(maker) for maker in makers]
         self._actors = [actor for actor, _ in pairs]
         for _, ref in pairs:
-            self._made(ref)
+            self._wait_until_made(ref)
 
     def __len__(self) -> int:
         return len(self._makers)
@@ -308,7 +308,7 @@ class RayActors:
         refs = [None if one is None else self._actors[k].ask.remote(*one) for k, one in enumerate(asked)]
         answers = []
         for k, (one, ref) in enumerate(zip(asked, refs, strict=True)):
-            answers.append(None if one is None else self._received(k, one, ref))
+            answers.append(None if one is None else self._receive(k, one, ref))
             if one is not None:
                 self._told[k].append(one)
         return answers
@@ -331,13 +331,13 @@ class RayActors:
         actor.look_in.remote(sys.path)
         return actor, actor.make.remote(maker)
 
-    def _made(self, ref: Any) -> None:
+    def _wait_until_made(self, ref: Any) -> None:
         try:
             self._ray.get(ref)
         except self._ray.exceptions.RayTaskError as error:
             raise InputError(f"Ray: an object cannot be made: {first_line(error)}") from None
 
-    def _received(self, k: int, one: tuple[str, tuple[Any, ...], dict[str, Any]], ref: Any) -> Any:
+    def _receive(self, k: int, one: tuple[str, tuple[Any, ...], dict[str, Any]], ref: Any) -> Any:
         """Wait for an answer; make the object anew if it is lost."""
         for _ in range(_TRIES):
             try:

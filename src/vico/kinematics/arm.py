@@ -16,7 +16,10 @@ from vico.io.compiled import compiled
 
 Array = NDArray[np.float64]
 
-_DAMPING, _STEPS, _LONGEST = 0.03, 60, 0.25
+# Of the search for joint angles.
+_DAMPING = 0.03
+_STEPS = 60  # at most
+_LONGEST = 0.25  # step, radians
 _STARTS = 12
 
 

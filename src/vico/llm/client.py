@@ -193,7 +193,7 @@ class LanguageModel:
             If the messages are unusable, or the recording that is replayed holds no answer.
         """
         said = check_messages(messages)
-        kept = self._kept(said, reply, check)
+        kept = self._cached_reply(said, reply, check)
         if kept is not None:
             return kept
         used = Usage()
@@ -221,7 +221,7 @@ class LanguageModel:
         what = f"no usable reply in {rounds + 1}; the last: {findings[0]}{more}"
         raise _unusable(self.endpoint, what, findings, answer.text)
 
-    def _kept(self, said: list[Message], reply: type[T], check: Check[T] | None) -> Reply[T] | None:
+    def _cached_reply(self, said: list[Message], reply: type[T], check: Check[T] | None) -> Reply[T] | None:
         """Return the reply in the cache, if it is still good."""
         if self._cache is None or self._replay is not None:
             return None
@@ -271,17 +271,17 @@ class LanguageModel:
             free = self._replay.cached(self._whole(turns, reply))
             if free is not None:
                 return free
-        asked = self._priced(Usage(1, tokens_of(turns), 0))
+        asked = self._with_price(Usage(1, tokens_of(turns), 0))
         self.budget.take(asked)
         try:
-            answer = self._told(turns, reply)
+            answer = self._ask_server(turns, reply)
         except BaseException:
             self.budget.release(asked)
             raise
         self.budget.settle(asked, answer.usage)
         return answer
 
-    def _told(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
+    def _ask_server(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
         """Return the answer, asked for without what the server turns out to refuse."""
         if self._replay is not None:
             return self._replay.answer(self._whole(turns, reply))
@@ -290,7 +290,7 @@ class LanguageModel:
         while True:
             request = self._request(turns, reply)
             try:
-                answer = self._read_answer(self._sent(request, retries), tokens_of(turns))
+                answer = self._read_answer(self._send(request, retries), tokens_of(turns))
                 break
             except RequestError as error:
                 part = self._to_leave_out(error, request, reply, tried)
@@ -333,7 +333,7 @@ class LanguageModel:
                 return part
         return None
 
-    def _sent(self, request: dict[str, Any], retries: int) -> dict[str, Any]:
+    def _send(self, request: dict[str, Any], retries: int) -> dict[str, Any]:
         """Return the answer to a request that is sent as often as it takes, and sent again so many times at most."""
         how = self.connection
         failed = 0
@@ -374,9 +374,9 @@ class LanguageModel:
         usage = Usage(
             1, _count(counted.get("prompt_tokens"), asked), _count(counted.get("completion_tokens"), len(text) // 4)
         )
-        return Answer(text, finish, refusal, self._priced(usage))
+        return Answer(text, finish, refusal, self._with_price(usage))
 
-    def _priced(self, usage: Usage) -> Usage:
+    def _with_price(self, usage: Usage) -> Usage:
         if self.endpoint.price is None:
             return usage
         read, written = self.endpoint.price

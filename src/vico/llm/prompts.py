@@ -204,7 +204,7 @@ class Prompt:
             raise InputError(f"{self.path}: inputs.{missing[0]}: no value is given for it")
         if unknown := sorted(inputs.keys() - wanted.keys()):
             raise InputError(f"{self.path}: {unknown[0]!r} is no input of this prompt; it takes {', '.join(wanted)}")
-        said = {name: self._said(name, one, inputs[name]) for name, one in wanted.items()}
+        said = {name: self._input_text(name, one, inputs[name]) for name, one in wanted.items()}
         head = _fill_placeholders(self.file.system, said)
         if any(one.kind == "data" for one in wanted.values()):
             head = f"{head.rstrip()}\n{_ABOUT_DATA}"
@@ -223,7 +223,7 @@ class Prompt:
         listed = data_block("findings", [finding[:_MOST_FINDING] for finding in findings[:_MOST_FINDINGS]])
         return [{"role": "assistant", "content": reply}, user(f"{self.file.mend.rstrip()}\n{listed}")]
 
-    def _said(self, name: str, kind: PromptInput, value: Any) -> str:
+    def _input_text(self, name: str, kind: PromptInput, value: Any) -> str:
         where = f"{self.path}: inputs.{name}"
         if kind.kind == "data":
             return data_block(name, value, where=where)

@@ -217,7 +217,7 @@ class Palette:
             self._packed = None
         return self._known[key]
 
-    def packed(self) -> Textures:
+    def pack(self) -> Textures:
         """Return the textures of all materials so far; the same arrays until there is another one."""
         if self._packed is None:
             self._packed = pack_textures(self._entries)

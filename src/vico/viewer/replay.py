@@ -108,7 +108,7 @@ class Recording:
         for step, picture in self.views[agent].key_frames():
             yield min(int(np.searchsorted(self.view_steps, step)), self.steps), picture
 
-    def travelled(self) -> NDArray[np.float64]:
+    def travelled_metres(self) -> NDArray[np.float64]:
         """Metres each body covered, leaving out jumps through doors; shape ``(n,)``."""
         moves = np.diff(self.tracks[:, :, :2].astype(np.float64), axis=0)
         metres = np.linalg.norm(moves, axis=2)
@@ -390,7 +390,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 def _most_alive(recording: Recording, count: int) -> list[str]:
     """Agents with a film of their own who moved most: they have something to show."""
-    metres = recording.travelled()
+    metres = recording.travelled_metres()
     names = [name for name in recording.people if name in recording.views]
     names.sort(key=lambda name: (-metres[recording.body_of(name)], name))
     robots = [name for name in names if recording.bodies[recording.body_of(name)].kind == "robot"]

@@ -28,10 +28,20 @@ from vico.world.mesh import Surface, merge_surfaces
 
 # Field numbers of onnx.proto (ModelProto, GraphProto, NodeProto, TensorProto, AttributeProto).
 _MODEL_GRAPH = 7
-_GRAPH_NODE, _GRAPH_INITIALISER = 1, 5
-_NODE_INPUT, _NODE_OUTPUT, _NODE_KIND, _NODE_ATTRIBUTE = 1, 2, 4, 5
-_TENSOR_DIMS, _TENSOR_TYPE, _TENSOR_FLOATS, _TENSOR_NAME, _TENSOR_RAW = 1, 2, 4, 8, 9
-_ATTRIBUTE_NAME, _ATTRIBUTE_FLOAT, _ATTRIBUTE_INT = 1, 2, 3
+_GRAPH_NODE = 1
+_GRAPH_INITIALISER = 5
+_NODE_INPUT = 1
+_NODE_OUTPUT = 2
+_NODE_KIND = 4
+_NODE_ATTRIBUTE = 5
+_TENSOR_DIMS = 1
+_TENSOR_TYPE = 2
+_TENSOR_FLOATS = 4
+_TENSOR_NAME = 8
+_TENSOR_RAW = 9
+_ATTRIBUTE_NAME = 1
+_ATTRIBUTE_FLOAT = 2
+_ATTRIBUTE_INT = 3
 _FLOAT32 = 1
 
 Layer = tuple[NDArray[np.float32], NDArray[np.float32]]

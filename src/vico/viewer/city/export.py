@@ -118,7 +118,7 @@ def _middle(footprint: Sequence[Any]) -> NDArray[np.float64]:
 
 def _split_mesh(mesh: PackedMesh, tiles: NDArray[np.int64], found: dict[int, list[PackedMesh]]) -> None:
     for tile in np.unique(tiles).tolist():
-        found.setdefault(tile, []).append(mesh.chosen(tiles == tile))
+        found.setdefault(tile, []).append(mesh.select(tiles == tile))
 
 
 def far_tiles(world: World, grid: Grid, textures: TextureLayers) -> dict[int, PackedMesh]:
@@ -138,7 +138,7 @@ def far_tiles(world: World, grid: Grid, textures: TextureLayers) -> dict[int, Pa
     tiles = np.array(
         [tile_of_building.get(e, int(t)) for e, t in zip(mesh.entity[first].tolist(), own, strict=True)], np.int64
     )
-    return {tile: mesh.chosen(tiles == tile) for tile in np.unique(tiles).tolist()}
+    return {tile: mesh.select(tiles == tile) for tile in np.unique(tiles).tolist()}
 
 
 def _mean_colours(surfaces: list[Surface], textures: TextureLayers) -> dict[int, NDArray[np.float64]]:

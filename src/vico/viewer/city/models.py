@@ -174,7 +174,7 @@ class PackedMesh:
     entity: NDArray[np.int32]
     triangles: NDArray[np.int32]
 
-    def chosen(self, triangles: NDArray[Any]) -> PackedMesh:
+    def select(self, triangles: NDArray[Any]) -> PackedMesh:
         """Return some of the triangles, with the vertices they need."""
         used, faces = np.unique(self.triangles[triangles], return_inverse=True)
         return PackedMesh(
@@ -267,8 +267,10 @@ def array_entries() -> list[dict[str, int]]:
 
 
 Models = Mapping[str, Sequence[Surface]]
-# From far away a shape has this share of its triangles, but some at least; leaves this share, each larger.
-_FAR_SHARE, _FAR_LEAST, _FAR_LEAVES = 0.14, 12, 0.17
+# What a shape has from far away.
+_FAR_SHARE = 0.14  # of its triangles
+_FAR_LEAST = 12  # triangles
+_FAR_LEAVES = 0.17  # share of its leaves, each larger
 
 
 def moving_models() -> dict[str, Sequence[Surface]]:

@@ -85,7 +85,7 @@ def _resting_pose(style: Any, clip: int, phase: float) -> NDArray[np.float64]:
     for k, second in enumerate(seconds.tolist()):
         causes[k, 1:] = restlessness(second, float(style["asymmetry"]), float(style["rhythm"]))
         rotations, offsets = pose(np.array([clip]), np.array([phase]), np.zeros(1), one, second=second)
-        poses[k, :55], poses[k, 55] = rotations[0], offsets[0]
+        poses[k, :-1], poses[k, -1] = rotations[0], offsets[0]
     fitted, *_ = np.linalg.lstsq(causes, poses.reshape(_MOMENTS, -1), rcond=None)
     return np.asarray(fitted.reshape(4, 56, 3))
 

@@ -59,7 +59,7 @@ class Skylight:
         found[:4] = self._sun(int(time))
         if air is not None:
             found[4 : 4 + len(_WEATHER_FIELDS)] = [air[key] for key in _WEATHER_FIELDS]
-        found[15] = 0.0
+        found[-1] = 0.0
         return found
 
     def _sun_at(self, second: int) -> tuple[float, float, float, float]:
@@ -134,7 +134,7 @@ class Frame:
     sky: NDArray[np.float32]
     tables: Mapping[str, Columns]
 
-    def encoded(self, *, flags: int = 0, range_id: int = 0) -> bytes:
+    def to_bytes(self, *, flags: int = 0, range_id: int = 0) -> bytes:
         """Return the bytes of the frame."""
         most = {"doors": _MOST_DOORS}
         counts = {

@@ -235,7 +235,7 @@ class Source:
         plans = self.plans(names) if step == self.last else {}
         about = {row["entity"]: row for row in rows}
         found = {
-            a["name"]: self._told(about[a["entity"]], motions.get(a["entity"]), joints, events)
+            a["name"]: self._agent_state(about[a["entity"]], motions.get(a["entity"]), joints, events)
             | {"plan": plans.get(a["name"])}
             for a in wanted
             if a["entity"] in about
@@ -323,7 +323,7 @@ class Source:
         period = periods.get(agent["name"], usual)
         return float(period) if isinstance(period, int | float) else None
 
-    def _told(
+    def _agent_state(
         self, row: dict[str, Any], motion: dict[str, Any] | None, joints: Columns, events: Sequence[dict[str, Any]]
     ) -> dict[str, Any]:
         name, mine = self.names[row["entity"]], joints["entity"] == row["entity"]
