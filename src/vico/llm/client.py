@@ -15,7 +15,7 @@ from vico.errors import InputError, LlmReplyError
 from vico.io.http import Backoff, with_retries
 from vico.llm.budget import Budget, Usage
 from vico.llm.prompts import Message, check_messages, data_block, tokens_of, user
-from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
+from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of
 from vico.llm.replies import Check, one_line, parse_reply, refusal_text, reply_text, response_format, schema_instruction
 from vico.llm.transport import Connection, Endpoint, RequestError, post
 
@@ -129,8 +129,11 @@ class LanguageModel:
             if env.get(variable):
                 options.setdefault(option, Path(env[variable]))
         replayed = options.get("replay")
-        endpoint = recorded_endpoint(replayed) if replayed is not None else Endpoint.from_environment(env)
-        return cls(endpoint, **options)
+        if replayed is None:
+            return cls(Endpoint.from_environment(env), **options)
+        # The endpoint the recording was made with, without its key: enough to replay it.
+        replay = Replay(replayed)
+        return cls(Endpoint(replay.base, replay.model), **options)
 
     @property
     def recorded(self) -> bool:

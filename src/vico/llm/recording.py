@@ -168,18 +168,6 @@ class Replay:
         )
 
 
-def recorded_endpoint(path: Path) -> Endpoint:
-    """Return the endpoint a recording was made with, without its key: enough to replay it.
-
-    Raises
-    ------
-    MissingFileError, SchemaError, InputError
-        If there is no usable recording.
-    """
-    replay = Replay(path)
-    return Endpoint(replay.base, replay.model)
-
-
 class Cache:
     """Accepted answers in a folder, one file each, named by endpoint, model and request."""
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.render.arrays import Buffers, buffers_for
+from vico.render.arrays import Buffers
 from vico.render.compiled import inlined, kernel
 from vico.render.records import BOX, MODEL_VIEW
 from vico.render.scene import Scene
@@ -305,10 +305,3 @@ class Background:
     def _is_lit(self, camera: Record, light: Light) -> bool:
         """Return whether the colours are those of this light; the camera says how a room is lit."""
         return self._light is light or (self._light is not None and bool(camera["indoors"]))
-
-
-def fitting_buffers(known: Buffers | None, scene: Scene, width: int, height: int) -> Buffers:
-    """Return the same scratch memory, or new one where the pictures are others or the scene has grown."""
-    if known is not None and known.fit(scene.arrays, width, height):
-        return known
-    return buffers_for(scene.arrays, width, height)

@@ -159,7 +159,9 @@ def _hints_of_robot(sim: Simulation, index: int) -> Iterator[Hint]:
     if not robots.has_arm(k):
         return
     if held := robots.in_hand(k):
-        spot = _before(here, float(robots.bodies().yaw[k]))
+        x, y, z = (float(value) for value in here)
+        yaw = float(robots.bodies().yaw[k])
+        spot = [x + 0.8 * math.cos(yaw), y + 0.8 * math.sin(yaw), z]  # metres ahead
         yield Hint("N", f"put {state.entity(held)['name']} down", {"type": "place", "target": spot})
         for j, name in enumerate(robots.names):
             if j != k and _apart(robots.bodies().position[j], here) < 2 * EARSHOT:
@@ -168,11 +170,6 @@ def _hints_of_robot(sim: Simulation, index: int) -> Iterator[Hint]:
     away = [(_apart(position, here), j) for j, position in enumerate(state.objects.position)]
     for _, j in sorted(away)[:_MOST_OF_A_KEY]:
         yield Hint("B", f"pick up {state.objects.names[j]}", {"type": "pick", "object": int(state.objects.entity[j])})
-
-
-def _before(position: Any, yaw: float) -> list[float]:
-    x, y, z = (float(value) for value in position)
-    return [x + 0.8 * math.cos(yaw), y + 0.8 * math.sin(yaw), z]
 
 
 def _apart(a: Any, b: Any) -> float:

@@ -35,14 +35,14 @@ from vico.sim.pictures.buildings import hall_size
 from vico.version import __version__
 from vico.viewer.city.models import (
     PLAIN,
+    SHAPES,
     Blob,
     PackedMesh,
     TextureLayers,
-    array_entries,
+    model_entry,
     moving_models,
     pack_surfaces,
     write_instances,
-    write_models,
     write_robots,
     write_rooms,
 )
@@ -60,7 +60,6 @@ __all__ = [
     "far_tiles",
     "ground_grid",
     "ground_picture",
-    "lamps_of",
     "near_tiles",
     "write_city",
 ]
@@ -295,13 +294,15 @@ def write_city(world: World, folder: Path) -> None:
     shapes = Blob()
     standing = world.prototypes()
     used = {entry["prototype"] for entry in instances}
-    lamps = lamps_of(world)
+    # What shines at night.
+    is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
+    lamps = set(world.objects.prototype[is_lamp].tolist())
     models = {
         name: with_lit_heads(standing[name]) if name in lamps else standing[name] for name in used
     } | moving_models()
     doors, leaves = door_entries(world)
     models |= leaves
-    written = write_models(models, textures, shapes)
+    written = {name: model_entry(list(models[name]), textures, shapes) for name in sorted(models)}
     robots = write_robots(textures, shapes)
     write_json(folder / "rooms.json", write_rooms(world, textures, folder))
     write_bytes(folder / "outlook.bin", outlook.bytes())
@@ -319,7 +320,7 @@ def write_city(world: World, folder: Path) -> None:
             "tile": TILE,
             "count": grid.count,
             "attribution": [source.attribution for source in world.manifest.sources if source.attribution],
-            "arrays": array_entries(),
+            "arrays": [{"height": height, "width": width} for height, width in SHAPES],
             "textures": _write_textures(folder, textures),
             "ground": ground,
             "tiles": tiles,
@@ -336,12 +337,6 @@ def write_city(world: World, folder: Path) -> None:
             ],
         },
     )
-
-
-def lamps_of(world: World) -> set[str]:
-    """Return the prototypes that shine at night."""
-    is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
-    return set(world.objects.prototype[is_lamp].tolist())
 
 
 def _tile(

@@ -8,7 +8,7 @@ with the joints between them. Rooms are one file a building, fetched only when s
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -261,12 +261,6 @@ class Blob:
         return b"".join(self._parts)
 
 
-def array_entries() -> list[dict[str, int]]:
-    """Return the sizes of the texture arrays as the manifest has them."""
-    return [{"height": height, "width": width} for height, width in SHAPES]
-
-
-Models = Mapping[str, Sequence[Surface]]
 # What a shape has from far away.
 _FAR_SHARE = 0.14  # of its triangles
 _FAR_LEAST = 12  # triangles
@@ -285,12 +279,8 @@ def moving_models() -> dict[str, Sequence[Surface]]:
     return found
 
 
-def write_models(models: Models, textures: TextureLayers, blob: Blob) -> dict[str, Any]:
-    """Write shapes, from near and from far; return their entries by name."""
-    return {name: _model_entry(list(models[name]), textures, blob) for name in sorted(models)}
-
-
-def _model_entry(surfaces: list[Surface], textures: TextureLayers, blob: Blob) -> dict[str, Any]:
+def model_entry(surfaces: list[Surface], textures: TextureLayers, blob: Blob) -> dict[str, Any]:
+    """Write a shape, from near and from far; return its entry."""
     near = [blob.mesh(mesh) for mesh in pack_surfaces(surfaces, textures)]
     far = [blob.mesh(mesh) for mesh in pack_surfaces(coarse(surfaces, textures), textures)]
     low = np.min([mesh["low"] for mesh in near], axis=0) if near else np.zeros(3)

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vico.community.folder import read_community
 from vico.errors import InputError, MissingFileError, VicoError
@@ -210,7 +209,11 @@ class Source:
     def cast(self, since: int | None = None) -> dict[str, Any]:
         """Return what ``/api/cast`` tells."""
         cast = self.tables.cast().values()
-        told = [_member(m) for m in cast if since is None or _changed_since(m, since)]
+        told = [
+            asdict(m) | {"size": list(m.size), "intervals": [list(interval) for interval in m.intervals]}
+            for m in cast
+            if since is None or _changed_since(m, since)
+        ]
         return {"step": self.last, "cast": told}
 
     def moment(self, step: int, agent: str = "") -> dict[str, Any]:
@@ -382,11 +385,6 @@ def _world_record(world: World) -> dict[str, Any]:
     }
 
 
-def _member(member: CastMember) -> dict[str, Any]:
-    told = asdict(member)
-    return told | {"size": list(member.size), "intervals": [list(interval) for interval in member.intervals]}
-
-
 def _changed_since(member: CastMember, since: int) -> bool:
     """Whether a body came or went after a step."""
     first, until = member.intervals[-1]
@@ -401,13 +399,13 @@ def _entity(entity: int, cast: Mapping[int, CastMember]) -> dict[str, Any] | Non
 
 def _rows(columns: Columns, table: str) -> list[dict[str, Any]]:
     """Return rows as dicts of plain values, in quantities."""
-    form = TABLES[table]
-    values = {key: _quantity(columns[key], form[key].unit) for key in form}
+    values = {}
+    for key, column in TABLES[table].items():
+        if column.unit:
+            values[key] = [round(value, 4) for value in (columns[key] * column.unit).tolist()]
+        else:
+            values[key] = np.asarray(columns[key]).tolist()
     return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
-
-
-def _quantity(values: NDArray[Any], unit: float) -> list[Any]:
-    return [round(value, 4) for value in (values * unit).tolist()] if unit else list(np.asarray(values).tolist())
 
 
 def _hit(

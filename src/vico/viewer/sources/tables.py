@@ -82,7 +82,8 @@ class RecordedTables:
     def stored(self, table: str, first: int, last: int) -> Columns:
         """Return rows as stored; see `StepTables.stored`."""
         with self._lock:
-            return _columns(self._run.table(table, first, last), table)
+            rows = self._run.table(table, first, last)
+            return {key: _column(rows, key, column) for key, column in TABLES[table].items()}
 
     def cast(self) -> dict[int, CastMember]:
         """Everybody and everything that was there at some step, by entity."""
@@ -158,7 +159,9 @@ class LiveTables:
         if first >= oldest:
             return newer
         older = self._older(table, first, min(last, oldest - 1))
-        return older if last < oldest else _in_order(table, _concatenate(table, [older, newer]))
+        if last < oldest:
+            return older
+        return _in_order(table, {key: np.concatenate([older[key], newer[key]]) for key in TABLES[table]})
 
     def cast(self) -> dict[int, CastMember]:
         """Everybody and everything that was there at some step, by entity."""
@@ -183,10 +186,6 @@ class LiveTables:
             return self._recorded
 
 
-def _columns(table: pa.Table, name: str) -> Columns:
-    return {key: _column(table, key, column) for key, column in TABLES[name].items()}
-
-
 def _column(table: pa.Table, key: str, column: Column) -> NDArray[Any]:
     if column.absent is not None and key not in table.column_names:
         return to_stored(np.full(len(table), column.absent), column)
@@ -202,10 +201,6 @@ def _kept_columns(name: str, rows: Sequence[tuple[int, Mapping[str, Mapping[str,
         else:
             found[key] = to_stored(np.concatenate([np.zeros(0), *(part[key] for part in parts)]), column)
     return _in_order(name, found)
-
-
-def _concatenate(name: str, parts: Sequence[Columns]) -> Columns:
-    return {key: np.concatenate([part[key] for part in parts]) for key in TABLES[name]}
 
 
 def _in_order(name: str, columns: Columns) -> Columns:
