@@ -23,6 +23,20 @@ Words = Annotated[tuple[tuple[str, ...], ...], tyro.conf.UseAppendAction, tyro.c
 Files = Annotated[tuple[tuple[Path, ...], ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE...")]
 #: The fields of a record are options of the verb itself, not of a part of it.
 FLAT = tyro.conf.arg(name="")
+# Options of all verbs that simulate.
+Robots = Annotated[str, tyro.conf.arg(help="Names, separated by commas; none for no robots.", metavar="A,B,...")]
+StartTime = Annotated[str, tyro.conf.arg(help="Time of day, HH:MM or HH:MM:SS.")]
+FirstDate = Annotated[str | None, tyro.conf.arg(help="Of the first day, YYYY-MM-DD; the community's day unless given.")]
+WeatherChoice = Annotated[str, tyro.conf.arg(help='A kind of weather, "changing", or a weather file (.json).')]
+EventChoice = Annotated[str, tyro.conf.arg(help='Of the city: none, "changing", or a file of events (.json).')]
+Cars = Annotated[
+    int | None, tyro.conf.arg(help="How many cars drive around; unset: 30, or as many as there is room for.")
+]
+Cyclists = Annotated[int, tyro.conf.arg(help="How many people nobody plays ride bicycles in the streets.")]
+Pedestrians = Annotated[
+    int | None,
+    tyro.conf.arg(help="How many people nobody plays walk around; unset: 30, or as many as there is room for."),
+]
 _RAY_ADDRESS = re.compile(r"auto|local|ray://.+|[^/\s]+:\d+")
 
 
@@ -167,23 +181,22 @@ class RunOptions:
     out: Path | None = None
     #: Folder of a run that was cut short, instead of all others but --agent: it goes on from its last checkpoint.
     resume: Path | None = None
-    start: str = "08:00"  # Time of day, HH:MM or HH:MM:SS.
-    date: str | None = None  # Of the first day, YYYY-MM-DD; the community's day unless given.
+    start: StartTime = "08:00"
+    date: FirstDate = None
     #: Hours that clocks are ahead of UTC there; without it, as the time zone of 15 degrees the world lies in.
     utc_offset: float | None = None
-    weather: str = "fair"  # A kind of weather, "changing", or a weather file (.json).
-    events: str = "none"  # Of the city: none, "changing", or a file of events (.json).
+    weather: WeatherChoice = "fair"
+    events: EventChoice = "none"
     opening_hours: bool = False  # Places keep the hours that the map says.
     steps: int = 1800  # Seconds to simulate.
-    robots: CommaSeparated = "husky,go2"  # Names, separated by commas; none for no robots.
+    robots: Robots = "husky,go2"
     #: File (.json) of where robots start: {"robot_0": [x, y, yaw]}; metres and radians. Without it by the seed.
     robot_places: Path | None = None
     assistant_places: Path | None = None  # Likewise, where assistants start.
     physics: Literal["mujoco", "genesis"] = "mujoco"  # Engine that moves robots: mujoco, or genesis (an extra).
-    cars: int | None = None  # How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists: int = 0  # How many people nobody plays ride bicycles in the streets.
-    #: How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    pedestrians: int | None = None
+    cars: Cars = None
+    cyclists: Cyclists = 0
+    pedestrians: Pedestrians = None
     #: Who may be in a junction: one vehicle at a time; those who are not in each other's way (shared); the same by
     #: signals, where the map has them; or one at a time by signals (both).
     junctions: Literal["one", "shared", "signals", "both"] = "one"

@@ -18,7 +18,20 @@ from tyro.conf import Positional
 
 from vico.cli.console import print_json
 from vico.cli.evaluation import AssistantOptions, EvaluationOptions, evaluate_assistant
-from vico.cli.options import FLAT, CommaSeparated, Hosts, RunOptions
+from vico.cli.options import (
+    FLAT,
+    Cars,
+    CommaSeparated,
+    Cyclists,
+    EventChoice,
+    FirstDate,
+    Hosts,
+    Pedestrians,
+    Robots,
+    RunOptions,
+    StartTime,
+    WeatherChoice,
+)
 from vico.errors import InputError
 from vico.viewer.server import require_server
 
@@ -30,19 +43,18 @@ class LiveOptions:
     world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]  # World folder.
     community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]  # Community folder, made for that world.
     out: Path | None = None  # Folder to record into; without it, out/live, which is replaced.
-    robots: CommaSeparated = "husky,go2"  # Names, separated by commas; none for no robots.
+    robots: Robots = "husky,go2"
     #: Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     assistants: int = 0  # How many of them.
-    start: str = "08:00"  # Time of day, HH:MM or HH:MM:SS.
-    date: str | None = None  # Of the first day, YYYY-MM-DD; the community's day unless given.
-    weather: str = "fair"  # A kind of weather, "changing", or a weather file (.json).
-    events: str = "none"  # Of the city: none, "changing", or a file of events (.json).
+    start: StartTime = "08:00"
+    date: FirstDate = None
+    weather: WeatherChoice = "fair"
+    events: EventChoice = "none"
     steps: int = 86_400  # Seconds to simulate at most.
-    cars: int | None = None  # How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists: int = 0  # How many people nobody plays ride bicycles in the streets.
-    #: How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    pedestrians: int | None = None
+    cars: Cars = None
+    cyclists: Cyclists = 0
+    pedestrians: Pedestrians = None
     #: Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
     observe: CommaSeparated = "none"
     speed: float = 1.0  # Simulated seconds a second at most; 0 is as fast as it goes.
@@ -77,15 +89,14 @@ class PlayOptions:
     task: Literal["none", "carry", "delivery", "search"] = "none"
     advanced: bool = False  # The harder form of it.
     out: Path | None = None  # Folder to record into; without it, out/play, which is replaced.
-    robots: CommaSeparated = "none"  # Names, separated by commas; none for no robots.
-    start: str = "08:00"  # Time of day, HH:MM or HH:MM:SS.
-    date: str | None = None  # Of the first day, YYYY-MM-DD; the community's day unless given.
-    weather: str = "fair"  # A kind of weather, "changing", or a weather file (.json).
+    robots: Robots = "none"
+    start: StartTime = "08:00"
+    date: FirstDate = None
+    weather: WeatherChoice = "fair"
     seconds: int = 36_000  # To simulate at most.
-    cars: int | None = None  # How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists: int = 0  # How many people nobody plays ride bicycles in the streets.
-    #: How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    pedestrians: int | None = None
+    cars: Cars = None
+    cyclists: Cyclists = 0
+    pedestrians: Pedestrians = None
     #: What whom you play sees is rendered and recorded, which a demonstration needs.
     view: Literal["recorded", "none"] = "recorded"
     port: int = 0  # Where the page is, on this machine alone; 0 takes a free one.
