@@ -153,7 +153,7 @@ def test_a_run_that_was_shown_and_reached_into_is_still_a_run(
     from vico.viewer.sources.source import Source
 
     run = shutil.copytree(helsinki_run[0], tmp_path / "run")
-    with ViewerServer(ViewerState(Source.recorded(run), lambda *_: ({}, "")), keep=run):
+    with ViewerServer(ViewerState(Source.of_run(run), lambda *_: ({}, "")), keep=run):
         pass
     (run / interventions.INTERVENTIONS_FILE).write_text("")
     assert (run / ADDRESS).is_file()

@@ -70,7 +70,7 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Watcher]:
 @pytest.fixture(scope="module")
 def recorded(watched: tuple[Path, Watcher]) -> Source:
     """The same run, read from its folder."""
-    source = Source.recorded(watched[0])
+    source = Source.of_run(watched[0])
     source.world, source.skylight = watched[1].world, watched[1].source.skylight  # type: ignore[union-attr]
     return source
 
@@ -142,7 +142,7 @@ def test_a_run_from_before_the_weather_was_recorded_has_a_sun_and_no_weather(
     old = shutil.copytree(watched[0], tmp_path / "old")
     for path in old.glob("segments/*/weather.parquet"):
         path.unlink()
-    source = Source.recorded(old)
+    source = Source.of_run(old)
     source.skylight = recorded.skylight
     sky = next(source.frames(3, 3)).sky
     assert np.isfinite(sky[:4]).all()

@@ -458,13 +458,13 @@ def _reporting() -> Iterator[tuple[ChallengeProgress | None, Finished]]:
                 tasks[label] = bars.add_task(label, total=limit)
             bars.update(tasks[label], completed=step, total=limit)
 
-        def finished(outcome: Outcome, done: int, total: int) -> None:
+        def close_bar(outcome: Outcome, done: int, total: int) -> None:
             bars.update(whole, completed=done, total=total)
             label = label_of(outcome.job)
             if label in tasks:
                 bars.remove_task(tasks.pop(label))
 
-        yield progress, finished
+        yield progress, close_bar
 
 
 def _print_outcome(outcome: Outcome, done: int, total: int) -> None:

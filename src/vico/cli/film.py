@@ -234,7 +234,7 @@ def _page_of(path: Path, world: Path | None) -> Iterator[str]:
     from vico.viewer.sources.source import Source
     from vico.viewer.sources.views import RecordedViews
 
-    source = Source.recorded(path, world=world)
+    source = Source.of_run(path, world=world)
     run = source.tables.run
     assert run is not None
     if source.world is None:

@@ -161,7 +161,7 @@ def view(
     from vico.viewer.sources.source import Source
     from vico.viewer.sources.views import RecordedViews
 
-    source = Source.recorded(path, world=world)
+    source = Source.of_run(path, world=world)
     run = source.tables.run
     assert run is not None
     city = None if source.world is None else city_of(source.world)

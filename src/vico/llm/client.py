@@ -271,7 +271,7 @@ class LanguageModel:
     def _answer(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
         """Return a server's answer, of any kind, within the budget."""
         if self._replay is not None:
-            free = self._replay.cached(self._whole(turns, reply))
+            free = self._replay.cached_answer(self._whole(turns, reply))
             if free is not None:
                 return free
         asked = self._with_price(Usage(1, tokens_of(turns), 0))

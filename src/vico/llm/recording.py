@@ -142,7 +142,7 @@ class Replay:
         self.base, self.model = self.base or line.base, self.model or line.model
         self._answers[line.digest].append((Answer(line.text, line.finish, line.refusal, usage), line.cached))
 
-    def cached(self, request: Mapping[str, Any]) -> Answer | None:
+    def cached_answer(self, request: Mapping[str, Any]) -> Answer | None:
         """Return the next answer to a request if it came from the cache then, and so cost nothing; else None."""
         with self._lock:
             waiting = self._answers.get(digest_of(request))

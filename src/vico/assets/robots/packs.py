@@ -273,7 +273,7 @@ def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
     meshes = folder / "pybullet_data" / "husky" / "meshes"
     dark, grey, yellow = (60, 62, 66), (44, 45, 48), (238, 186, 24)
 
-    def moved(surface: Surface, x: float, z: float, *, turned: bool = False) -> Surface:
+    def place(surface: Surface, x: float, z: float, *, turned: bool = False) -> Surface:
         c = -1.0 if turned else 1.0
         return surface.moved(np.array([[c, 0, 0, x], [0, c, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]], np.float64))
 
@@ -281,9 +281,9 @@ def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
     base = [
         _light(meshes / "base_link.stl", 900, grey),
         _light(meshes / "top_plate.stl", 900, yellow),
-        moved(_light(meshes / "user_rail.stl", 700, dark), 0.272, 0.245),
-        moved(bumper, 0.48, 0.091),
-        moved(bumper, -0.48, 0.091, turned=True),
+        place(_light(meshes / "user_rail.stl", 700, dark), 0.272, 0.245),
+        place(bumper, 0.48, 0.091),
+        place(bumper, -0.48, 0.091, turned=True),
     ]
     wheel = [_light(meshes / "wheel.stl", 900, dark, wheel_radius / 0.17775)]
     shapes = {"base": merge_surfaces(base)}

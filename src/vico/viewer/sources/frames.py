@@ -188,9 +188,9 @@ def frames_between(tables: StepTables, skylight: Skylight, first: int, last: int
     for begin in range(0, len(wanted), chunk):
         steps = wanted[begin : begin + chunk]
         begin_step, end_step = steps[0], steps[-1]
-        times = tables.stored("steps", begin_step, end_step)["time"]
-        weather = tables.stored("weather", begin_step, end_step)
-        rows = {name: _ByStep(tables.stored(name, begin_step, end_step)) for name in FRAME_COLUMNS}
+        times = tables.rows_between("steps", begin_step, end_step)["time"]
+        weather = tables.rows_between("weather", begin_step, end_step)
+        rows = {name: _ByStep(tables.rows_between(name, begin_step, end_step)) for name in FRAME_COLUMNS}
         for step in steps:
             time = float(times[step - begin_step])
             air = {key: values[step - begin_step] for key, values in weather.items()} if len(weather["step"]) else None

@@ -135,7 +135,7 @@ class Source:
         self.plans: Callable[[Sequence[str]], Mapping[str, Any]] = lambda names: {}
 
     @classmethod
-    def recorded(cls, path: Path, *, world: Path | None = None) -> Source:
+    def of_run(cls, path: Path, *, world: Path | None = None) -> Source:
         """Return the source of a run folder.
 
         Parameters
@@ -227,13 +227,13 @@ class Source:
         wanted = [a for a in self.agents if not agent or a["name"] == agent]
         if not wanted:
             raise InputError(f"nobody is called {agent!r}")
-        head = self.tables.stored("steps", step, step)
+        head = self.tables.rows_between("steps", step, step)
         if not len(head["step"]):
             raise InputError(f"step {step} is not there")
         events = self.events(step, step)["events"]
-        rows = _rows(self.tables.stored("agents", step, step), "agents")
-        motions = {row["entity"]: row for row in _rows(self.tables.stored("people", step, step), "people")}
-        joints = self.tables.stored("joints", step, step)
+        rows = _rows(self.tables.rows_between("agents", step, step), "agents")
+        motions = {row["entity"]: row for row in _rows(self.tables.rows_between("people", step, step), "people")}
+        joints = self.tables.rows_between("joints", step, step)
         names = [a["name"] for a in wanted]
         plans = self.plans(names) if step == self.last else {}
         about = {row["entity"]: row for row in rows}
@@ -249,7 +249,7 @@ class Source:
 
     def events(self, first: int, last: int, limit: int = 1000) -> dict[str, Any]:
         """Return what ``/api/events`` tells of some steps."""
-        table = self.tables.stored("events", first, last)
+        table = self.tables.rows_between("events", first, last)
         rows = _rows({key: values[:limit] for key, values in table.items()}, "events")
         for row in rows:
             row["data"] = json.loads(row["data"])
@@ -297,7 +297,7 @@ class Source:
         end, oldest = self.last, max(self.last - _SEARCHED_IN_ALL, 0)
         while end >= oldest and len(found) < limit:
             first = max(end - _SEARCHED + 1, 0)
-            for row in reversed(_rows(self.tables.stored("events", first, end), "events")):
+            for row in reversed(_rows(self.tables.rows_between("events", first, end), "events")):
                 if row["kind"] not in ("refused", "collision") and wanted in row["text"].casefold():
                     place = [row["x"], row["y"], row["z"]]
                     entity = entities.get(row["agent"])

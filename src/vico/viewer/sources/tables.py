@@ -34,7 +34,7 @@ class StepTables(Protocol):
     def last(self) -> int:
         """The newest step there is; -1 before the first."""
 
-    def stored(self, table: str, first: int, last: int) -> Columns:
+    def rows_between(self, table: str, first: int, last: int) -> Columns:
         """Return the rows of steps `first` to `last`, both included, as stored, in the order of the format.
 
         Raises
@@ -79,8 +79,8 @@ class RecordedTables:
         with self._lock:
             return self._run.refresh()
 
-    def stored(self, table: str, first: int, last: int) -> Columns:
-        """Return rows as stored; see `StepTables.stored`."""
+    def rows_between(self, table: str, first: int, last: int) -> Columns:
+        """Return rows as stored; see `StepTables.rows_between`."""
         with self._lock:
             rows = self._run.table(table, first, last)
             return {key: _column(rows, key, column) for key, column in TABLES[table].items()}
@@ -147,8 +147,8 @@ class LiveTables:
                 take_line(self._cast, line)
         self._last = step
 
-    def stored(self, table: str, first: int, last: int) -> Columns:
-        """Return rows as stored; see `StepTables.stored`."""
+    def rows_between(self, table: str, first: int, last: int) -> Columns:
+        """Return rows as stored; see `StepTables.rows_between`."""
         with self._lock:
             ring = list(self._ring)
         oldest = ring[0][0] if ring else self._last + 1
@@ -174,7 +174,7 @@ class LiveTables:
             recorded.refresh()
         if recorded is None or recorded.last < last:
             raise InputError(f"steps {first} to {last} are neither kept nor written yet")
-        return recorded.stored(table, first, last)
+        return recorded.rows_between(table, first, last)
 
     def _on_disk(self) -> RecordedTables | None:
         with self._reading:
@@ -261,6 +261,6 @@ class Timeline:
         known, last = len(self._times), self._tables.last
         if last < known:
             return
-        new = self._tables.stored("steps", known, last)
+        new = self._tables.rows_between("steps", known, last)
         self._times = np.concatenate([self._times, new["time"]])
         self._counts = {name: np.concatenate([values, new[name]]) for name, values in self._counts.items()}
