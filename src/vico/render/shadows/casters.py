@@ -199,9 +199,10 @@ def limb_shadow(limb: Any, p: Any, q: Any, r: Any) -> Any:
 AVATAR_HALF_WIDTH = 0.30
 # Whoever is as high as this in the picture throws a shadow with arms and legs, pixels.
 _LIMB_PIXELS = 24.0
-# Lengths of the light's way through an avatar's ball and through a box that make a full shadow, metres; of what is
-# thinner, such as a robot's legs, its thinnest side does.
-_SOFT_BALL, _SOFT_BOX, _THINNEST = 0.22, 0.5, 0.02
+# Lengths of the light's way that make a full shadow, metres.
+_SOFT_BALL = 0.22  # through an avatar's ball
+_SOFT_BOX = 0.5  # through a box; of what is thinner, such as a robot's legs, its thinnest side does
+_THINNEST = 0.02
 # The longest shadow, metres; a sun this low casts no longer ones.
 _LONGEST_SHADOW, _LOWEST_SUN = 14.0, 0.08
 # Out of doors, what is further away than this casts no shadow, metres.
