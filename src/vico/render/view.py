@@ -134,7 +134,7 @@ def is_motion_noticeable(scene: Any, camera: Any, light: Any, coarse: Any, scrat
     """Return whether a moving thing may be seen in a room, or darken something that is.
 
     `coarse`, a `CoarseDepth`, is that of the room without such things: what lies behind all of it is hidden. `scratch`
-    is as from `new_scratch`.
+    is empty `CASTER`, `MODEL_VIEW` and `BOX` records.
     """
     caster, model_view, box = scratch
     reach = shadow_reach(camera)
