@@ -117,7 +117,7 @@ def measured(world: Path, community: Path, turns: int, steps: int) -> tuple[Turn
         Runner(sim, agents, hooks=hooks, faults=faults, director=control).run(wanted)
         source, began = viewer.source, time.process_time()
         for _ in range(20):
-            content = next(source.frames(source.last, source.last)).encoded()
+            content = next(source.frames(source.last, source.last)).to_bytes()
         return watch, (time.process_time() - began) * 50.0, len(content)
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from reporting import machine, publish
 
 from vico.agents.schedule import followers_of
-from vico.cli.demo import compiled_speed, python_speed
+from vico.cli.machine_speed import compiled_speed, python_speed
 from vico.community import read_community
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig

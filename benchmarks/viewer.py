@@ -65,7 +65,7 @@ def main() -> int:
     parser.add_argument("--table", type=Path)
     arguments = parser.parse_args()
     began = time.perf_counter()
-    source = Source.recorded(arguments.run)
+    source = Source.of_run(arguments.run)
     assert source.world is not None
     assert source.tables.run is not None
     city = city_folder(source.world)

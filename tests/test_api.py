@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import fields
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import toy_city
 import vico
+from vico.cli.options import CommunityBuildOptions, WorldBuildOptions
 from vico.errors import InputError
 from vico.world.world import World
 
@@ -30,6 +35,19 @@ def test_every_public_name_is_there_and_documented(name: str) -> None:
 def test_a_name_that_is_not_there_is_told() -> None:
     with pytest.raises(AttributeError, match="module 'vico' has no attribute 'bild_world'"):
         vico.bild_world  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [(vico.build_world, WorldBuildOptions), (vico.build_community, CommunityBuildOptions)],
+)
+def test_the_command_line_has_the_same_defaults(function: Callable[..., Any], options: type) -> None:
+    usual = {field.name: field.default for field in fields(options)}
+    here = {name: one.default for name, one in signature(function).parameters.items() if name in usual}
+    # There `out` may be left out, or a file given for several.
+    both = here.keys() - {"out", "dem"}
+    assert {"seed"} < both
+    assert {name: here[name] for name in both} == {name: usual[name] for name in both}
 
 
 def test_a_community_is_built_written_and_checked(helsinki_path: Path, tmp_path: Path) -> None:

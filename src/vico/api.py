@@ -6,7 +6,6 @@ Everything here is done by the rooms; whoever needs more options calls them: `vi
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from vico.community import Community, CommunityFinding, date_of, read_community,
 from vico.community import build_community as _build_community
 from vico.community import check_community as _check_community
 from vico.errors import InputError
-from vico.geo.overpass import Overpass
 from vico.render import Cameras, render
 from vico.render.world_scene import scene_of
 from vico.world.check import WorldFinding
@@ -27,7 +25,7 @@ from vico.world.folder import read_world as _read_world
 from vico.world.world import World
 from vico.worldgen import pipeline
 from vico.worldgen.previews import viewpoints
-from vico.worldgen.request import Sources, map_for, packaged_extract
+from vico.worldgen.request import Sources, locate_map, packaged_extract
 
 #: Height of a standing person's eyes above the ground, metres.
 EYE_HEIGHT = 1.65
@@ -76,10 +74,8 @@ def build_world(
     if lat is None or lon is None:
         packaged = packaged_extract()
         lat, lon = (packaged.lat, packaged.lon) if osm is None else pipeline.extract_centre(Path(osm))
-    if osm is None:
-        server = os.environ.get("VICO_OVERPASS")
-        osm = map_for(lat, lon, radius, source=None if server == "off" else Overpass(server))
-    sources = Sources(Path(osm), dem=() if dem is None else (Path(dem),))
+    osm = locate_map(lat, lon, radius) if osm is None else Path(osm)
+    sources = Sources(osm, dem=() if dem is None else (Path(dem),))
     pipeline.build_world(sources, lat=lat, lon=lon, half=radius, seed=seed, out=Path(out), force=force)
     return _read_world(Path(out))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from vico.cli import demo
-from vico.cli.demo import REFERENCE_COMPILED, REFERENCE_PYTHON, compiled_speed, python_speed, speed_table
+from vico.cli.machine_speed import REFERENCE_COMPILED, REFERENCE_PYTHON, compiled_speed, python_speed, speed_table
 
 SCRIPT = """import sys
 from pathlib import Path

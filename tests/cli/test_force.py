@@ -9,7 +9,7 @@ import pytest
 
 from command_line import vico
 from vico.challenges.tables.results import EVALUATION_FOLDER
-from vico.cli.demo import EVENING
+from vico.cli.demo import evening_folder
 from vico.community.folder import COMMUNITY_FOLDER
 from vico.datasets.folder import DATASET_FOLDER
 from vico.errors import OutputExistsError
@@ -124,7 +124,8 @@ def test_an_export_is_replaced_and_a_world_is_not_by_an_export(
 
 
 @pytest.mark.parametrize(
-    "kind", [WORLD_FOLDER, COMMUNITY_FOLDER, RUN_FOLDER, EVENING, DATASET_FOLDER, EXPORT_FOLDER, EVALUATION_FOLDER]
+    "kind",
+    [WORLD_FOLDER, COMMUNITY_FOLDER, RUN_FOLDER, evening_folder(), DATASET_FOLDER, EXPORT_FOLDER, EVALUATION_FOLDER],
 )
 def test_every_kind_takes_an_empty_folder_and_no_file(kind: FolderKind, tmp_path: Path) -> None:
     kind.require(tmp_path)
@@ -152,7 +153,7 @@ def test_a_run_that_was_shown_and_reached_into_is_still_a_run(
     from vico.viewer.sources.source import Source
 
     run = shutil.copytree(helsinki_run[0], tmp_path / "run")
-    with ViewerServer(ViewerState(Source.recorded(run), lambda *_: ({}, "")), keep=run):
+    with ViewerServer(ViewerState(Source.of_run(run), lambda *_: ({}, "")), keep=run):
         pass
     (run / interventions.INTERVENTIONS_FILE).write_text("")
     assert (run / ADDRESS).is_file()

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from command_line import interrupted, vico
-from vico.cli import console, film
+from vico.cli import console
 from vico.cli import run as run_verb
 from vico.cli.console import CommandInterrupted, ended_by_signals, exit_code, progress_bars, stopped_between_steps
 from vico.errors import InputError
@@ -22,6 +22,7 @@ from vico.io.files import read_json
 from vico.render.film import FilmWriter, partial_film, read_film, write_film
 from vico.sim.recording import read_run
 from vico.sim.recording.schema import checkpoint_steps
+from vico.viewer import run_film
 
 STEPS = 9
 
@@ -204,7 +205,7 @@ def test_a_film_that_fails_leaves_nothing(tmp_path: Path) -> None:
 def test_an_interrupted_film_keeps_its_frames_and_says_where(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written = film.write_film_of_shots
+    written = run_film.write_film_of_shots
 
     def interrupted(*given: Any, report: Callable[[int, int], None], **more: Any) -> int:
         def told(done: int, count: int) -> None:
@@ -214,7 +215,7 @@ def test_an_interrupted_film_keeps_its_frames_and_says_where(
 
         return written(*given, report=told, **more)
 
-    monkeypatch.setattr(film, "write_film_of_shots", interrupted)
+    monkeypatch.setattr(run_film, "write_film_of_shots", interrupted)
     small = ("--size", "96x64", "--samples", 1, "--quality", "plain", "--fps", 5)
     assert vico("film", whole, "--follow", "resident_0", *small, "--out", tmp_path / "film.mp4") == 130
     assert "film.partial.mp4: stopped after 7 of 45 frames, 1.4 s that can be played" in capsys.readouterr().err

@@ -136,15 +136,15 @@ def test_a_killed_demo_needs_no_force(
     def killed(*_: Any, **__: Any) -> int:
         raise Killed
 
-    monkeypatch.setattr(demo.run_verb, "run", killed)
-    monkeypatch.setattr(demo.world_verb, "build", lambda *_, **__: 0)
-    monkeypatch.setattr(demo.community_verb, "build", lambda *_, **__: 0)
+    monkeypatch.setattr("vico.cli.run.run", killed)
+    monkeypatch.setattr(demo, "world_build", lambda *_, **__: 0)
+    monkeypatch.setattr(demo, "community_build", lambda *_, **__: 0)
     monkeypatch.setattr(demo, "_evening", lambda *_: "")
     for _ in range(2):  # the second time finds what the first one left
         with pytest.raises(Killed):
             demo.demo(tmp_path / "demo")
-    monkeypatch.setattr(demo.run_verb, "run", lambda *_, **__: 0)
-    monkeypatch.setattr(demo.replay_verb, "replay", lambda *_, **__: 0)
+    monkeypatch.setattr("vico.cli.run.run", lambda *_, **__: 0)
+    monkeypatch.setattr(demo, "replay", lambda *_, **__: 0)
     assert demo.demo(tmp_path / "demo") == 0
     assert not (tmp_path / "demo" / ".unfinished").exists()
     printed = capsys.readouterr().out

@@ -32,8 +32,8 @@ def printing(folder: Path, line: str) -> str:
     """Return the command of a program whose verb `doctor` does this instead."""
     script = folder / "program.py"
     script.write_text(
-        "from vico.cli import doctor, main\nfrom vico.cli.console import print_json, print_table\n"
-        f"doctor.doctor = lambda **_: {line} or 0\nmain.main(['doctor'])\n",
+        "from vico.cli import main\nfrom vico.cli.console import print_json, print_table\n"
+        f"main.app._subcommands['doctor'].target = lambda: {line} or 0\nmain.main(['doctor'])\n",
         encoding="utf-8",
     )
     return f"{sys.executable} {script}"

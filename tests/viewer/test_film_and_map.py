@@ -45,7 +45,7 @@ def test_metres_travelled_leave_jumps_out(recording: Recording) -> None:
     tracks = np.zeros_like(recording.tracks)
     tracks[:, 0, 0] = np.arange(len(tracks))  # a metre a second
     tracks[4:, 1, 0] = 80.0  # one jump through a door
-    metres = Recording(**(vars(recording) | {"tracks": tracks})).travelled()
+    metres = Recording(**(vars(recording) | {"tracks": tracks})).travelled_metres()
     assert metres[:2].tolist() == [len(tracks) - 1, 0.0]
 
 

@@ -50,7 +50,7 @@ def url(run: Path) -> Iterator[str]:
 
 
 def shown(run: Path) -> ViewerServer:
-    source = Source.recorded(run)
+    source = Source.of_run(run)
     tables = source.tables.run
     assert tables is not None
     return ViewerServer(ViewerState(source, RecordedViews(tables).view), keep=run)

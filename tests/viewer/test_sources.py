@@ -49,7 +49,7 @@ class Watcher(Hook):
     def _look(self, step: int) -> None:
         assert self.source is not None
         self.tables.add(step, self.recorder.latest, self.recorder.latest_cast)
-        self.seen.append(next(self.source.frames(step, step)).encoded())
+        self.seen.append(next(self.source.frames(step, step)).to_bytes())
         self.moments.append(self.source.moment(step))
 
 
@@ -70,14 +70,14 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Watcher]:
 @pytest.fixture(scope="module")
 def recorded(watched: tuple[Path, Watcher]) -> Source:
     """The same run, read from its folder."""
-    source = Source.recorded(watched[0])
+    source = Source.of_run(watched[0])
     source.world, source.skylight = watched[1].world, watched[1].source.skylight  # type: ignore[union-attr]
     return source
 
 
 def test_a_frame_survives_its_bytes(recorded: Source) -> None:
     frame = next(recorded.frames(30, 30))
-    again, flags, range_id = decode_frame(frame.encoded(flags=NEWEST, range_id=7))
+    again, flags, range_id = decode_frame(frame.to_bytes(flags=NEWEST, range_id=7))
     assert (again.step, again.time, flags, range_id) == (30, 28_820.0, NEWEST, 7)
     np.testing.assert_array_equal(again.sky, frame.sky)
     for table, form in FRAME_COLUMNS.items():
@@ -88,14 +88,14 @@ def test_a_frame_survives_its_bytes(recorded: Source) -> None:
 
 
 def test_bytes_that_are_no_frame_are_refused(recorded: Source) -> None:
-    content = next(recorded.frames(3, 3)).encoded()
+    content = next(recorded.frames(3, 3)).to_bytes()
     for broken in (b"", content[:50], content[:-8], b"X" + content[1:]):
         with pytest.raises(SchemaError):
             decode_frame(broken)
 
 
 def test_a_run_that_goes_on_gives_the_frames_of_its_recording(watched: tuple[Path, Watcher], recorded: Source) -> None:
-    frames = [frame.encoded() for frame in recorded.frames(0, STEPS)]
+    frames = [frame.to_bytes() for frame in recorded.frames(0, STEPS)]
     assert watched[1].seen == frames
 
 
@@ -109,8 +109,8 @@ def test_steps_that_memory_has_forgotten_are_read_from_the_disk(
 ) -> None:
     live = watched[1].source
     assert live is not None
-    newer = [frame.encoded() for frame in live.frames(5, STEPS, 5)]
-    assert newer == [frame.encoded() for frame in recorded.frames(5, STEPS, 5)]
+    newer = [frame.to_bytes() for frame in live.frames(5, STEPS, 5)]
+    assert newer == [frame.to_bytes() for frame in recorded.frames(5, STEPS, 5)]
     assert live.events(0, STEPS) == recorded.events(0, STEPS)
     assert live.cast() == recorded.cast()
     assert live.metrics(0, STEPS, 10) == recorded.metrics(0, STEPS, 10)
@@ -142,7 +142,7 @@ def test_a_run_from_before_the_weather_was_recorded_has_a_sun_and_no_weather(
     old = shutil.copytree(watched[0], tmp_path / "old")
     for path in old.glob("segments/*/weather.parquet"):
         path.unlink()
-    source = Source.recorded(old)
+    source = Source.of_run(old)
     source.skylight = recorded.skylight
     sky = next(source.frames(3, 3)).sky
     assert np.isfinite(sky[:4]).all()

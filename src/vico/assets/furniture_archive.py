@@ -103,7 +103,7 @@ class Archive(AbstractContextManager["Archive"]):
             self._zip = zipfile.ZipFile(io.BytesIO(source) if isinstance(source, bytes) else source)
         except (zipfile.BadZipFile, OSError) as error:
             raise IntegrityError(f"things: {name} is damaged ({error}): install the package again") from None
-        self.entries = dict(self._listed())
+        self.entries = dict(self._read_entries())
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._zip.close()
@@ -127,7 +127,7 @@ class Archive(AbstractContextManager["Archive"]):
             raise IntegrityError(f"things: {self.name}: {path} is larger than {_LARGEST_MEMBER >> 20} MiB")
         return data
 
-    def _listed(self) -> Iterator[tuple[str, ArchiveEntry]]:
+    def _read_entries(self) -> Iterator[tuple[str, ArchiveEntry]]:
         rows: dict[int, dict[str, str]] = {}
         for line in self.read(_LISTING).decode("latin-1").splitlines():
             if found := _PROPERTY.match(line):

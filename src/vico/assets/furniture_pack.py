@@ -141,35 +141,6 @@ class StandIn:
     glow: tuple[str, ...] = ()
 
 
-def fit_stand_ins(
-    pieces: Sequence[StandIn],
-    name: str,
-    models: Mapping[str, Model],
-    look: Callable[[StandIn], tuple[ArchiveEntry, ObjMesh]],
-) -> list[Surface]:
-    """Make the surfaces that stand for one of our models.
-
-    Parameters
-    ----------
-    pieces
-        What it is made of.
-    name
-        The model whose outline they take.
-    models
-        Our models.
-    look
-        Reads a piece's entry and solid.
-    """
-    parts: list[Surface] = []
-    for piece in pieces:
-        if piece.pack == OURS:
-            x, y = piece.box[:2] if piece.box else (0.0, 0.0)
-            parts += [surface.moved(pose_matrix(x, y)) for surface in models[piece.name].surfaces]
-        else:
-            parts += _place_stand_in(piece, models[name], *look(piece))
-    return merge_surfaces(parts)
-
-
 def _place_stand_in(piece: StandIn, ours: Model, entry: ArchiveEntry, solid: ObjMesh) -> list[Surface]:
     upright = _turn_upright(solid.points, entry, piece.turn)
     points, faces, kept = simplify_mesh(upright, solid.faces, piece.triangles, kinds=solid.paint)
@@ -514,7 +485,14 @@ def _bake(opened: Mapping[str, Archive], path: Path, say: Callable[[str], None])
         say(f"things: thinning and fitting {len(STAND_INS)} models")
         for name, pieces in STAND_INS.items():
             try:
-                layers[name] = fit_stand_ins(pieces, name, models, look)
+                parts: list[Surface] = []
+                for stand_in in pieces:
+                    if stand_in.pack == OURS:
+                        x, y = stand_in.box[:2] if stand_in.box else (0.0, 0.0)
+                        parts += [surface.moved(pose_matrix(x, y)) for surface in models[stand_in.name].surfaces]
+                    else:
+                        parts += _place_stand_in(stand_in, models[name], *look(stand_in))
+                layers[name] = merge_surfaces(parts)
             except IntegrityError as error:
                 say(f"things: {name} stays our own model: {error}")
                 continue

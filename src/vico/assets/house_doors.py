@@ -79,11 +79,17 @@ _LEAVES = {
 }
 _NAMES = tuple(_LEAVES)
 _GATE = _NAMES.index("gate")
-# A panel belongs to an entrance that is no farther off its plane, along it and up or down than this, metres.
-_OFF, _ALONG, _UP = 0.3, 3.0, 2.0
+# A panel belongs to an entrance that is no farther off than this, metres.
+_OFF = 0.3  # its plane
+_ALONG = 3.0
+_UP = 2.0  # or down
 _EQUAL = 2e-4  # of texture coordinates
-_THICK, _AJAR = 0.045, math.radians(84.0)  # of leaves: metres, and how far open ones are turned
-_HALL_DEEP, _HALL_SHALLOW, _HALL_BESIDE = 2.4, 1.3, 0.45  # metres
+_THICK = 0.045  # of leaves, metres
+_AJAR = math.radians(84.0)  # how far open leaves are turned
+# Of the hall behind a door, metres.
+_HALL_DEEP = 2.4
+_HALL_SHALLOW = 1.3
+_HALL_BESIDE = 0.45
 #: How far before and behind the plane of a closed leaf the wall is open, metres.
 BEFORE, BEHIND = 0.03, 0.25
 

@@ -19,7 +19,10 @@ RISE = 3.2
 DOOR_HEIGHT = 2.1
 WALL_HEIGHT = 2.7
 THICK = 0.1  # metres between the faces of a wall
-SILL, SHOP_SILL, HEAD = 0.85, 0.4, 2.35
+# Of windows above the floor, metres.
+SILL = 0.85
+SHOP_SILL = 0.4
+HEAD = 2.35
 _TILE = {"planks": 2.0, "tiles": 1.2, "carpet": 2.0, "stone": 1.6, "concrete": 4.0, "parquet": 1.2, "chequer": 1.2}
 _WALL_TILE = 2.4
 _SKIRTING = 5  # rows of a wall's picture

@@ -99,14 +99,11 @@ def installed_folder(package: Package) -> Path | None:
     except (FileNotFoundError, SchemaError):
         return None
     wanted = package.record()
+    wanted["members"] = list(wanted["members"])  # as JSON has them
     same = isinstance(record, dict) and all(
-        record.get(key) == _plain(wanted[key]) for key in ("schema", "name", "version", "sha256", "members")
+        record.get(key) == wanted[key] for key in ("schema", "name", "version", "sha256", "members")
     )
     return folder if same else None
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
 
 
 def fetch(package: Package, *, force: bool = False, say: Callable[[str], None] = lambda _: None) -> Path:

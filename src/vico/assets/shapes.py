@@ -22,10 +22,6 @@ def pose_matrix(x: float = 0.0, y: float = 0.0, z: float = 0.0, yaw: float = 0.0
     return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]], np.float64)
 
 
-def _shift(centre: Vector) -> NDArray[np.float64]:
-    return pose_matrix(float(centre[0]), float(centre[1]), float(centre[2]))
-
-
 def facing_x(x: float, y: float, z: float) -> NDArray[np.float64]:
     """4x4 transform: turn the z axis to +x, then move: what stood on the ground looks forward."""
     return np.array([[0, 0, 1, x], [0, 1, 0, y], [-1, 0, 0, z], [0, 0, 0, 1]], np.float64)
@@ -100,7 +96,8 @@ def lathe(
         for k in range(3):
             np.add.at(normals, triangles[:, k], flat)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return Surface.from_triangles(points, triangles, colour=colour, normals=normals).moved(_shift(centre))
+    shift = pose_matrix(float(centre[0]), float(centre[1]), float(centre[2]))
+    return Surface.from_triangles(points, triangles, colour=colour, normals=normals).moved(shift)
 
 
 def cylinder(

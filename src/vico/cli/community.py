@@ -1,31 +1,25 @@
-"""`vico community build` and `vico check community`."""
+"""`vico community` peoples worlds; `vico check community` is beside it.
+
+What a verb needs is imported when it runs, so that `vico --help` is quick.
+"""
 
 from __future__ import annotations
 
 import time
-from datetime import date as Date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional
+from tyro.extras import SubcommandApp
 
 from vico.cli.console import Report, check_output, print_json, print_table, progress_bars
-from vico.cli.options import CommunityBuildOptions
-from vico.community import (
-    Author,
-    Community,
-    build_community,
-    check_community,
-    date_of,
-    digest_of,
-    read_community,
-    world_of,
-    write_community,
-)
-from vico.community.folder import COMMUNITY_FOLDER
-from vico.community.llm import LlmCommunityAuthor
-from vico.community.model import Origin
+from vico.cli.options import FLAT, CommunityBuildOptions
 from vico.errors import InputError
-from vico.world.folder import read_world
-from vico.world.world import World
+
+if TYPE_CHECKING:
+    from vico.community.llm import LlmCommunityAuthor
+
+community = SubcommandApp()
 
 # The longest answer that a model may give, tokens: the day of a busy person has about two thousand.
 _LONGEST_ANSWER = 4096
@@ -45,8 +39,18 @@ _MEANINGS = {
 }
 
 
-def build(options: CommunityBuildOptions) -> int:
-    """People a world, write the community, and say who lives there and who wrote what."""
+@community.command(name="build")
+def community_build(options: Annotated[CommunityBuildOptions, FLAT]) -> int:
+    """People a world: homes, jobs, groups and a full day, or several, for each resident.
+
+    Example: vico community build helsinki --residents 15 --day friday --days 3 --out people
+
+    Example: vico community build helsinki --llm --llm-budget-tokens 400000 --out people
+    """
+    from vico.community import build_community, date_of, digest_of, write_community
+    from vico.community.folder import COMMUNITY_FOLDER
+    from vico.world.folder import read_world
+
     asks_model = options.asks_model
     check_output(options.out, options.path, force=options.force, kind=COMMUNITY_FOLDER)
     if asks_model and (options.day is not None or options.days != 1):
@@ -55,40 +59,56 @@ def build(options: CommunityBuildOptions) -> int:
     world = read_world(options.path)
     began = time.perf_counter()
     with progress_bars() as report:
-        author = llm_author(options, report) if asks_model else None
-        community = _build_community(world, options, first, author, report)
-    write_community(community, options.out, force=options.force or options.out.is_dir(), world=options.path)
+        author = _llm_author(options, report) if asks_model else None
+        if author is not None:
+            people = build_community(world, residents=options.residents, seed=options.seed, author=author)
+        else:
+            report("people and schedules", 0, 1)
+            people = build_community(
+                world, residents=options.residents, seed=options.seed, date=first, days=options.days
+            )
+            report("people and schedules", 1, 1)
+    write_community(people, options.out, force=options.force or options.out.is_dir(), world=options.path)
     facts = {
         "path": str(options.out),
-        "world": community.world.name,
-        "digest": digest_of(community),
-        "author": community.author,
-        "date": f"{community.weekday} {community.date}",
-        "days": len(community.dates),
-        "residents": len(community.residents),
-        "groups": len(community.groups),
-        "relations": len(community.relations),
+        "world": people.world.name,
+        "digest": digest_of(people),
+        "author": people.author,
+        "date": f"{people.weekday} {people.date}",
+        "days": len(people.dates),
+        "residents": len(people.residents),
+        "groups": len(people.groups),
+        "relations": len(people.relations),
         "seconds": round(time.perf_counter() - began, 2),
     }
-    people = _people(community, world)
+    residents = [
+        {
+            "name": r.name,
+            "age": r.age,
+            "occupation": r.occupation,
+            "home": world.place_by_id[r.home].name,
+            "workplace": world.place_by_id[r.workplace].name if r.workplace else None,
+        }
+        for r in people.residents
+    ]
     told = _authorship_report(author) if author is not None else None
     if options.json:
-        print_json({**facts, "people": people, **({} if told is None else {"llm": told})})
+        print_json({**facts, "people": residents, **({} if told is None else {"llm": told})})
         return 0
     print_table("Community", facts, _MEANINGS)
     rows = {
         str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
-        for p in people[:_SHOWN_RESIDENTS]
+        for p in residents[:_SHOWN_RESIDENTS]
     }
-    if len(people) > _SHOWN_RESIDENTS:
-        rows["..."] = f"{len(people) - _SHOWN_RESIDENTS:,} more; --json tells all"
+    if len(residents) > _SHOWN_RESIDENTS:
+        rows["..."] = f"{len(residents) - _SHOWN_RESIDENTS:,} more; --json tells all"
     print_table("Residents", rows)
     if told is not None:
         _print_authorship(told)
     return 0
 
 
-def llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAuthor:
+def _llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAuthor:
     """Return the language model that options and environment name, as an author.
 
     Raises
@@ -96,6 +116,7 @@ def llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAu
     InputError, MissingFileError, SchemaError
         If no model is named, or an option is unusable.
     """
+    from vico.community.llm import LlmCommunityAuthor
     from vico.io.cache import cache_folder
     from vico.llm import Budget, Connection, LanguageModel, Sampling
 
@@ -108,30 +129,6 @@ def llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAu
         **{name: value for name, value in given.items() if value is not None},
     )
     return LlmCommunityAuthor(model, workers=options.llm_concurrency, only=options.llm_only, progress=report)
-
-
-def _build_community(
-    world: World, options: CommunityBuildOptions, first: Date | None, author: Author | None, report: Report
-) -> Community:
-    if author is not None:
-        return build_community(world, residents=options.residents, seed=options.seed, author=author)
-    report("people and schedules", 0, 1)
-    community = build_community(world, residents=options.residents, seed=options.seed, date=first, days=options.days)
-    report("people and schedules", 1, 1)
-    return community
-
-
-def _people(community: Community, world: World) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": r.name,
-            "age": r.age,
-            "occupation": r.occupation,
-            "home": world.place_by_id[r.home].name,
-            "workplace": world.place_by_id[r.workplace].name if r.workplace else None,
-        }
-        for r in community.residents
-    ]
 
 
 def _authorship_report(author: LlmCommunityAuthor) -> dict[str, Any]:
@@ -154,6 +151,8 @@ def _authorship_report(author: LlmCommunityAuthor) -> dict[str, Any]:
 
 
 def _print_authorship(told: dict[str, Any]) -> None:
+    from vico.community.model import Origin
+
     rows = {
         kind: ", ".join(f"{counts[o.value]} {o.value}" for o in Origin if counts.get(o.value))
         for kind, counts in told["items"].items()
@@ -174,11 +173,25 @@ def _print_authorship(told: dict[str, Any]) -> None:
         print(f"  and {len(left) - _MOST_TROUBLES} more")
 
 
-def day(path: Path, *, day: str, out: Path, force: bool, json: bool) -> int:
-    """Write one day of the community at `path` to `out`."""
+@community.command(name="day")
+def community_day(path: Positional[Path], day: str, out: Path, force: bool = False, json: bool = False) -> int:
+    """Take one of several days of a community, as a community of its own that runs can live through.
+
+    Example: vico community day people --day saturday --out people_saturday
+
+    Args:
+        path: Community folder, built with --days.
+        day: A date like 2025-06-07, or a day of the week like saturday: the first one there is.
+        out: Folder to make; refused if it exists, unless --force.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
+        json: Print the result as JSON.
+    """
+    from vico.community import date_of, digest_of, read_community, world_of, write_community
+    from vico.community.folder import COMMUNITY_FOLDER
+
     check_output(out, path, force=force, kind=COMMUNITY_FOLDER)
-    community = read_community(path)
-    one = community.on(date_of(day, community.dates))
+    people = read_community(path)
+    one = people.on(date_of(day, people.dates))
     write_community(one, out, force=force or out.is_dir(), world=world_of(path))
     facts = {"path": str(out), "digest": digest_of(one), "date": f"{one.weekday} {one.date}"}
     if json:
@@ -188,13 +201,23 @@ def day(path: Path, *, day: str, out: Path, force: bool, json: bool) -> int:
     return 0
 
 
-def check(path: Path, *, world: Path | None = None, json: bool = False) -> int:
-    """Check the community at `path` against its world; 1 if anything is found."""
-    community = read_community(path)
+def check_community(path: Positional[Path], world: Path | None = None, json: bool = False) -> int:
+    """Check that a community is grounded in its world. Exit 1 if anything is wrong.
+
+    Args:
+        path: Community folder.
+        world: World folder; without it, the one the community was made for, if it is still where it was.
+        json: Print JSON.
+    """
+    from vico.community import check_community as findings_of
+    from vico.community import read_community, world_of
+    from vico.world.folder import read_world
+
+    people = read_community(path)
     folder = world or world_of(path)
     if folder is None:
         raise InputError(f"{path}: its world is not where it was; say where it is with --world")
-    findings = check_community(community, read_world(folder))
+    findings = findings_of(people, read_world(folder))
     if json:
         print_json(
             {
@@ -209,7 +232,7 @@ def check(path: Path, *, world: Path | None = None, json: bool = False) -> int:
             print(f"{finding.where}: {finding.what}; {finding.mend}")
     else:
         print(
-            f"{path}: {len(community.residents)} residents and {len(community.groups)} groups, all grounded in "
-            f"{community.world.name}"
+            f"{path}: {len(people.residents)} residents and {len(people.groups)} groups, all grounded in "
+            f"{people.world.name}"
         )
     return 1 if findings else 0

@@ -231,7 +231,7 @@ def ended_by_signals() -> Iterator[None]:
     def stop(number: int, _: FrameType | None) -> None:
         raise CommandInterrupted(number)
 
-    with _signal_handlers({number: stop for number in _ENDING if _is_usual(number)}):
+    with _signal_handlers({number: stop for number in _ENDING if signal.getsignal(number) is signal.SIG_DFL}):
         yield
 
 
@@ -286,10 +286,6 @@ def _print_notice(sentence: str) -> None:
         os.write(2, f"\n{sentence}\n".encode())
     except OSError:
         return  # the terminal is gone; the run is kept all the same
-
-
-def _is_usual(number: int) -> bool:
-    return signal.getsignal(number) is signal.SIG_DFL
 
 
 @contextmanager

@@ -2,8 +2,7 @@
 
 `vico demo` does the main job once, from the packaged map to a page one can look at. `vico warm-up` compiles the hot
 loops, which are kept in the cache folder for every later start. `vico bench` runs one of the checkout's benchmarks
-and prints its tables, with how fast one thread of this machine is beside that of the machine the README's figures
-were measured on.
+in a process of its own and prints its tables, with the speed of this machine beside that of the README's figures.
 """
 
 from __future__ import annotations
@@ -19,50 +18,49 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-from rich.console import Console
+from tyro.conf import Positional
 
-from vico.assets.people import PASSERS_BY, body_of, passer_by
-from vico.cli import (
-    community,
-    film,
-    run,
-    world,
-)
-from vico.cli import (
-    community as community_verb,
-)
-from vico.cli import (
-    film as replay_verb,
-)
-from vico.cli import (
-    run as run_verb,
-)
-from vico.cli import (
-    world as world_verb,
-)
+from vico.cli.community import community_build
 from vico.cli.console import check_output, print_json
-from vico.cli.options import CommunityBuildOptions, RunOptions
-from vico.community.folder import COMMUNITY_FOLDER
+from vico.cli.film import replay
+from vico.cli.options import CommunityBuildOptions, RunOptions, WorldBuildOptions
+from vico.cli.world import world_build
 from vico.errors import MissingFileError, OutputExistsError, StageError, VicoError
-from vico.io.compiled import compiled
-from vico.io.files import check_replaceable
-from vico.sim.recording.schema import RUN_FOLDER
-from vico.sim.robots.path_following import NEIGHBOUR, room_to_turn
-from vico.world.walkable import fill_polygon
-from vico.world.world import WORLD_FOLDER
-from vico.worldgen.request import Sources, packaged_extract
 
-#: A run with the film of it.
-EVENING = replace(RUN_FOLDER, patterns=lambda folder: (*RUN_FOLDER.patterns(folder), _FILM))
+if TYPE_CHECKING:
+    from vico.io.files import FolderKind
+
 _FILM = "film.mp4"
 #: Folders that the demo makes, in the order in which it makes them.
 PARTS = ("world", "community", "run", "evening")
 
 
-def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
-    """Build central Helsinki, people it, simulate half an hour from 08:00 and a rainy evening, show both."""
+def evening_folder() -> FolderKind:
+    """Return the kind of a run's folder with the film of it."""
+    from vico.sim.recording.schema import RUN_FOLDER
+
+    return replace(RUN_FOLDER, patterns=lambda folder: (*RUN_FOLDER.patterns(folder), _FILM))
+
+
+def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> int:
+    """Do the main job once: build central Helsinki, people it, simulate half an hour, show it.
+
+    Args:
+        out: Folder to make; refused if it exists, unless --force.
+        seed: Decides everything that is left to chance.
+        force: Replace the folders world, community, run and evening there; what else lies beside them stays.
+    """
+    from rich.console import Console
+
+    from vico.cli.run import run as simulate
+    from vico.community.folder import COMMUNITY_FOLDER
+    from vico.io.files import check_replaceable
+    from vico.sim.recording.schema import RUN_FOLDER
+    from vico.world.world import WORLD_FOLDER
+    from vico.worldgen.request import packaged_extract
+
     unfinished = out / ".unfinished"
     again = force or unfinished.is_file()
     check_output(out, force=again)
@@ -70,7 +68,8 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
         raise OutputExistsError(f"{out}: is a file; choose another --out")
     world, people, run, evening = (out / name for name in PARTS)
     # What else lies there stays.
-    for folder, kind in ((world, WORLD_FOLDER), (people, COMMUNITY_FOLDER), (run, RUN_FOLDER), (evening, EVENING)):
+    kinds = (WORLD_FOLDER, COMMUNITY_FOLDER, RUN_FOLDER, evening_folder())
+    for folder, kind in zip((world, people, run, evening), kinds, strict=True):
         check_replaceable(folder, force=again, kind=kind)
     console = Console(stderr=True)
     began = time.perf_counter()
@@ -80,15 +79,15 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     for folder in (world, people, run, evening):
         shutil.rmtree(folder, ignore_errors=True)
     console.rule("1 of 5: the world")
-    world_verb.build(Sources(extract.path), out=world, centre=(extract.lat, extract.lon), half=extract.half, seed=seed)
+    world_build(WorldBuildOptions(world, extract.path, extract.lat, extract.lon, radius=extract.half, seed=seed))
     console.rule("2 of 5: its people")
-    community_verb.build(CommunityBuildOptions(world, people, seed=seed))
+    community_build(CommunityBuildOptions(world, people, seed=seed))
     with ThreadPoolExecutor(1) as beside:
         console.rule("3 of 5: half an hour of their morning; beside it, an evening in the rain with robots")
         filmed = beside.submit(_evening, world, people, evening, seed)
-        run_verb.run(RunOptions(world, people, out=run, seed=seed))
+        simulate(RunOptions(world, people, out=run, seed=seed))
         console.rule("4 of 5: something to look at")
-        replay_verb.replay(run, film=True)
+        replay(run)
         console.rule("5 of 5: the evening")
         print(filmed.result(), end="")
     unfinished.unlink()
@@ -113,20 +112,8 @@ def _evening(world: Path, people: Path, out: Path, seed: int) -> str:
     vico = [sys.executable, "-m", "vico.cli.main"]
     moment = ["--start", "17:45", "--date", "2026-10-20", "--utc-offset", "3", "--weather", "rain", "--steps", "36"]
     cast = ["--robots", "husky,go2,h1,drone", "--cars", "40", "--pedestrians", "80", "--junctions", "signals"]
-    run = [
-        *vico,
-        "run",
-        str(world),
-        str(people),
-        "--out",
-        str(out),
-        *moment,
-        *cast,
-        "--observe",
-        "none",
-        "--seed",
-        str(seed),
-    ]
+    given = [str(world), str(people), "--out", str(out), "--observe", "none", "--seed", str(seed)]
+    run = [*vico, "run", *given, *moment, *cast]
     around_the_h1 = ["--follow", "robot_2", "--view", "orbit", "--start", "24"]
     made = ["--out", str(out / _FILM), "--size", "640x360", "--fps", "15", "--samples", "1"]
     told = ""
@@ -138,22 +125,29 @@ def _evening(world: Path, people: Path, out: Path, seed: int) -> str:
     return told
 
 
-_WARM_UP_RADIUS = 150.0
+_WARM_UP_RADIUS = 150.0  # half the world's side, metres
 
 
 def warm_up() -> int:
-    """Build a small world, live in it for a few seconds, look at it: whatever a real run compiles is compiled.
+    """Compile the hot loops once, so that the first run starts quickly."""
+    import numpy as np
 
-    The bodies of passers-by are made, too.
-    """
+    from vico.assets.people import PASSERS_BY, body_of, passer_by
+    from vico.cli.run import run as simulate
+    from vico.sim.robots.path_following import NEIGHBOUR, room_to_turn
+    from vico.world.walkable import fill_polygon
+    from vico.worldgen.request import packaged_extract
+
     began = time.perf_counter()
     place = packaged_extract()
     with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
         here = Path(folder)
-        world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=_WARM_UP_RADIUS)
-        community.build(CommunityBuildOptions(here / "world", here / "people", residents=6))
-        run.run(RunOptions(here / "world", here / "people", out=here / "run", steps=60, cars=5, pedestrians=5))
-        film.replay(here / "run", film=True)
+        world, people = here / "world", here / "people"
+        # A small world, a few seconds in it and a look at it: whatever a real run compiles is compiled.
+        world_build(WorldBuildOptions(world, place.path, place.lat, place.lon, radius=_WARM_UP_RADIUS))
+        community_build(CommunityBuildOptions(world, people, residents=6))
+        simulate(RunOptions(world, people, out=here / "run", steps=60, cars=5, pedestrians=5))
+        replay(here / "run")
     # What so small a place and so short a time may not need: ramps of bridges, a robot that turns on the spot.
     ring = np.array([0.5, 2.5, 1.5])
     fill_polygon(np.zeros((4, 4), np.float32), ring, ring[::-1].copy(), np.array([0, 3]), 2.0, 1.0, 0.5)
@@ -162,60 +156,6 @@ def warm_up() -> int:
         body_of(passer_by(look))  # kept in the cache
     print(f"compiled and tried in {time.perf_counter() - began:.0f} s", file=sys.stderr)
     return 0
-
-
-# The machine of benchmarks/results, in million turns a second.
-REFERENCE_PYTHON, REFERENCE_COMPILED = 107.0, 701.0
-_TURNS, _COMPILED_TURNS, _SPEED_TRIES = 1_000_000, 20_000_000, 5
-
-
-def python_speed() -> float:
-    """Return how many million turns of an empty loop Python takes a second: the fastest of a few tries."""
-    best = float("inf")
-    for _ in range(_SPEED_TRIES):
-        began = time.perf_counter()
-        for _ in range(_TURNS):
-            pass
-        best = min(best, time.perf_counter() - began)
-    return _TURNS / best / 1e6
-
-
-def compiled_speed() -> float:
-    """Return how many million turns a second compiled code takes, where each waits for the last one's product."""
-    best = float("inf")
-    _turn(1)
-    for _ in range(_SPEED_TRIES):
-        began = time.perf_counter()
-        _turn(_COMPILED_TURNS)
-        best = min(best, time.perf_counter() - began)
-    return _COMPILED_TURNS / best / 1e6
-
-
-def speed_table() -> str:
-    """Return a table in markdown of this machine's speeds beside the reference's, with what to expect of figures."""
-    lines = [
-        "## This machine beside that of the README's figures",
-        "",
-        "One thread, million turns of a loop a second. The README's figures are to be scaled by about the last column;",
-        "other programs that run meanwhile take their share, too (`benchmarks/under_load.py`).",
-        "",
-        "| loop | here | there | here / there |",
-        "|---|---|---|---|",
-    ]
-    for name, here, there in (
-        ("Python, empty", python_speed(), REFERENCE_PYTHON),
-        ("compiled, products", compiled_speed(), REFERENCE_COMPILED),
-    ):
-        lines.append(f"| {name} | {here:.0f} | {there:.0f} | {here / there:.2f} |")
-    return "\n".join(lines) + "\n"
-
-
-@compiled
-def _turn(turns: int) -> float:
-    value = 0.5
-    for _ in range(turns):
-        value = 3.7 * value * (1.0 - value)
-    return value
 
 
 SCRIPTS = Path(__file__).parents[3] / "benchmarks"
@@ -228,27 +168,23 @@ class BenchmarkError(VicoError, RuntimeError):
     """A benchmark did not come to its end."""
 
 
-def bench(what: str, *, table: Path | None = None, json: bool = False, options: tuple[str, ...] = ()) -> int:
-    """Measure one thing in a process of its own; print the markdown it reports, or its tables as JSON.
+def bench(
+    what: Positional[Literal["render", "sim", "world", "memory"]], table: Path | None = None, json: bool = False
+) -> int:
+    """Measure speed and memory on this machine, on the packaged place with 15 residents.
 
-    Beside it stands how fast this machine is, and that of the README's figures.
+    Example: vico bench render
 
-    Parameters
-    ----------
-    what
-        ``render``, ``sim``, ``world`` or ``memory``.
-    table
-        File for the report.
-    options
-        More arguments for the script.
+    Example: vico bench world --table benchmarks/results/world.md
 
-    Raises
-    ------
-    MissingFileError
-        If vico was installed without its repository.
-    BenchmarkError
-        If the script failed.
+    Args:
+        what: What to measure.
+        table: Write the table to this file, too.
+        json: Print the tables as JSON.
     """
+    from vico.cli.machine_speed import speed_table
+    from vico.worldgen.request import packaged_extract
+
     script = SCRIPTS / f"{what}.py"
     if not script.exists():
         raise MissingFileError(
@@ -256,10 +192,17 @@ def bench(what: str, *, table: Path | None = None, json: bool = False, options: 
         )
     with tempfile.TemporaryDirectory(prefix="vico-") as folder:
         here = Path(folder)
-        _prepare(here, _BENCHMARK_INPUTS[what])
+        parts = _BENCHMARK_INPUTS[what]
+        place = packaged_extract()
+        world, people = here / "world", here / "people"
+        with redirect_stdout(io.StringIO()):
+            if "world" in parts:
+                world_build(WorldBuildOptions(world, place.path, place.lat, place.lon, radius=place.half))
+            if "people" in parts:
+                community_build(CommunityBuildOptions(world, people, residents=RESIDENTS))
         report = here / "report.md"
-        given = [str(here / name) for name in _BENCHMARK_INPUTS[what]]
-        command = [sys.executable, str(script), *given, "--table", str(report), *options]
+        given = [str(here / name) for name in parts]
+        command = [sys.executable, str(script), *given, "--table", str(report)]
         # Stdout is ours: the report is printed once, from the file.
         done = subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
         if done.returncode or not report.exists():
@@ -275,15 +218,6 @@ def bench(what: str, *, table: Path | None = None, json: bool = False, options: 
     else:
         print(f"{text}\nSeconds and megabytes: less is better. Times real time: more is better.\n\n{speeds}")
     return 0
-
-
-def _prepare(here: Path, parts: tuple[str, ...]) -> None:
-    place = packaged_extract()
-    with redirect_stdout(io.StringIO()):
-        if "world" in parts:
-            world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=place.half)
-        if "people" in parts:
-            community.build(CommunityBuildOptions(here / "world", here / "people", residents=RESIDENTS))
 
 
 def tables_of(text: str) -> list[dict[str, object]]:

@@ -5,10 +5,8 @@ It answers in seconds: nothing is compiled, unless everything is to be tried (`-
 
 from __future__ import annotations
 
-import importlib.metadata
 import json as json_files
 import os
-import platform
 import re
 import shutil
 import subprocess
@@ -17,9 +15,6 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-
-from rich.console import Console
-from rich.table import Table
 
 from vico.cli.console import print_json
 
@@ -57,13 +52,10 @@ class Diagnosis:
     mend: str = ""
 
 
-def _python() -> Diagnosis:
-    ok = (3, 11) <= sys.version_info[:2] < (3, 15)
-    return Diagnosis("Python", ok, True, platform.python_version(), "install Python 3.11, 3.12, 3.13 or 3.14")
-
-
 def _packages() -> list[Diagnosis]:
     """Look for the packages of the default install, and import each: what is installed may not load."""
+    import importlib.metadata
+
     try:
         told = importlib.metadata.requires("virtual-community") or []
     except importlib.metadata.PackageNotFoundError:
@@ -111,6 +103,8 @@ def _not_importable(modules: list[str]) -> dict[str, str]:
 
 
 def _netconvert() -> Diagnosis:
+    import importlib.metadata
+
     mend = "pip install 'virtual-community[worldgen]' to build worlds"
     try:
         return Diagnosis("eclipse-sumo", True, False, importlib.metadata.version("eclipse-sumo"))
@@ -201,15 +195,30 @@ def findings(*, thorough: bool = False) -> list[Diagnosis]:
     thorough
         Also draw, write a film and simulate. The first time that compiles for a minute or more.
     """
-    found = [_python(), *_packages(), _netconvert()]
+    import platform
+
+    is_supported = (3, 11) <= sys.version_info[:2] < (3, 15)
+    found = [
+        Diagnosis("Python", is_supported, True, platform.python_version(), "install Python 3.11, 3.12, 3.13 or 3.14"),
+        *_packages(),
+        _netconvert(),
+    ]
     checks: list[Callable[[], Diagnosis]] = [_memory, _disk]
     if all(one.ok or not one.needed for one in found):  # what follows needs the packages
         checks += [_compiled_code, *((_frame, _film, _physics) if thorough else ())]
     return found + [check() for check in checks]
 
 
-def doctor(*, thorough: bool = False, json: bool = False) -> int:
-    """Print the findings; 1 if something needed is missing."""
+def doctor(thorough: bool = False, json: bool = False) -> int:
+    """Say whether this machine has what vico needs, and what is missing. Exit 1 if something needed is missing.
+
+    Args:
+        thorough: Try it all, too: draw, write a film, simulate. Where nothing is compiled yet that takes minutes.
+        json: Print JSON.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
     found = findings(thorough=thorough)
     if json:
         print_json([asdict(finding) for finding in found])

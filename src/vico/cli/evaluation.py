@@ -22,7 +22,7 @@ from tyro.extras import SubcommandApp
 
 from vico.cli.console import check_output, print_json
 from vico.cli.leaderboard import add_to_leaderboard
-from vico.cli.options import Hosts, RayAddress, Words
+from vico.cli.options import FLAT, Hosts, RayAddress, Words
 from vico.errors import InputError, OutputError, OutputExistsError
 from vico.io.files import is_being_written, new_folder, write_errors
 from vico.threads import workers as processors
@@ -41,223 +41,113 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class EvaluationOptions:
-    """What every `vico eval` is asked for.
+    """What every `vico eval` is asked for."""
 
-    Attributes
-    ----------
-    worlds
-        World folders, or their URLs (s3://BUCKET/worlds/helsinki); one episode for each world, seed, category and
-        method.
-    out
-        Folder for tasks, episodes and results, or a URL like s3://BUCKET/results (the extra "s3"); refused if it
-        exists, unless --resume or --force.
-    method
-        One of the challenge's (of assistant tasks also human: you, at a page), my_module:MyAgent
-        (path/to/file.py:MyAgent), or two joined by +. Give it several times
-        to judge several in the same tasks.
-    against
-        The method that the others are compared with; the first one without.
-    seeds
-        Episodes a world, seeded 0, 1, ...
-    first_seed
-        Or this and on.
-    workers
-        Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
-    ray
-        Play on a Ray cluster instead (the extra "ray"): its address; without one on that which runs here, or on one
-        that is started for the occasion. OUT and the worlds must be on a folder that all machines share, or URLs.
-    resume
-        Go on in OUT: episodes that are there and would come to the same are kept, what is missing is played.
-    record
-        Keep each episode's run (OUT/runs), for vico replay and the viewer.
-    compare
-        Put the published rows beside ours.
-    leaderboard
-        Add what it comes to to this leaderboard file; it is made if it is not there.
-    date
-        Of the leaderboard's entries, YYYY-MM-DD; left out without.
-    deadline
-        Seconds an agent of yours has for an action; who is late waits a step. 0 waits for it as long as it takes.
-    in_process
-        Ask agents of yours in the process that simulates, where nothing keeps them from the truth: for a debugger.
-    force
-        Replace what this verb made there before; refused if the folder holds anything else.
-    json
-        Print the results as JSON.
-    """
-
+    #: World folders, or their URLs (s3://BUCKET/worlds/helsinki); one episode for each world, seed, category and
+    #: method.
     worlds: Words
+    #: Folder for tasks, episodes and results, or a URL like s3://BUCKET/results (the extra "s3"); refused if it exists,
+    #: unless --resume or --force.
     out: str
+    #: One of the challenge's (of assistant tasks also human: you, at a page),
+    #: my_module:MyAgent (path/to/file.py:MyAgent), or two joined by +. Give it several times to judge several in the
+    #: same tasks.
     method: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="METHOD")] = ()
-    against: str = ""
-    seeds: int = 3
-    first_seed: int = 0
-    workers: int = 0
+    against: str = ""  # The method that the others are compared with; the first one without.
+    seeds: int = 3  # Episodes a world, seeded 0, 1, ...
+    first_seed: int = 0  # Or this and on.
+    workers: int = 0  # Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
+    #: Play on a Ray cluster instead (the extra "ray"): its address; without one on that which runs here, or on one that
+    #: is started for the occasion. OUT and the worlds must be on a folder that all machines share, or URLs.
     ray: RayAddress = None
+    #: Go on in OUT: episodes that are there and would come to the same are kept, what is missing is played.
     resume: bool = False
-    record: bool = False
-    compare: bool = False
-    leaderboard: Path | None = None
-    date: str | None = None
+    record: bool = False  # Keep each episode's run (OUT/runs), for vico replay and the viewer.
+    compare: bool = False  # Put the published rows beside ours.
+    leaderboard: Path | None = None  # Add what it comes to to this leaderboard file; it is made if it is not there.
+    date: str | None = None  # Of the leaderboard's entries, YYYY-MM-DD; left out without.
+    #: Seconds an agent of yours has for an action; who is late waits a step. 0 waits for it as long as it takes.
     deadline: float = 60.0
+    #: Ask agents of yours in the process that simulates, where nothing keeps them from the truth: for a debugger.
     in_process: bool = False
-    force: bool = False
-    json: bool = False
+    force: bool = False  # Replace what this verb made there before; refused if the folder holds anything else.
+    json: bool = False  # Print the results as JSON.
 
 
-Common = Annotated[EvaluationOptions, tyro.conf.arg(name="")]
+Common = Annotated[EvaluationOptions, FLAT]
 
 
 @dataclass(frozen=True)
 class AssistantOptions:
-    """What `vico eval assistant` is asked for.
+    """What `vico eval assistant` is asked for."""
 
-    Attributes
-    ----------
-    common
-        What every evaluation is asked for.
-    category
-        What is asked of the assistants.
-    assistants
-        How many of them work together.
-    advanced
-        The harder tasks: more places to look in, half the distances.
-    no_distance
-        Planners do not reckon with distances.
-    steps
-        Seconds an episode may last.
-    subtasks
-        How many of the six subtasks of a task are asked for: the first ones.
-    port
-        With --method human: where the page is that one plays at; 0 takes a free one.
-    allow_host
-        With --method human: a name, beside this machine's own, under which a proxy or a forwarded port shows the page.
-    waits
-        With --method human: seconds that an episode waits for a person who has not come, or has left; it counts as not
-        played then.
-    """
-
-    common: Common
-    category: Literal["carry", "delivery", "search", "all"] = "delivery"
-    assistants: int = 1
-    advanced: bool = False
-    no_distance: bool = False
-    steps: int = 1500
-    subtasks: int = 6
-    port: int = 0
+    common: Common  # What every evaluation is asked for.
+    category: Literal["carry", "delivery", "search", "all"] = "delivery"  # What is asked of the assistants.
+    assistants: int = 1  # How many of them work together.
+    advanced: bool = False  # The harder tasks: more places to look in, half the distances.
+    no_distance: bool = False  # Planners do not reckon with distances.
+    steps: int = 1500  # Seconds an episode may last.
+    subtasks: int = 6  # How many of the six subtasks of a task are asked for: the first ones.
+    port: int = 0  # With --method human: where the page is that one plays at; 0 takes a free one.
+    #: With --method human: a name, beside this machine's own, under which a proxy or a forwarded port shows the page.
     allow_host: Hosts = ()
+    #: With --method human: seconds that an episode waits for a person who has not come, or has left; it counts as not
+    #: played then.
     waits: float = 600.0
 
 
 @dataclass(frozen=True)
 class InfluenceOptions:
-    """What `vico eval influence` is asked for.
+    """What `vico eval influence` is asked for."""
 
-    Attributes
-    ----------
-    common
-        What every evaluation is asked for.
-    start
-        When the day of talk begins, HH:MM; the challenge's own time without.
-    hours
-        How long it is; 0 for the challenge's own length.
-    simulation
-        With bodies, or by schedule: members are where their day says, and walks take what the router says.
-    members
-        Who answers and ranks: the opinion model, or a language model.
-    target_model
-        Language model that chooses whom to talk to, for methods that have one.
-    dialogue_model
-        Language model that talks.
-    member_model
-        Language model of the members, with ``--members llm``.
-    """
-
-    common: Common
-    start: str = ""
-    hours: float = 0.0
+    common: Common  # What every evaluation is asked for.
+    start: str = ""  # When the day of talk begins, HH:MM; the challenge's own time without.
+    hours: float = 0.0  # How long it is; 0 for the challenge's own length.
+    #: With bodies, or by schedule: members are where their day says, and walks take what the router says.
     simulation: Literal["full", "schedule"] = "full"
-    members: Literal["model", "llm"] = "model"
-    target_model: str = ""
-    dialogue_model: str = ""
-    member_model: str = ""
+    members: Literal["model", "llm"] = "model"  # Who answers and ranks: the opinion model, or a language model.
+    target_model: str = ""  # Language model that chooses whom to talk to, for methods that have one.
+    dialogue_model: str = ""  # Language model that talks.
+    member_model: str = ""  # Language model of the members, with ``--members llm``.
 
 
 @dataclass(frozen=True)
 class CommuteOptions:
-    """What `vico eval commute` is asked for.
+    """What `vico eval commute` is asked for."""
 
-    Attributes
-    ----------
-    common
-        What every evaluation is asked for.
-    hours
-        From the first leaving to the end of the day; 0 for the challenge's own.
-    """
-
-    common: Common
-    hours: float = 0.0
+    common: Common  # What every evaluation is asked for.
+    hours: float = 0.0  # From the first leaving to the end of the day; 0 for the challenge's own.
 
 
 @dataclass(frozen=True)
 class TeamingOptions:
-    """What `vico eval teaming` is asked for.
+    """What `vico eval teaming` is asked for."""
 
-    Attributes
-    ----------
-    common
-        What every evaluation is asked for.
-    category
-        Of the tasks.
-    steps
-        Seconds of an episode at most.
-    period
-        Seconds between two actions of a robot: 0.5 is 2 Hz.
-    """
-
-    common: Common
-    category: Literal["accompany", "guide", "spot", "all"] = "all"
-    steps: int = 600
-    period: float = 0.5
+    common: Common  # What every evaluation is asked for.
+    category: Literal["accompany", "guide", "spot", "all"] = "all"  # Of the tasks.
+    steps: int = 600  # Seconds of an episode at most.
+    period: float = 0.5  # Seconds between two actions of a robot: 0.5 is 2 Hz.
 
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """What `vico eval robot` is asked for.
+    """What `vico eval robot` is asked for."""
 
-    Attributes
-    ----------
-    common
-        What every evaluation is asked for.
-    category
-        Of the tasks.
-    steps
-        Seconds of an episode at most.
-    period
-        Seconds between two actions of a robot: 0.05 is 20 Hz.
-    oracle_grasp
-        Hands never lose what they closed on; without it friction alone holds.
-    policy
-        What training has written: for rl a file, for rl-decomposed the folder with both or LIFT.npz,PLACE.npz, for vla
-        a file or a LeRobot policy's folder. With several such methods METHOD=FILE, once for each.
-    """
-
-    common: Common
-    category: Literal["carry", "deliver", "all"] = "all"
-    steps: int = 1500
-    period: float = 0.05
-    oracle_grasp: bool = False
+    common: Common  # What every evaluation is asked for.
+    category: Literal["carry", "deliver", "all"] = "all"  # Of the tasks.
+    steps: int = 1500  # Seconds of an episode at most.
+    period: float = 0.05  # Seconds between two actions of a robot: 0.05 is 20 Hz.
+    oracle_grasp: bool = False  # Hands never lose what they closed on; without it friction alone holds.
+    #: What training has written: for rl a file, for rl-decomposed the folder with both or LIFT.npz,PLACE.npz, for vla a
+    #: file or a LeRobot policy's folder. With several such methods METHOD=FILE, once for each.
     policy: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
 
-
-# The fields of a record are options of the verb itself, not of a part of it.
-_FLAT = tyro.conf.arg(name="")
 
 evaluation = SubcommandApp()
 
 
 @evaluation.command(name="assistant")
-def evaluate_assistant(options: Annotated[AssistantOptions, _FLAT]) -> int:
+def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
     """Judge planners on the community assistant tasks.
 
     Exit 0 if every episode was played, 1 if some were not (the table says why), 2 for bad input. The same command goes
@@ -270,54 +160,6 @@ def evaluate_assistant(options: Annotated[AssistantOptions, _FLAT]) -> int:
 
     Example: vico eval assistant --category search --method my_module:MyAgent --worlds helsinki --record --out mine
     """
-    return judge_assistant(options)
-
-
-@evaluation.command(name="influence")
-def evaluate_influence(options: Annotated[InfluenceOptions, _FLAT]) -> int:
-    """Judge strategies that compete for a community's friendship; a method is a pair, ours+nearest.
-
-    Example: vico eval influence --method ours+random --method ours+nearest --worlds helsinki monaco --out results
-
-    Example: vico eval influence --method llm+llm --target-model o1 --dialogue-model gpt-4o --worlds helsinki --out llm
-    """
-    return judge_influence(options)
-
-
-@evaluation.command(name="commute")
-def evaluate_commute(options: Annotated[CommuteOptions, _FLAT]) -> int:
-    """Judge how agents get around on a day of commutes.
-
-    Example: vico eval commute --method rule --method ours --worlds helsinki monaco --seeds 10 --compare --out results
-    """
-    return judge_commute(options)
-
-
-@evaluation.command(name="robot")
-def evaluate_robot(options: Annotated[RobotOptions, _FLAT]) -> int:
-    """Judge robots with an arm and a deck that bring things, and go along with people, by real contact.
-
-    Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
-    Example: vico eval robot --method rl --policy runs/whole/policy.npz --worlds helsinki --out results
-    """
-    return judge_robot(options)
-
-
-@evaluation.command(name="teaming")
-def evaluate_teaming(options: Annotated[TeamingOptions, _FLAT]) -> int:
-    """Judge a humanoid, a quadruped and a drone at work with a person or another robot.
-
-    Example: vico eval teaming --category guide --method heuristic --method alone --worlds helsinki --out results
-    """
-    return judge_teaming(options)
-
-
-#: `evaluate` with all but where to, and who is told.
-Play = Callable[..., "list[Outcome]"]
-
-
-def judge_assistant(options: AssistantOptions) -> int:
-    """Judge planners on the community assistant tasks."""
     from vico.challenges.assistant.tasks import SUBTASKS
 
     if not 1 <= options.assistants <= 2:
@@ -334,27 +176,29 @@ def judge_assistant(options: AssistantOptions) -> int:
         setting = {**setting, "subtasks": options.subtasks}
     categories = None if options.category == "all" else (options.category,)
     if any("human" in method.split("+") for method in options.common.method):
-        return _by_hand(categories, setting, options)
+        # A person plays at a page of this machine, one episode after the other, each recorded.
+        from vico.cli.live import city_of, print_address
+        from vico.viewer import human_evaluation
+
+        if options.common.ray is not None:
+            raise InputError("eval: --method human is played at this machine; leave out --ray")
+        require_server()
+        human_evaluation.AT_THE_PAGE.open(
+            city=city_of, announce=print_address, port=options.port, waits=options.waits, hosts=options.allow_host
+        )
+        common = replace(options.common, workers=1, record=True)
+        return judge(human_evaluation.CHALLENGE, categories, setting, common)
     return judge("assistant", categories, setting, options.common, methods=("heuristic",))
 
 
-def _by_hand(categories: Sequence[str] | None, setting: Setting, options: AssistantOptions) -> int:
-    """Judge a person, who plays at a page of this machine, one episode after the other, each recorded."""
-    from vico.cli.live import city_of, print_address
-    from vico.viewer import human_evaluation
+@evaluation.command(name="influence")
+def evaluate_influence(options: Annotated[InfluenceOptions, FLAT]) -> int:
+    """Judge strategies that compete for a community's friendship; a method is a pair, ours+nearest.
 
-    if options.common.ray is not None:
-        raise InputError("eval: --method human is played at this machine; leave out --ray")
-    require_server()
-    human_evaluation.AT_THE_PAGE.open(
-        city=city_of, announce=print_address, port=options.port, waits=options.waits, hosts=options.allow_host
-    )
-    common = replace(options.common, workers=1, record=True)
-    return judge(human_evaluation.CHALLENGE, categories, setting, common)
+    Example: vico eval influence --method ours+random --method ours+nearest --worlds helsinki monaco --out results
 
-
-def judge_influence(options: InfluenceOptions) -> int:
-    """Judge strategies that compete for a community's friendship."""
+    Example: vico eval influence --method llm+llm --target-model o1 --dialogue-model gpt-4o --worlds helsinki --out llm
+    """
     if not options.hours >= 0:
         raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
     usual = InfluenceOptions(options.common)
@@ -363,24 +207,24 @@ def judge_influence(options: InfluenceOptions) -> int:
     return judge("influence", None, asked, options.common)
 
 
-def judge_commute(options: CommuteOptions) -> int:
-    """Judge how agents get around on a day of commutes."""
+@evaluation.command(name="commute")
+def evaluate_commute(options: Annotated[CommuteOptions, FLAT]) -> int:
+    """Judge how agents get around on a day of commutes.
+
+    Example: vico eval commute --method rule --method ours --worlds helsinki monaco --seeds 10 --compare --out results
+    """
     if not options.hours >= 0:
         raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
     return judge("commute", None, {"hours": options.hours} if options.hours else {}, options.common)
 
 
-def judge_teaming(options: TeamingOptions) -> int:
-    """Judge robots at work with a person or with each other."""
-    if options.steps < 1:
-        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
-    categories = None if options.category == "all" else (options.category,)
-    setting: Setting = {"steps": options.steps, "period": options.period}
-    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
+@evaluation.command(name="robot")
+def evaluate_robot(options: Annotated[RobotOptions, FLAT]) -> int:
+    """Judge robots with an arm and a deck that bring things, and go along with people, by real contact.
 
-
-def judge_robot(options: RobotOptions) -> int:
-    """Judge robots that bring things, and go along with people."""
+    Example: vico eval robot --category deliver --method heuristic --method alone --worlds helsinki --out results
+    Example: vico eval robot --method rl --policy runs/whole/policy.npz --worlds helsinki --out results
+    """
     if options.steps < 1:
         raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
     categories = None if options.category == "all" else (options.category,)
@@ -390,6 +234,23 @@ def judge_robot(options: RobotOptions) -> int:
     setting: Setting = {"steps": options.steps, "period": options.period, **by_oracle}
     policies = policy_settings(options.common.method, options.policy)
     return judge("robot", categories, setting, options.common, methods=("heuristic",), of_method=policies)
+
+
+@evaluation.command(name="teaming")
+def evaluate_teaming(options: Annotated[TeamingOptions, FLAT]) -> int:
+    """Judge a humanoid, a quadruped and a drone at work with a person or another robot.
+
+    Example: vico eval teaming --category guide --method heuristic --method alone --worlds helsinki --out results
+    """
+    if options.steps < 1:
+        raise InputError(f"eval: --steps {options.steps}; give seconds, 1 or more")
+    categories = None if options.category == "all" else (options.category,)
+    setting: Setting = {"steps": options.steps, "period": options.period}
+    return judge("teaming", categories, setting, options.common, methods=("heuristic",))
+
+
+#: `evaluate` with all but where to, and who is told.
+Play = Callable[..., "list[Outcome]"]
 
 
 def judge(
@@ -597,13 +458,13 @@ def _reporting() -> Iterator[tuple[ChallengeProgress | None, Finished]]:
                 tasks[label] = bars.add_task(label, total=limit)
             bars.update(tasks[label], completed=step, total=limit)
 
-        def finished(outcome: Outcome, done: int, total: int) -> None:
+        def close_bar(outcome: Outcome, done: int, total: int) -> None:
             bars.update(whole, completed=done, total=total)
             label = label_of(outcome.job)
             if label in tasks:
                 bars.remove_task(tasks.pop(label))
 
-        yield progress, finished
+        yield progress, close_bar
 
 
 def _print_outcome(outcome: Outcome, done: int, total: int) -> None:

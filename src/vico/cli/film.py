@@ -1,43 +1,86 @@
 """`vico film`, `vico still`, `vico replay` and `vico score-pictures`: pictures of recorded runs.
 
 Films and stills show what happened in a recorded run, from beside somebody. A replay is the page and the film of a
-whole run. Scores are FID and KID of a folder of pictures against one of photos.
+whole run. Scores are FID and KID of a folder of pictures against one of photos. What a verb needs is imported when it
+runs, so that `vico --help` is quick.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
+from tyro.conf import Positional
 
 from vico.cli.console import CommandInterrupted, Report, print_json, print_table, progress_bars, signal_of
-from vico.cli.live import city_of
-from vico.cli.viewer import FilmOptions, StillOptions
-from vico.clock import seconds_of_day
+from vico.cli.options import FLAT
 from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError, some_of
-from vico.render import render_top_down
-from vico.render.film import partial_film
-from vico.render.frames import RenderQuality
-from vico.render.world_scene import scene_of
-from vico.sim.config import find_by_name
-from vico.sim.recording import Run, read_run
-from vico.sim.recording.schema import DEMO_FILM, REPLAY
-from vico.viewer.picture_scores import FeatureNetwork, pictures_in, scores
-from vico.viewer.replay import recording_of, write_demo_film, write_replay
-from vico.viewer.run_film import FilmSettings, RepeatedRun, Span, read_shots, write_film_of_shots, write_still
 from vico.viewer.server import require_server
-from vico.world.folder import is_world, read_world
-from vico.world.world import World
-from vico.worldgen.previews import Overhead
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from vico.sim.recording import Run
+    from vico.viewer.run_film import FilmSettings, Span
+    from vico.world.world import World
 
 
-def film(options: FilmOptions) -> int:
-    """Write a film of a run."""
+@dataclass(frozen=True)
+class FilmOptions:
+    """What `vico film` is asked for."""
+
+    run: Positional[Path]  # Run folder.
+    #: Whom the camera follows: a person by name ("Ann Lee", or Ann), resident_3, a robot, a thing, or "car 3".
+    follow: str = ""
+    #: Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
+    shots: Path | None = None
+    out: Path = Path("film.mp4")  # File to write (.mp4).
+    size: str = "1920x1080"  # WIDTHxHEIGHT, pixels.
+    start: str = ""  # HH:MM:SS, or seconds since the run began; without it, its beginning.
+    stop: str = ""  # Likewise; without it, its end.
+    fps: int = 25  # Frames a second.
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"  # From where.
+    samples: int = 2  # Rays a pixel, along each side: 1 is quick, 2 smooth.
+    quality: Literal["plain", "fine"] = "fine"  # plain, or fine: soft shadows, darker corners, mirroring glass.
+    world: Path | None = None  # The world it ran in, if it is no longer where it was.
+    community: Path | None = None  # Its community, if it is no longer where it was.
+    force: bool = False  # Replace the file if it is there.
+    #: Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
+    headless: bool = False
+
+
+@dataclass(frozen=True)
+class StillOptions:
+    """What `vico still` is asked for."""
+
+    run: Positional[Path]  # Run folder.
+    follow: str  # Who is in its middle, as for `vico film`: "Ann Lee", resident_3, "car 3".
+    at: str = ""  # HH:MM:SS, or seconds since the run began; without it, its end.
+    out: Path = Path("still.png")  # File to write (.png or .jpg).
+    size: str = "1920x1080"  # WIDTHxHEIGHT, pixels.
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"  # From where.
+    samples: int = 3  # Rays a pixel, along each side.
+    quality: Literal["plain", "fine"] = "fine"  # plain, or fine: soft shadows, darker corners, mirroring glass.
+    world: Path | None = None  # The world it ran in, if it is no longer where it was.
+    community: Path | None = None  # Its community, if it is no longer where it was.
+    force: bool = False  # Replace the file if it is there.
+    #: Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
+    headless: bool = False
+
+
+def film(options: Annotated[FilmOptions, FLAT]) -> int:
+    """Film somebody in a recorded run: it is simulated again with what was done in it, and looked at from beside.
+
+    Example: vico film morning --follow resident_3 --start 08:05 --stop 08:06 --out walk.mp4
+    """
+    from vico.render.frames import RenderQuality
+    from vico.sim.recording import read_run
+    from vico.viewer.run_film import FilmSettings, RepeatedRun, write_film_of_shots
+
     out = options.out
     if bool(options.follow) == (options.shots is not None):
         raise InputError("film: give either --follow with a name, or --shots with a list of shots")
@@ -70,6 +113,8 @@ def film(options: FilmOptions) -> int:
 
 def _spans(options: FilmOptions, settings: FilmSettings, run: Run) -> list[Span]:
     """Return the shots that are asked for, and their steps; whoever is followed is looked up."""
+    from vico.viewer.run_film import Span, read_shots
+
     if options.shots is None:
         first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
         follow = followed_name(run, options.follow, first, last, option="film: --follow")
@@ -87,8 +132,17 @@ def _spans(options: FilmOptions, settings: FilmSettings, run: Run) -> list[Span]
     return spans
 
 
-def still(options: StillOptions) -> int:
-    """Write a picture of a moment of a run."""
+def still(options: Annotated[StillOptions, FLAT]) -> int:
+    """Take a picture of somebody in a recorded run.
+
+    Example: vico still morning --follow resident_3 --at 08:05 --view side --out walk.png
+
+    Example: vico still morning --follow resident_3 --at 08:05 --headless --out walk.png
+    """
+    from vico.render.frames import RenderQuality
+    from vico.sim.recording import read_run
+    from vico.viewer.run_film import FilmSettings, RepeatedRun, write_still
+
     _check(options.out, force=options.force)
     width, height = size_of(options.size)
     recorded = read_run(options.run)
@@ -144,15 +198,17 @@ def _still_of_page(options: StillOptions, follow: str, step: int) -> int:
 @contextmanager
 def _report_if_interrupted(out: Path, report: Report, rate: int) -> Iterator[Callable[[int, int], None]]:
     """Give what is told of a film's frames; where the block is interrupted, say how much of the film is there."""
+    from vico.render.film import partial_film
+
     made, wanted = 0, 0
 
-    def told(done: int, count: int) -> None:
+    def report_frames(done: int, count: int) -> None:
         nonlocal made, wanted
         made, wanted = done, count
         report("film", done, count)
 
     try:
-        yield told
+        yield report_frames
     except KeyboardInterrupt as stop:
         if not made:
             raise
@@ -165,6 +221,7 @@ def _report_if_interrupted(out: Path, report: Report, rate: int) -> Iterator[Cal
 @contextmanager
 def _page_of(path: Path, world: Path | None) -> Iterator[str]:
     """Serve a run's page while the block lasts; give its address."""
+    from vico.cli.live import city_of
     from vico.viewer.headless import browser_program
     from vico.viewer.three import three_module
 
@@ -177,7 +234,7 @@ def _page_of(path: Path, world: Path | None) -> Iterator[str]:
     from vico.viewer.sources.source import Source
     from vico.viewer.sources.views import RecordedViews
 
-    source = Source.recorded(path, world=world)
+    source = Source.of_run(path, world=world)
     run = source.tables.run
     assert run is not None
     if source.world is None:
@@ -208,6 +265,10 @@ def step_of(run: Run, text: str, *, default: int) -> int:
     InputError
         If the run was not there then.
     """
+    import numpy as np
+
+    from vico.clock import seconds_of_day
+
     if not text:
         return default
     times = run.times
@@ -236,6 +297,8 @@ def followed_name(run: Run, text: str, first: int, last: int, *, option: str) ->
     InputError
         If nobody is called so, or is not there all the time.
     """
+    from vico.sim.config import find_by_name
+
     name = find_by_name(text, run.names, option=option)
     stays = [stay for one in run.cast.values() if name in (one.agent, one.name) for stay in one.intervals]
     if not any(begin <= first and (until is None or last < until) for begin, until in stays):
@@ -254,14 +317,21 @@ def _check(out: Path, *, force: bool) -> None:
         raise OutputExistsError(f"{out}: exists; give another name, or --force")
 
 
-def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
-    """Write ``replay.html`` (and ``demo.mp4``) into the run's folder.
+def replay(path: Positional[Path], no_film: bool = False, world: Path | None = None) -> int:
+    """Make the replay page (and the film) of a recorded run.
 
-    Parameters
-    ----------
-    world
-        The world it ran in, if it is no longer where it was.
+    Example: vico replay morning
+
+    Args:
+        path: Run folder; a run that was cut short shows what it had.
+        no_film: Leave demo.mp4 out.
+        world: The world it ran in, if it is no longer where it was.
     """
+    from vico.sim.recording import read_run
+    from vico.sim.recording.schema import DEMO_FILM, REPLAY
+    from vico.viewer.replay import recording_of, write_demo_film, write_replay
+    from vico.world.folder import is_world, read_world
+
     run = read_run(path)
     folder = world or run.source("world")
     if not is_world(folder):
@@ -275,7 +345,7 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
         report("replay page", 0, 1)
         write_replay(path / REPLAY, recording, place, picture=picture)
         report("replay page", 1, 1)
-        if film and recording.views:
+        if not no_film and recording.views:
             report("film", 0, 1)
             write_demo_film(path / DEMO_FILM, recording, place)
             report("film", 1, 1)
@@ -285,6 +355,13 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
 
 def _from_above(world: World, folder: Path) -> NDArray[np.uint8]:
     """Return the picture the world was built with; taken now where it was built without pictures."""
+    import numpy as np
+    from PIL import Image
+
+    from vico.render import render_top_down
+    from vico.render.world_scene import scene_of
+    from vico.worldgen.previews import Overhead
+
     kept = folder / "previews" / "above.png"
     if kept.is_file():
         try:
@@ -295,8 +372,26 @@ def _from_above(world: World, folder: Path) -> NDArray[np.uint8]:
     return render_top_down(scene_of(world, rooms=False), world.half, Overhead().side)
 
 
-def score_pictures(pictures: Path, *, photos: Path, weights: Path, scale: str, json: bool) -> int:
-    """Print the scores."""
+def score_pictures(
+    pictures: Positional[Path],
+    photos: Path,
+    weights: Path,
+    scale: Literal["-1..1", "0..1", "0..255", "imagenet"] = "-1..1",
+    json: bool = False,
+) -> int:
+    """Say how much pictures look like photos: FID and KID by a feature network of your own.
+
+    Example: vico score-pictures stills --photos street_photos --weights inception_v3.onnx
+
+    Args:
+        pictures: Folder of pictures (.jpg, .png), folders in it too.
+        photos: Folder of photos.
+        weights: The network, an ONNX file: pictures in, features out. Needs the extra "scores".
+        scale: What it wants bytes to be turned into.
+        json: Print JSON.
+    """
+    from vico.viewer.picture_scores import FeatureNetwork, pictures_in, scores
+
     network = FeatureNetwork(weights, scale=scale)
     found = asdict(scores(network.features(pictures_in(pictures)), network.features(pictures_in(photos))))
     found |= {"weights": weights.name, "scale": scale}

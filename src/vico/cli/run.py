@@ -28,7 +28,7 @@ from vico.cli.console import (
     stopped_between_steps,
 )
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
-from vico.cli.options import RunOptions
+from vico.cli.options import RunOptions, split_names
 from vico.clock import seconds_of_day
 from vico.community import Community, read_community, read_names
 from vico.errors import InputError, OutputExistsError, SchemaError
@@ -109,7 +109,7 @@ def run(options: RunOptions) -> int:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
     talk = _talk_of(options)
     use_workers(options.workers)
-    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).done()
+    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).simulate()
     if options.json:
         print_json(metrics)
     else:
@@ -117,8 +117,23 @@ def run(options: RunOptions) -> int:
         shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
         print_table(str(options.out), shown, _MEANINGS)
     if talk is not None:
-        print(_talk_summary(talk), file=sys.stderr)
-    return _exit_code(metrics)
+        why = f" ({talk.reason})" if talk.reason else ""
+        tokens = talk.usage.read + talk.usage.written
+        print(
+            f"{talk.answered} answers of residents by the language model, {tokens} tokens; "
+            f"{talk.fallbacks} left to templates{why}",
+            file=sys.stderr,
+        )
+    overlaps = metrics.get("overlaps", {"count": 0})
+    if not overlaps["count"]:
+        return 0
+    first = overlaps["first"][0]
+    print(
+        f"{overlaps['pairs']} pairs overlapped in {overlaps['count']} of {overlaps['sub_steps']} sub-steps, the first: "
+        f"{first['who']} with {first['with']} at {first['where']}, {1000 * first['depth']:.0f} mm; see metrics.json",
+        file=sys.stderr,
+    )
+    return 1
 
 
 def named_or_read(text: str) -> str | dict[str, Any]:
@@ -140,29 +155,6 @@ def _talk_of(options: RunOptions) -> LlmTalk | None:
         return LlmTalk(LanguageModel.from_environment(sampling=Sampling(seed=options.seed, temperature=0.0)))
     except InputError as error:
         raise InputError(f"run: --talk llm: {error}; or leave --talk out") from None
-
-
-def _talk_summary(talk: LlmTalk) -> str:
-    """Say how many answers were the model's."""
-    why = f" ({talk.reason})" if talk.reason else ""
-    return (
-        f"{talk.answered} answers of residents by the language model, {talk.usage.read + talk.usage.written} tokens; "
-        f"{talk.fallbacks} left to templates{why}"
-    )
-
-
-def _exit_code(metrics: dict[str, Any]) -> int:
-    """Return the exit code: 1 with overlaps, which are told in a sentence."""
-    overlaps = metrics.get("overlaps", {"count": 0})
-    if not overlaps["count"]:
-        return 0
-    first = overlaps["first"][0]
-    print(
-        f"{overlaps['pairs']} pairs overlapped in {overlaps['count']} of {overlaps['sub_steps']} sub-steps, the first: "
-        f"{first['who']} with {first['with']} at {first['where']}, {1000 * first['depth']:.0f} mm; see metrics.json",
-        file=sys.stderr,
-    )
-    return 1
 
 
 @dataclass(frozen=True)
@@ -254,7 +246,7 @@ class Job:
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
         return cls(options, out, place, people, config, sources, found, talk, played)
 
-    def done(self) -> dict[str, Any]:
+    def simulate(self) -> dict[str, Any]:
         """Do it; return its metrics.
 
         Raises
@@ -279,7 +271,7 @@ class Job:
                     metrics = self._go(leg, control, viewer, report, asked)
                 if asked or control is None or control.switch is None:
                     break
-                leg = self._switched(leg, control)
+                leg = self._switch_branch(leg, control)
             if metrics["steps"] < options.steps:
                 kept = self._told_of_rest(leg, metrics["steps"])
                 if asked:
@@ -307,7 +299,7 @@ class Job:
         """Set the scene, and open the recording or go on with it."""
         sim, faults = self._simulation(), FaultLog()
         if goes_on:
-            return self._resumed(sim, agents, every, self.out, control)
+            return self._resume(sim, agents, every, self.out, control)
         # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
         check_replaceable(self.out, force=True, kind=RUN_FOLDER)
         remove_path(self.out)
@@ -315,7 +307,7 @@ class Job:
         how["notes"]["faults"] = faults.record()
         return Leg(sim, agents, Recorder(self.out, sim, **how), faults, every)
 
-    def _resumed(
+    def _resume(
         self, sim: Simulation, agents: Gatherer, every: int, out: Path, control: Control | None, **notes: Any
     ) -> Leg:
         """Go on with a recording from its last checkpoint."""
@@ -328,12 +320,12 @@ class Job:
             control.restore(checkpoint.notes, out=out, step=checkpoint.step)
         return Leg(sim, agents, recorder, faults, every)
 
-    def _switched(self, leg: Leg, control: Control) -> Leg:
+    def _switch_branch(self, leg: Leg, control: Control) -> Leg:
         """Go on from a checkpoint in a sibling of the run's folder; the run so far stays whole."""
         assert control.switch is not None
         step, name, _ = control.switch
         out = branched_run(leg.recorder.out, step, name)
-        return self._resumed(
+        return self._resume(
             self._simulation(),
             leg.agents,
             leg.every,
@@ -590,5 +582,5 @@ def _places(kind: str, given: Path | None, world: World, played: PlayedAgent | N
 
 
 def _names(text: str) -> tuple[str, ...]:
-    names = tuple(part.strip() for part in text.split(",") if part.strip())
+    names = tuple(split_names(text))
     return () if names == ("none",) else names

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import webbrowser
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,87 +17,55 @@ import tyro
 from tyro.conf import Positional
 
 from vico.cli.console import print_json
-from vico.cli.evaluation import AssistantOptions, EvaluationOptions
-from vico.cli.options import CommaSeparated, Hosts, RunOptions
+from vico.cli.evaluation import AssistantOptions, EvaluationOptions, evaluate_assistant
+from vico.cli.options import (
+    FLAT,
+    Cars,
+    CommaSeparated,
+    Cyclists,
+    EventChoice,
+    FirstDate,
+    Hosts,
+    Pedestrians,
+    Robots,
+    RunOptions,
+    StartTime,
+    WeatherChoice,
+)
 from vico.errors import InputError
 from vico.viewer.server import require_server
 
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What `vico live` is asked for; what else a run can be asked for, `vico run --live` is.
+    """What `vico live` is asked for; what else a run can be asked for, `vico run --live` is."""
 
-    Attributes
-    ----------
-    world
-        World folder.
-    community
-        Community folder, made for that world.
-    out
-        Folder to record into; without it, out/live, which is replaced.
-    robots
-        Names, separated by commas; none for no robots.
-    agent
-        Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
-    assistants
-        How many of them.
-    start
-        Time of day, HH:MM or HH:MM:SS.
-    date
-        Of the first day, YYYY-MM-DD; the community's day unless given.
-    weather
-        A kind of weather, "changing", or a weather file (.json).
-    events
-        Of the city: none, "changing", or a file of events (.json).
-    steps
-        Seconds to simulate at most.
-    cars
-        How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists
-        How many people nobody plays ride bicycles in the streets.
-    pedestrians
-        How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    observe
-        Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
-    speed
-        Simulated seconds a second at most; 0 is as fast as it goes.
-    paused
-        Wait before the first step until somebody lets it go on.
-    interventions
-        What was done to an earlier run (its interventions.jsonl), to be done again.
-    port
-        Where the page is, on this machine alone; 0 takes a free one.
-    allow_host
-        A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
-        times.
-    idle
-        Seconds without a page open after which the run waits for one; 0: it never waits.
-    seed
-        Decides everything that is left to chance.
-    """
-
-    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
-    community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]
-    out: Path | None = None
-    robots: CommaSeparated = "husky,go2"
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]  # World folder.
+    community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]  # Community folder, made for that world.
+    out: Path | None = None  # Folder to record into; without it, out/live, which is replaced.
+    robots: Robots = "husky,go2"
+    #: Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
-    assistants: int = 0
-    start: str = "08:00"
-    date: str | None = None
-    weather: str = "fair"
-    events: str = "none"
-    steps: int = 86_400
-    cars: int | None = None
-    cyclists: int = 0
-    pedestrians: int | None = None
+    assistants: int = 0  # How many of them.
+    start: StartTime = "08:00"
+    date: FirstDate = None
+    weather: WeatherChoice = "fair"
+    events: EventChoice = "none"
+    steps: int = 86_400  # Seconds to simulate at most.
+    cars: Cars = None
+    cyclists: Cyclists = 0
+    pedestrians: Pedestrians = None
+    #: Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
     observe: CommaSeparated = "none"
-    speed: float = 1.0
-    paused: bool = False
-    interventions: Path | None = None
-    port: int = 0
+    speed: float = 1.0  # Simulated seconds a second at most; 0 is as fast as it goes.
+    paused: bool = False  # Wait before the first step until somebody lets it go on.
+    interventions: Path | None = None  # What was done to an earlier run (its interventions.jsonl), to be done again.
+    port: int = 0  # Where the page is, on this machine alone; 0 takes a free one.
+    #: A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
+    #: times.
     allow_host: Hosts = ()
-    idle: float = 300.0
-    seed: int = 0
+    idle: float = 300.0  # Seconds without a page open after which the run waits for one; 0: it never waits.
+    seed: int = 0  # Decides everything that is left to chance.
 
     def run_options(self) -> RunOptions:
         """Return the same as options of a run."""
@@ -110,74 +77,35 @@ class LiveOptions:
 
 @dataclass(frozen=True)
 class PlayOptions:
-    """What `vico play` is asked for.
+    """What `vico play` is asked for."""
 
-    Attributes
-    ----------
-    world
-        World folder.
-    community
-        Community folder, made for that world; tasks have people of their own and take none.
-    played
-        Who you are: a resident by name ("Ann Lee", or Ann), resident_3, assistant_0 or robot_0. Without it
-        assistant_0, or robot_0 where robots are given.
-    task
-        A task for the assistant, which is judged at the end.
-    advanced
-        The harder form of it.
-    out
-        Folder to record into; without it, out/play, which is replaced.
-    robots
-        Names, separated by commas; none for no robots.
-    start
-        Time of day, HH:MM or HH:MM:SS.
-    date
-        Of the first day, YYYY-MM-DD; the community's day unless given.
-    weather
-        A kind of weather, "changing", or a weather file (.json).
-    seconds
-        To simulate at most.
-    cars
-        How many cars drive around; unset: 30, or as many as there is room for.
-    cyclists
-        How many people nobody plays ride bicycles in the streets.
-    pedestrians
-        How many people nobody plays walk around; unset: 30, or as many as there is room for.
-    view
-        What whom you play sees is rendered and recorded, which a demonstration needs.
-    port
-        Where the page is, on this machine alone; 0 takes a free one.
-    allow_host
-        A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
-        times.
-    idle
-        Seconds without a page open after which the run waits for one; 0: it never waits.
-    waits
-        With a task: seconds that it waits for you at its page.
-    seed
-        Decides everything that is left to chance, and the task.
-    """
-
-    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]  # World folder.
+    #: Community folder, made for that world; tasks have people of their own and take none.
     community: Positional[Annotated[Path | None, tyro.conf.arg(metavar="COMMUNITY")]] = None
+    #: Who you are: a resident by name ("Ann Lee", or Ann), resident_3, assistant_0 or robot_0. Without it assistant_0,
+    #: or robot_0 where robots are given.
     played: Annotated[str, tyro.conf.arg(name="as", metavar="AGENT")] = ""
+    #: A task for the assistant, which is judged at the end.
     task: Literal["none", "carry", "delivery", "search"] = "none"
-    advanced: bool = False
-    out: Path | None = None
-    robots: CommaSeparated = "none"
-    start: str = "08:00"
-    date: str | None = None
-    weather: str = "fair"
-    seconds: int = 36_000
-    cars: int | None = None
-    cyclists: int = 0
-    pedestrians: int | None = None
+    advanced: bool = False  # The harder form of it.
+    out: Path | None = None  # Folder to record into; without it, out/play, which is replaced.
+    robots: Robots = "none"
+    start: StartTime = "08:00"
+    date: FirstDate = None
+    weather: WeatherChoice = "fair"
+    seconds: int = 36_000  # To simulate at most.
+    cars: Cars = None
+    cyclists: Cyclists = 0
+    pedestrians: Pedestrians = None
+    #: What whom you play sees is rendered and recorded, which a demonstration needs.
     view: Literal["recorded", "none"] = "recorded"
-    port: int = 0
+    port: int = 0  # Where the page is, on this machine alone; 0 takes a free one.
+    #: A name, beside this machine's own, under which a proxy or a forwarded port shows the page; may be given several
+    #: times.
     allow_host: Hosts = ()
-    idle: float = 60.0
-    waits: float = 600.0
-    seed: int = 0
+    idle: float = 60.0  # Seconds without a page open after which the run waits for one; 0: it never waits.
+    waits: float = 600.0  # With a task: seconds that it waits for you at its page.
+    seed: int = 0  # Decides everything that is left to chance, and the task.
 
     def run_options(self, played: str, steps: int) -> RunOptions:
         """Return the same as options of a run."""
@@ -200,110 +128,6 @@ class PlayOptions:
         given |= {"observe": played if self.view == "recorded" else "none", "states_every": steps // self.seconds * 300}
         given |= {"out": self.out or Path("out/play"), "force": self.out is None, "steps": steps}
         return RunOptions(**given, live=True, speed=1.0)
-
-
-@dataclass(frozen=True)
-class FilmOptions:
-    """What `vico film` is asked for.
-
-    Attributes
-    ----------
-    run
-        Run folder.
-    follow
-        Whom the camera follows: a person by name ("Ann Lee", or Ann), resident_3, a robot, a thing, or "car 3".
-    shots
-        Instead of it: a file that lists shots, each with times, whom it follows and from where (docs/pictures.md).
-    out
-        File to write (.mp4).
-    size
-        WIDTHxHEIGHT, pixels.
-    start
-        HH:MM:SS, or seconds since the run began; without it, its beginning.
-    stop
-        Likewise; without it, its end.
-    fps
-        Frames a second.
-    view
-        From where.
-    samples
-        Rays a pixel, along each side: 1 is quick, 2 smooth.
-    quality
-        plain, or fine: soft shadows, darker corners, mirroring glass.
-    world
-        The world it ran in, if it is no longer where it was.
-    community
-        Its community, if it is no longer where it was.
-    force
-        Replace the file if it is there.
-    headless
-        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
-    """
-
-    run: Positional[Path]
-    follow: str = ""
-    shots: Path | None = None
-    out: Path = Path("film.mp4")
-    size: str = "1920x1080"
-    start: str = ""
-    stop: str = ""
-    fps: int = 25
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
-    samples: int = 2
-    quality: Literal["plain", "fine"] = "fine"
-    world: Path | None = None
-    community: Path | None = None
-    force: bool = False
-    headless: bool = False
-
-
-@dataclass(frozen=True)
-class StillOptions:
-    """What `vico still` is asked for.
-
-    Attributes
-    ----------
-    run
-        Run folder.
-    follow
-        Who is in its middle, as for `vico film`: "Ann Lee", resident_3, "car 3".
-    at
-        HH:MM:SS, or seconds since the run began; without it, its end.
-    out
-        File to write (.png or .jpg).
-    size
-        WIDTHxHEIGHT, pixels.
-    view
-        From where.
-    samples
-        Rays a pixel, along each side.
-    quality
-        plain, or fine: soft shadows, darker corners, mirroring glass.
-    world
-        The world it ran in, if it is no longer where it was.
-    community
-        Its community, if it is no longer where it was.
-    force
-        Replace the file if it is there.
-    headless
-        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
-    """
-
-    run: Positional[Path]
-    follow: str
-    at: str = ""
-    out: Path = Path("still.png")
-    size: str = "1920x1080"
-    view: Literal["behind", "front", "eyes", "above", "side", "orbit", "close"] = "behind"
-    samples: int = 3
-    quality: Literal["plain", "fine"] = "fine"
-    world: Path | None = None
-    community: Path | None = None
-    force: bool = False
-    headless: bool = False
-
-
-_FLAT = tyro.conf.arg(name="")
 
 
 def view(
@@ -329,53 +153,6 @@ def view(
         browser: Open it in the browser.
         json: Print the address as JSON.
     """
-    return show_run(path, world=world, port=port, hosts=allow_host, browser=browser, json=json)
-
-
-def live(options: Annotated[LiveOptions, _FLAT]) -> int:
-    """Start a simulation with a page beside it, from which it can be paused, looked into and changed.
-
-    Example: vico live helsinki people
-
-    Example: vico live helsinki people --robots husky,drone --agent my_module:MyAgent --speed 10
-    """
-    from vico.cli import run as verb
-
-    return verb.run(options.run_options())
-
-
-def play(options: Annotated[PlayOptions, _FLAT]) -> int:
-    """Walk through a world among its people, from a page in the browser; or do a task there, and be judged.
-
-    Example: vico play helsinki people
-
-    Example: vico play helsinki people --as resident_3
-
-    Example: vico play helsinki people --robots drone --as robot_0
-
-    Example: vico play helsinki --task delivery --seed 0
-    """
-    return play_at_page(options)
-
-
-def show_run(path: Path, *, world: Path | None, port: int, hosts: Sequence[str] = (), browser: bool, json: bool) -> int:
-    """Show a run until Ctrl+C.
-
-    Parameters
-    ----------
-    path
-        Run folder.
-    world
-        The world it ran in, if it is no longer where it was.
-    port
-        To listen on; 0 takes the one it was shown on before, or a free one.
-    hosts
-        Names of hosts, beside this machine's own, under which the page is shown.
-    browser
-        Open it there.
-    json
-        Print the address as JSON.
-    """
     from vico.cli.live import city_of, print_address, wait_for_interrupt
 
     require_server()
@@ -384,12 +161,12 @@ def show_run(path: Path, *, world: Path | None, port: int, hosts: Sequence[str] 
     from vico.viewer.sources.source import Source
     from vico.viewer.sources.views import RecordedViews
 
-    source = Source.recorded(path, world=world)
+    source = Source.of_run(path, world=world)
     run = source.tables.run
     assert run is not None
     city = None if source.world is None else city_of(source.world)
     with ViewerServer(
-        ViewerState(source, RecordedViews(run).view, city=city), port=port, keep=path, hosts=hosts
+        ViewerState(source, RecordedViews(run).view, city=city), port=port, keep=path, hosts=allow_host
     ) as server:
         if json:
             print_json({"url": server.url})
@@ -401,17 +178,28 @@ def show_run(path: Path, *, world: Path | None, port: int, hosts: Sequence[str] 
     return 0
 
 
-# There are as many assistants as it takes for the one who is played.
-_ASSISTANT = re.compile(r"assistant_\d{1,4}")
+def live(options: Annotated[LiveOptions, FLAT]) -> int:
+    """Start a simulation with a page beside it, from which it can be paused, looked into and changed.
+
+    Example: vico live helsinki people
+
+    Example: vico live helsinki people --robots husky,drone --agent my_module:MyAgent --speed 10
+    """
+    from vico.cli import run as verb
+
+    return verb.run(options.run_options())
 
 
-def play_at_page(options: PlayOptions) -> int:
-    """Open the page, and run until the time is up, somebody stops it, or the task is done.
+def play(options: Annotated[PlayOptions, FLAT]) -> int:
+    """Walk through a world among its people, from a page in the browser; or do a task there, and be judged.
 
-    Raises
-    ------
-    InputError
-        If nobody is called as asked, or a number is not usable.
+    Example: vico play helsinki people
+
+    Example: vico play helsinki people --as resident_3
+
+    Example: vico play helsinki people --robots drone --as robot_0
+
+    Example: vico play helsinki --task delivery --seed 0
     """
     require_server()
     if options.task != "none":
@@ -420,10 +208,6 @@ def play_at_page(options: PlayOptions) -> int:
         raise InputError("play: give WORLD and COMMUNITY, or WORLD and --task; see vico play --help")
     if not 1 <= options.seconds <= 1_000_000:
         raise InputError(f"play: --seconds {options.seconds}; it has to be 1 to 1000000")
-    return _play_freely(options, options.community)
-
-
-def _play_freely(options: PlayOptions, community: Path) -> int:
     from vico.agents.human import PERIOD, HumanAgent, Mailbox
     from vico.cli.run import Job, names_of
     from vico.sim.config import find_by_name
@@ -432,13 +216,17 @@ def _play_freely(options: PlayOptions, community: Path) -> int:
     robots = [name.strip() for name in options.robots.split(",") if name.strip() not in ("", "none")]
     played = options.played or ("robot_0" if robots else "assistant_0")
     if not _ASSISTANT.fullmatch(played):
-        played = find_by_name(played, names_of(community, robots, assistants=1), option="play: --as")
+        played = find_by_name(played, names_of(options.community, robots, assistants=1), option="play: --as")
     human = HumanAgent(Mailbox(), steer=_steering(robots, played))
     given = options.run_options(played, round(options.seconds / PERIOD))
     assert given.out is not None
-    Job.of(given, options.world, community, given.out, played=PlayedAgent(played, human)).done()
+    Job.of(given, options.world, options.community, given.out, played=PlayedAgent(played, human)).simulate()
     print(given.out)
     return 0
+
+
+# There are as many assistants as it takes for the one who is played.
+_ASSISTANT = re.compile(r"assistant_\d{1,4}")
 
 
 def _steering(robots: list[str], played: str):  # type: ignore[no-untyped-def]
@@ -453,8 +241,6 @@ def _steering(robots: list[str], played: str):  # type: ignore[no-untyped-def]
 
 def _play_task(options: PlayOptions, category: Literal["carry", "delivery", "search"]) -> int:
     """Play one task as `vico eval assistant --method human` does, and tell the verdict."""
-    from vico.cli.evaluation import judge_assistant
-
     if options.played not in ("", "assistant_0"):
         raise InputError(f"play: --as {options.played}; tasks are for assistant_0")
     if not 0 <= options.seed <= 10_000:
@@ -476,4 +262,4 @@ def _play_task(options: PlayOptions, category: Literal["carry", "delivery", "sea
         waits=options.waits,
         allow_host=options.allow_host,
     )
-    return judge_assistant(asked)
+    return evaluate_assistant(asked)

@@ -1,30 +1,32 @@
-"""`vico world build`, `vico world info`, `vico check world`."""
+"""`vico world` builds worlds and looks into them; `vico check world` and `vico export` are beside it.
+
+What a verb needs is imported when it runs, so that `vico --help` is quick.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import Positional
+from tyro.extras import SubcommandApp
 
 from vico.cli.console import check_output, print_export, print_json, print_table, progress_bars
-from vico.cli.options import WorldBuildOptions
+from vico.cli.options import FLAT, CommaSeparated, RayAddress, WorldBuildOptions, split_names
 from vico.errors import InputError, MissingFileError
-from vico.geo.gtfs_feed import NO_TIMETABLE
-from vico.world.folder import read_world
-from vico.world.model import FLAT_GROUND
-from vico.world.world import WORLD_FOLDER, World, stage_seconds
-from vico.worldgen.batch import PlaceTable, read_place_table
-from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
-from vico.worldgen.photos.texturing import Texturing
-from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
-from vico.worldgen.request import BuildOptions, Sources
 
-_DEFAULTS = BuildOptions()
+if TYPE_CHECKING:
+    from vico.world.world import World
+    from vico.worldgen.batch import PlaceTable
+    from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
+
+world = SubcommandApp()
+
 _DROPPED = "features of the map left out, mended or noted; world.json says which and why"
 # What `world info` tells, in words.
 _MEANINGS = {
@@ -51,49 +53,29 @@ _MEANINGS = {
 }
 
 
-def build(
-    sources: Sources,
-    *,
-    out: Path,
-    centre: tuple[float, float] | None = None,
-    half: float = 400.0,
-    seed: int = 0,
-    options: BuildOptions = _DEFAULTS,
-    force: bool = False,
-    json: bool = False,
-) -> int:
-    """Build a world; without a centre (latitude and longitude) around the map's middle."""
-    lat, lon = centre or extract_centre(sources.osm)
-    check_output(out, *sources.files(), force=force, kind=WORLD_FOLDER)
-    with progress_bars() as report:
-        build_world(
-            sources,
-            lat=lat,
-            lon=lon,
-            half=half,
-            seed=seed,
-            out=out,
-            force=force,
-            options=replace(options, progress=report),
-        )
-    if options.author is not None:
-        print(f"language model: {options.author.model.budget.spent}", file=sys.stderr)
-    code = info(out, json=json)
-    manifest = read_world(out).manifest
-    if manifest.is_flat:
-        print(f"{out}: {FLAT_GROUND}", file=sys.stderr)
-    for what in [what for stage in manifest.stages for what in stage.dropped]:
-        if what.reason.startswith(NO_TIMETABLE):
-            print(f"{out}: {what.id} {what.reason}", file=sys.stderr)
-    return code
+@world.command(name="build")
+def world_build(options: Annotated[WorldBuildOptions, FLAT]) -> int:
+    """Make a world from OpenStreetMap data. A build that was killed goes on where it stopped.
 
+    Example: vico world build --lat 60.1690 --lon 24.9435 --out helsinki
 
-def build_as_asked(options: WorldBuildOptions) -> int:
-    """Build the world that the command line asks for, from a map that is found if none is given."""
-    centre, osm = options.centre(), options.osm
+    Example: vico world build --lat 48.8530 --lon 2.3499 --out paris
+
+    Example: vico world build --osm monaco.osm.pbf --center 43.7338,7.4181 --dem srtm.tif --out monaco
+    Example: vico world build --osm berlin.osm.pbf --buildings lod2.gml --buildings overture.parquet --out berlin
+    """
+    from vico.geo.gtfs_feed import NO_TIMETABLE
+    from vico.world.folder import read_world
+    from vico.world.model import FLAT_GROUND
+    from vico.world.world import WORLD_FOLDER
+    from vico.worldgen.photos.texturing import Texturing
+    from vico.worldgen.pipeline import build_world, extract_centre
+    from vico.worldgen.request import BuildOptions, Sources, locate_map
+
+    centre, osm, out = options.centre(), options.osm, options.out
     if osm is None:
         lat, lon = centre or (None, None)
-        osm = locate(lat, lon, options.radius, overpass=options.overpass, refresh=options.refresh)
+        osm = locate_map(lat, lon, options.radius, overpass=options.overpass, refresh=options.refresh)
     sources = Sources(
         osm,
         dem=tuple(chain.from_iterable(options.dem)),
@@ -107,7 +89,7 @@ def build_as_asked(options: WorldBuildOptions) -> int:
         detections=options.detections,
         installed_things=options.things == "installed",
     )
-    how = Texturing(
+    texturing = Texturing(
         texel=options.texel,
         inpaint=options.inpaint,
         upscale=options.upscale,
@@ -120,52 +102,132 @@ def build_as_asked(options: WorldBuildOptions) -> int:
     )
     author = None
     if options.layout_llm:
-        author = layout_author(options.llm_calls, options.llm_tokens, options.llm_cost)
-    return build(
-        sources,
-        out=options.out,
-        centre=centre,
-        half=options.radius,
-        seed=options.seed,
-        options=BuildOptions(texturing=how, author=author),
-        force=options.force,
-        json=options.json,
-    )
+        author = _layout_author(options.llm_calls, options.llm_tokens, options.llm_cost)
+    lat, lon = centre or extract_centre(osm)
+    check_output(out, *sources.files(), force=options.force, kind=WORLD_FOLDER)
+    with progress_bars() as report:
+        build_world(
+            sources,
+            lat=lat,
+            lon=lon,
+            half=options.radius,
+            seed=options.seed,
+            out=out,
+            force=options.force,
+            options=BuildOptions(texturing=texturing, author=author, progress=report),
+        )
+    if author is not None:
+        print(f"language model: {author.model.budget.spent}", file=sys.stderr)
+    code = world_info(out, json=options.json)
+    manifest = read_world(out).manifest
+    if manifest.is_flat:
+        print(f"{out}: {FLAT_GROUND}", file=sys.stderr)
+    for what in [what for stage in manifest.stages for what in stage.dropped]:
+        if what.reason.startswith(NO_TIMETABLE):
+            print(f"{out}: {what.id} {what.reason}", file=sys.stderr)
+    return code
 
 
-def layout_author(calls: int | None, tokens: int | None, cost: float | None) -> LlmLayoutAuthor:
+def _layout_author(calls: int | None, tokens: int | None, cost: float | None) -> LlmLayoutAuthor:
     """Return the language model that the environment names, as an author of floor plans."""
     from vico.io.cache import cache_folder
     from vico.llm import Budget, LanguageModel
+    from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 
     budget = Budget(calls=calls, tokens=tokens, cost=cost)
     return LlmLayoutAuthor(LanguageModel.from_environment(cache=cache_folder() / "llm", budget=budget))
 
 
-def locate(
-    lat: float | None, lon: float | None, half: float, *, overpass: str | None = None, refresh: bool = False
-) -> Path:
-    """Find a map that covers a window: the packaged extract, else one from an Overpass server (``off``: none)."""
-    from vico.geo.overpass import Overpass
-    from vico.worldgen.request import map_for
+@world.command(name="rebuild")
+def world_rebuild(path: Positional[Path], stage: CommaSeparated, layout_llm: bool = False, json: bool = False) -> int:
+    """Run stages of a world again, and whatever depends on what they change.
 
-    endpoint = overpass or os.environ.get("VICO_OVERPASS")
-    source = None if endpoint == "off" else Overpass(endpoint, refresh=refresh)
-    return map_for(lat, lon, half, source=source)
+    Example: vico world rebuild helsinki --stage objects,indoor
 
+    Args:
+        path: World folder.
+        stage: Names of stages, separated by commas; a wrong one names them all.
+        layout_llm: With the language model that drew its floor plans.
+        json: Print the result as JSON.
+    """
+    from vico.worldgen.pipeline import rebuild_world
 
-def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None = None, json: bool = False) -> int:
-    """Run stages of a world again."""
+    author = _layout_author(None, None, None) if layout_llm else None
     with progress_bars() as report:
-        rebuild_world(path, stages, progress=report, author=author)
-    return info(path, json=json)
+        rebuild_world(path, split_names(stage), progress=report, author=author)
+    return world_info(path, json=json)
 
 
-def rows_of_table(table: Path, *, extracts: Path | None, only: str) -> PlaceTable:
+@world.command(name="build-many")
+def world_build_many(
+    table: Positional[Path],
+    out: str,
+    extracts: Path | None = None,
+    only: str = "",
+    workers: int = 0,
+    ray: RayAddress = None,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Build a table of places side by side.
+
+    The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,layouts,things,
+    buildings,precedence,seed. Semicolons, tabs, decimal commas and columns such as City or Longitude are read too; a
+    row that can't be read is told with its line.
+    Worlds that are there are kept, those that fail are told at the end (exit 1) and do not stop the others.
+
+    Example: vico world build-many places.csv --out worlds --workers 4
+
+    Example: vico world build-many paper35 --out worlds
+
+    Example: vico world build-many places.csv --out s3://bucket/worlds --ray
+
+    Args:
+        table: The places; file names in it are relative to it. Or the name of a list, such as paper35.
+        extracts: For a list: folder with maps of its places; the others are fetched.
+        only: Names of the places to build, separated by commas; all without.
+        out: Parent folder of the worlds, or a URL like s3://BUCKET/worlds (the extra "s3").
+        workers: Processes side by side; 0 is one a processor.
+        ray: Hand the places to a Ray cluster instead (the extra "ray"): its address; without one, that which runs here.
+        force: Build anew worlds that are there.
+        json: Print the outcomes as JSON.
+    """
+    from vico.io.stores import store_at
+    from vico.worldgen.batch import Outcome, build_many
+    from vico.worldgen.request import locate_map
+
+    places = _rows_of_table(table, extracts=extracts, only=only)
+    rows = places.rows
+    for note in places.notes:
+        print(note, file=sys.stderr)
+    with progress_bars() as report:
+        report("places", 0, len(rows))
+        outcomes = build_many(
+            rows,
+            store_at(out),
+            locate=locate_map,
+            workers=workers or os.cpu_count() or 1,
+            force=force,
+            ray=ray,
+            finished=lambda _, done, total: report("places", done, total),
+        )
+    outcomes += [Outcome(row.name, "failed", reason=row.reason) for row in places.bad]
+    failed = [outcome for outcome in outcomes if outcome.state == "failed"]
+    if json:
+        print_json({"ok": not failed, "places": [asdict(outcome) for outcome in outcomes]})
+    else:
+        for o in outcomes:
+            what = o.reason or f"{o.buildings} buildings, {o.places} places, {o.seconds:.1f} s"
+            what += "; flat, no --dem" if o.flat else ""
+            print(f"{o.name}: {o.state}: {what}")
+    return 1 if failed else 0
+
+
+def _rows_of_table(table: Path, *, extracts: Path | None, only: str) -> PlaceTable:
     """Return the places of a table, which is a file, or of a list that is known by name."""
-    from vico.worldgen.batch import place_lists, rows_of
+    from vico.worldgen.batch import PlaceTable, place_lists, read_place_table, rows_of
 
-    names = {name.strip() for name in only.split(",") if name.strip()}
+    names = set(split_names(only))
     lists = place_lists()
     if not table.exists() and str(table) in lists:
         return PlaceTable(tuple(rows_of(lists[str(table)], extracts=extracts, only=names)))
@@ -181,47 +243,38 @@ def rows_of_table(table: Path, *, extracts: Path | None, only: str) -> PlaceTabl
     return replace(read, rows=rows, bad=tuple(row for row in read.bad if not names or row.name in names))
 
 
-def build_table(
-    table: PlaceTable,
-    *,
-    out: str,
-    workers: int,
-    ray: str | None = None,
-    force: bool = False,
-    json: bool = False,
-) -> int:
-    """Build places; 1 if any failed, or a row of the table could not be read."""
-    from vico.io.stores import store_at
-    from vico.worldgen.batch import Outcome, build_many
+@world.command(name="info")
+def world_info(path: Positional[Path], json: bool = False) -> int:
+    """Say what a world holds.
 
-    rows = table.rows
-    for note in table.notes:
-        print(note, file=sys.stderr)
-    with progress_bars() as report:
-        report("places", 0, len(rows))
-        outcomes = build_many(
-            rows,
-            store_at(out),
-            locate=locate,
-            workers=workers,
-            force=force,
-            ray=ray,
-            finished=lambda _, done, total: report("places", done, total),
-        )
-    outcomes += [Outcome(row.name, "failed", reason=row.reason) for row in table.bad]
-    failed = [outcome for outcome in outcomes if outcome.state == "failed"]
+    Example: vico world info helsinki --json
+
+    Args:
+        path: World folder.
+        json: Print JSON.
+    """
+    from vico.world.folder import read_world
+
+    content = _facts(read_world(path))
     if json:
-        print_json({"ok": not failed, "places": [asdict(outcome) for outcome in outcomes]})
-    else:
-        for o in outcomes:
-            what = o.reason or f"{o.buildings} buildings, {o.places} places, {o.seconds:.1f} s"
-            what += "; flat, no --dem" if o.flat else ""
-            print(f"{o.name}: {o.state}: {what}")
-    return 1 if failed else 0
+        print_json(content)
+        return 0
+    rows = {name: value for name, value in content.items() if not isinstance(value, dict | list)}
+    rows |= {f"places: {kind}": number for kind, number in content["places_by_type"].items()}
+    for what in ("footprint", "height", "roof"):
+        rows |= {f"{what} from {name}": number for name, number in content.get(f"{what}_from", {}).items()}
+    rows |= {f"dropped: {stage}": number for stage, number in content["dropped"].items()}
+    rows |= {"seconds": content["seconds"]["total"]}
+    rows |= {f"source: {source['name']}": source["attribution"] for source in content["sources"]}
+    dropped = {f"dropped: {stage}": _DROPPED for stage in list(content["dropped"])[:1]}
+    print_table(f"world {path}", rows, _MEANINGS | dropped)
+    return 0
 
 
-def facts(world: World) -> dict[str, Any]:
+def _facts(world: World) -> dict[str, Any]:
     """Return what `world info` tells."""
+    from vico.world.world import stage_seconds
+
     manifest = world.manifest
     seconds = stage_seconds(world)
     return {
@@ -251,29 +304,17 @@ def _building_sources(world: World) -> dict[str, dict[str, int]]:
     }
 
 
-def info(path: Path, *, json: bool = False) -> int:
-    """Say what a world holds."""
-    content = facts(read_world(path))
-    if json:
-        print_json(content)
-        return 0
-    rows = {name: value for name, value in content.items() if not isinstance(value, dict | list)}
-    rows |= {f"places: {kind}": number for kind, number in content["places_by_type"].items()}
-    for what in ("footprint", "height", "roof"):
-        rows |= {f"{what} from {name}": number for name, number in content.get(f"{what}_from", {}).items()}
-    rows |= {f"dropped: {stage}": number for stage, number in content["dropped"].items()}
-    rows |= {"seconds": content["seconds"]["total"]}
-    rows |= {f"source: {source['name']}": source["attribution"] for source in content["sources"]}
-    dropped = {f"dropped: {stage}": _DROPPED for stage in list(content["dropped"])[:1]}
-    print_table(f"world {path}", rows, _MEANINGS | dropped)
-    return 0
+def check_world(path: Positional[Path], json: bool = False) -> int:
+    """Check a world: schema, hashes, buildings, entrances, rooms, lanes, transit. Exit 1 if anything is wrong.
 
+    Args:
+        path: World folder.
+        json: Print JSON.
+    """
+    from vico.world.check import check_world as findings_of
+    from vico.world.folder import read_world
 
-def check(path: Path, *, json: bool = False) -> int:
-    """Check a world; 1 if anything is wrong."""
-    from vico.world.check import check_world
-
-    findings = check_world(read_world(path))
+    findings = findings_of(read_world(path))
     if json:
         print_json({"ok": not findings, "findings": [finding._asdict() for finding in findings]})
     else:
@@ -284,9 +325,28 @@ def check(path: Path, *, json: bool = False) -> int:
     return 1 if findings else 0
 
 
-def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool = False, json: bool = False) -> int:
-    """Write a world in another format."""
+def export(
+    path: Positional[Path],
+    to: Literal["gltf", "usd", "mjcf", "geojson", "xodr"],
+    out: Path,
+    rooms: bool = False,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Write a world in another format: glTF, OpenUSD, MuJoCo, GeoJSON, OpenDRIVE.
+
+    Example: vico export helsinki --to mjcf --out helsinki_mjcf
+
+    Args:
+        path: World folder.
+        to: The format. "usd" needs the extra of that name.
+        out: Folder to make; refused if it exists, unless --force.
+        rooms: With what lies indoors.
+        force: Replace what this verb made there before; refused if the folder holds anything else.
+        json: Print the result as JSON.
+    """
     from vico.world.exports import EXPORT_FOLDER, export_world
+    from vico.world.folder import read_world
 
     check_output(out, path, force=force, kind=EXPORT_FOLDER)
     counts = export_world(read_world(path), to, out, rooms=rooms, force=force)

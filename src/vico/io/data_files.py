@@ -108,13 +108,13 @@ def cached_data(make: Callable[P, T]) -> Callable[P, T]:
     made: dict[Hashable, T] = {}
 
     @wraps(make)
-    def kept(*args: P.args, **kwargs: P.kwargs) -> T:
+    def made_once(*args: P.args, **kwargs: P.kwargs) -> T:
         key = (os.environ.get(VARIABLE, ""), args, tuple(kwargs.items()))
         if key not in made:
             made[key] = make(*args, **kwargs)
         return made[key]
 
-    return kept
+    return made_once
 
 
 def read_record(path: Path, kind: type[R], *, guide: str = "") -> R:

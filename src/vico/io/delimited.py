@@ -77,7 +77,7 @@ class DelimitedText:
         first, delimiter = self._first_line(spelt)
         self.separator = _SEPARATORS[delimiter]
         self._rows = csv.reader(self._lines(first), delimiter=delimiter, skipinitialspace=delimiter != "\t")
-        with self._told():
+        with self._csv_errors():
             cells = next(self._rows, [])
         self.written = [cell.strip() for cell in cells]
         self.header = _canonical_header(self.written, columns)
@@ -95,14 +95,14 @@ class DelimitedText:
         SchemaError
             If a row can't be told from the next, or is not in the encoding that the table begins with.
         """
-        with self._told():
+        with self._csv_errors():
             for row in self._rows:
                 cells = [cell.strip() for cell in row]
                 if any(cells):
                     yield cells
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _csv_errors(self) -> Iterator[None]:
         try:
             yield
         except csv.Error as error:
@@ -143,10 +143,10 @@ class DelimitedText:
             if len(line) >= _MOST_LINE:
                 raise SchemaError(f"{self._what} has a line of more than {_MOST_LINE:,} characters; mend the table")
             if not line.isascii():
-                line = self._redecoded(line)
+                line = self._redecode(line)
             yield line.replace("\0", "") if "\0" in line else line
 
-    def _redecoded(self, line: str) -> str:
+    def _redecode(self, line: str) -> str:
         try:
             line.encode()
         except UnicodeEncodeError:

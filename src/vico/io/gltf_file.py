@@ -146,7 +146,9 @@ class GltfFile:
         if not isinstance(count, int) or not 0 <= count <= _MOST_VALUES:
             raise GltfFault(f"accessor {index} claims {count} values; export it anew")
         if "bufferView" in accessor:
-            values = self._strided(accessor["bufferView"], accessor.get("byteOffset", 0), kind, width, count, index)
+            values = self._read_strided(
+                accessor["bufferView"], accessor.get("byteOffset", 0), kind, width, count, index
+            )
         else:
             values = np.zeros((count, width), kind)
         sparse = accessor.get("sparse")
@@ -154,15 +156,19 @@ class GltfFile:
             values = values.copy()
             many = sparse["count"]
             at, new = sparse["indices"], sparse["values"]
-            which = self._strided(
+            which = self._read_strided(
                 at["bufferView"], at.get("byteOffset", 0), COMPONENTS[at["componentType"]], 1, many, index
             )
-            values[which[:, 0]] = self._strided(new["bufferView"], new.get("byteOffset", 0), kind, width, many, index)
+            values[which[:, 0]] = self._read_strided(
+                new["bufferView"], new.get("byteOffset", 0), kind, width, many, index
+            )
         if accessor.get("normalized") and kind.kind in "iu":
             values = np.maximum(values / float(np.iinfo(kind).max), -1.0)
         return values[:, 0] if width == 1 else values
 
-    def _strided(self, view: int, offset: int, kind: np.dtype[Any], width: int, count: int, index: int) -> NDArray[Any]:
+    def _read_strided(
+        self, view: int, offset: int, kind: np.dtype[Any], width: int, count: int, index: int
+    ) -> NDArray[Any]:
         data, stride = self.view(view)
         packed = kind.itemsize * width
         stride = stride or packed

@@ -523,7 +523,7 @@ class HttpClient:
                 lambda: self._exchange(request, limits), backoff=self._backoff, sleep=self._sleep
             )
         except HttpError as error:
-            raise _source_error(request, self._explained(error), error.status) from None
+            raise _source_error(request, self._explanation(error), error.status) from None
         if validate is not None and status == 200:
             reason = validate(content)
             if reason is not None:
@@ -547,7 +547,7 @@ class HttpClient:
         if start > now:
             self._sleep(start - now)
 
-    def _explained(self, error: HttpError) -> str:
+    def _explanation(self, error: HttpError) -> str:
         if error.status is None:
             return f"{error} after {error.tries} tries" if error.tries > 1 else str(error)
         asked = error.retry_after or 0.0

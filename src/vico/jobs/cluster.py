@@ -157,7 +157,11 @@ def connect(address: str, processors: int) -> None:
     try:
         found = _known_address() if address == "auto" else address
         if found in ("", "local"):
-            _start(ray, processors, how)
+            # A cluster on this machine listens on all interfaces, whatever it is told: with a token nobody gets in
+            # unasked. Ray (2.60 on) would write its own into the home folder; this one lasts as long as the process.
+            if not {"RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & set(os.environ):
+                os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
+            ray.init("local", num_cpus=processors, include_dashboard=False, **how)
         else:
             _check_answer(found)  # Ray itself tries for minutes
             ray.init(found, **how)
@@ -189,14 +193,6 @@ def _check_answer(address: str) -> None:
             socket.create_connection((host.strip("[]"), int(port)), timeout=_KNOCK).close()
         except OSError as error:
             raise ConnectionError(f"nothing answers at {address} ({error.strerror or error})") from None
-
-
-def _start(ray: Any, processors: int, how: dict[str, Any]) -> None:
-    """Start a cluster on this machine; whatever Ray is told it listens on all interfaces, so nobody gets in unasked."""
-    # It asks for a word (Ray 2.60 on) that would be written into the home folder; Ray keeps it as long as the process.
-    if not {"RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & set(os.environ):
-        os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
-    ray.init("local", num_cpus=processors, include_dashboard=False, **how)
 
 
 def ray_module() -> Any:
@@ -291,7 +287,7 @@ class RayActors:
         pairs = [self._make(maker) for maker in makers]
         self._actors = [actor for actor, _ in pairs]
         for _, ref in pairs:
-            self._made(ref)
+            self._wait_until_made(ref)
 
     def __len__(self) -> int:
         return len(self._makers)
@@ -312,7 +308,7 @@ class RayActors:
         refs = [None if one is None else self._actors[k].ask.remote(*one) for k, one in enumerate(asked)]
         answers = []
         for k, (one, ref) in enumerate(zip(asked, refs, strict=True)):
-            answers.append(None if one is None else self._received(k, one, ref))
+            answers.append(None if one is None else self._receive(k, one, ref))
             if one is not None:
                 self._told[k].append(one)
         return answers
@@ -335,13 +331,13 @@ class RayActors:
         actor.look_in.remote(sys.path)
         return actor, actor.make.remote(maker)
 
-    def _made(self, ref: Any) -> None:
+    def _wait_until_made(self, ref: Any) -> None:
         try:
             self._ray.get(ref)
         except self._ray.exceptions.RayTaskError as error:
             raise InputError(f"Ray: an object cannot be made: {first_line(error)}") from None
 
-    def _received(self, k: int, one: tuple[str, tuple[Any, ...], dict[str, Any]], ref: Any) -> Any:
+    def _receive(self, k: int, one: tuple[str, tuple[Any, ...], dict[str, Any]], ref: Any) -> Any:
         """Wait for an answer; make the object anew if it is lost."""
         for _ in range(_TRIES):
             try:

@@ -80,7 +80,7 @@ class Processes:
         How many at most; they share the processors.
     """
 
-    one_machine = True
+    one_machine: bool = True
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -162,7 +162,7 @@ class _Round:
         assert worker.index is not None
         message = _receive_message(worker)
         if message is None:
-            self._lost(worker, done)
+            self._replace_lost(worker, done)
         elif "told" in message:
             if told is not None:
                 told(message["told"])
@@ -171,7 +171,7 @@ class _Round:
             index, worker.index = worker.index, None
             done(index, answer)
 
-    def _lost(self, worker: _Worker, done: AnswerHandler) -> None:
+    def _replace_lost(self, worker: _Worker, done: AnswerHandler) -> None:
         """Do a dead process's task again in another one; mark it if that was its second try."""
         assert worker.index is not None
         index = worker.index
@@ -227,7 +227,7 @@ def open_executor(*, workers: int = 1, ray: str | None = None) -> Executor:
 class ThisProcess:
     """Does one task after the other where it was asked."""
 
-    one_machine = True
+    one_machine: bool = True
 
     def run(
         self, service: Service, tasks: Sequence[Task], *, done: AnswerHandler, told: MessageHandler | None = None

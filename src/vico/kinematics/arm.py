@@ -16,7 +16,10 @@ from vico.io.compiled import compiled
 
 Array = NDArray[np.float64]
 
-_DAMPING, _STEPS, _LONGEST = 0.03, 60, 0.25
+# Of the search for joint angles.
+_DAMPING = 0.03
+_STEPS = 60  # at most
+_LONGEST = 0.25  # step, radians
 _STARTS = 12
 
 
@@ -222,7 +225,12 @@ def collision_spheres(chain: Chain, radii: Array, *, jaw: Jaw, opening: float) -
         finger = [np.array([0.0, side * (opening + jaw.thickness * 0.5), z]) for z in jaw.pads]
         balls += _along(finger[0], finger[1] - np.array([0.0, 0.0, jaw.thickness]), jaw.thickness)
     found += [(count - 1, point, jaw.thickness) for point in balls]
-    return _stack_spheres(found)
+    found.sort(key=lambda one: one[0])
+    return CollisionSpheres(
+        np.array([one[0] for one in found], np.int64),
+        np.array([one[1] for one in found]),
+        np.array([one[2] for one in found]),
+    )
 
 
 def with_held_object(limbs: CollisionSpheres, points: Array, radius: float) -> CollisionSpheres:
@@ -255,15 +263,6 @@ def _along(start: Array, end: Array, radius: float) -> list[Array]:
     """Return points on a line, no farther apart than balls of a radius cover well."""
     count = max(math.ceil(float(np.linalg.norm(end - start)) / (1.2 * radius)), 1)
     return [start + (end - start) * k / count for k in range(count + 1)]
-
-
-def _stack_spheres(found: list[tuple[int, Array, float]]) -> CollisionSpheres:
-    found.sort(key=lambda one: one[0])
-    return CollisionSpheres(
-        np.array([one[0] for one in found], np.int64),
-        np.array([one[1] for one in found]),
-        np.array([one[2] for one in found]),
-    )
 
 
 @compiled

@@ -130,8 +130,9 @@ def obstacle_distance(room: DistanceGrid, limbs: CollisionSpheres, places: Array
     return float(clearance(room, limbs, places, -1e9))
 
 
-# Radians between two looks along a way, and between two nodes of a tree; nodes of a tree at most.
-_LOOK, _STEP, _MOST = 0.06, 0.35, 1500
+_LOOK = 0.06  # between two looks along a way, radians
+_STEP = 0.35  # between two nodes of a tree, radians
+_MOST = 1500  # nodes of a tree
 # Straight pieces that are tried in place of parts of a way.
 _SHORTCUTS = 60
 
@@ -320,7 +321,9 @@ def _shorten(arm, way, count, places, luck):  # type: ignore[no-untyped-def]
     return count
 
 
-_STEPS, _LONGEST, _STARTS = 80, 0.25, 12
+_STEPS = 80  # at most
+_LONGEST = 0.25  # step, radians
+_STARTS = 12
 # Share of what is left to the posture that a step takes; exact enough, metres and radians summed.
 _DRAWN, _EXACT = 0.15, 2e-3
 

@@ -15,7 +15,7 @@ from vico.errors import InputError, LlmReplyError
 from vico.io.http import Backoff, with_retries
 from vico.llm.budget import Budget, Usage
 from vico.llm.prompts import Message, check_messages, data_block, tokens_of, user
-from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
+from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of
 from vico.llm.replies import Check, one_line, parse_reply, refusal_text, reply_text, response_format, schema_instruction
 from vico.llm.transport import Connection, Endpoint, RequestError, post
 
@@ -129,8 +129,11 @@ class LanguageModel:
             if env.get(variable):
                 options.setdefault(option, Path(env[variable]))
         replayed = options.get("replay")
-        endpoint = recorded_endpoint(replayed) if replayed is not None else Endpoint.from_environment(env)
-        return cls(endpoint, **options)
+        if replayed is None:
+            return cls(Endpoint.from_environment(env), **options)
+        # The endpoint the recording was made with, without its key: enough to replay it.
+        replay = Replay(replayed)
+        return cls(Endpoint(replay.base, replay.model), **options)
 
     @property
     def recorded(self) -> bool:
@@ -193,7 +196,7 @@ class LanguageModel:
             If the messages are unusable, or the recording that is replayed holds no answer.
         """
         said = check_messages(messages)
-        kept = self._kept(said, reply, check)
+        kept = self._cached_reply(said, reply, check)
         if kept is not None:
             return kept
         used = Usage()
@@ -221,7 +224,7 @@ class LanguageModel:
         what = f"no usable reply in {rounds + 1}; the last: {findings[0]}{more}"
         raise _unusable(self.endpoint, what, findings, answer.text)
 
-    def _kept(self, said: list[Message], reply: type[T], check: Check[T] | None) -> Reply[T] | None:
+    def _cached_reply(self, said: list[Message], reply: type[T], check: Check[T] | None) -> Reply[T] | None:
         """Return the reply in the cache, if it is still good."""
         if self._cache is None or self._replay is not None:
             return None
@@ -268,20 +271,20 @@ class LanguageModel:
     def _answer(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
         """Return a server's answer, of any kind, within the budget."""
         if self._replay is not None:
-            free = self._replay.cached(self._whole(turns, reply))
+            free = self._replay.cached_answer(self._whole(turns, reply))
             if free is not None:
                 return free
-        asked = self._priced(Usage(1, tokens_of(turns), 0))
+        asked = self._with_price(Usage(1, tokens_of(turns), 0))
         self.budget.take(asked)
         try:
-            answer = self._told(turns, reply)
+            answer = self._ask_server(turns, reply)
         except BaseException:
             self.budget.release(asked)
             raise
         self.budget.settle(asked, answer.usage)
         return answer
 
-    def _told(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
+    def _ask_server(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
         """Return the answer, asked for without what the server turns out to refuse."""
         if self._replay is not None:
             return self._replay.answer(self._whole(turns, reply))
@@ -290,7 +293,7 @@ class LanguageModel:
         while True:
             request = self._request(turns, reply)
             try:
-                answer = self._read_answer(self._sent(request, retries), tokens_of(turns))
+                answer = self._read_answer(self._send(request, retries), tokens_of(turns))
                 break
             except RequestError as error:
                 part = self._to_leave_out(error, request, reply, tried)
@@ -333,7 +336,7 @@ class LanguageModel:
                 return part
         return None
 
-    def _sent(self, request: dict[str, Any], retries: int) -> dict[str, Any]:
+    def _send(self, request: dict[str, Any], retries: int) -> dict[str, Any]:
         """Return the answer to a request that is sent as often as it takes, and sent again so many times at most."""
         how = self.connection
         failed = 0
@@ -374,9 +377,9 @@ class LanguageModel:
         usage = Usage(
             1, _count(counted.get("prompt_tokens"), asked), _count(counted.get("completion_tokens"), len(text) // 4)
         )
-        return Answer(text, finish, refusal, self._priced(usage))
+        return Answer(text, finish, refusal, self._with_price(usage))
 
-    def _priced(self, usage: Usage) -> Usage:
+    def _with_price(self, usage: Usage) -> Usage:
         if self.endpoint.price is None:
             return usage
         read, written = self.endpoint.price

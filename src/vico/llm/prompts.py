@@ -204,7 +204,7 @@ class Prompt:
             raise InputError(f"{self.path}: inputs.{missing[0]}: no value is given for it")
         if unknown := sorted(inputs.keys() - wanted.keys()):
             raise InputError(f"{self.path}: {unknown[0]!r} is no input of this prompt; it takes {', '.join(wanted)}")
-        said = {name: self._said(name, one, inputs[name]) for name, one in wanted.items()}
+        said = {name: self._input_text(name, one, inputs[name]) for name, one in wanted.items()}
         head = _fill_placeholders(self.file.system, said)
         if any(one.kind == "data" for one in wanted.values()):
             head = f"{head.rstrip()}\n{_ABOUT_DATA}"
@@ -223,7 +223,7 @@ class Prompt:
         listed = data_block("findings", [finding[:_MOST_FINDING] for finding in findings[:_MOST_FINDINGS]])
         return [{"role": "assistant", "content": reply}, user(f"{self.file.mend.rstrip()}\n{listed}")]
 
-    def _said(self, name: str, kind: PromptInput, value: Any) -> str:
+    def _input_text(self, name: str, kind: PromptInput, value: Any) -> str:
         where = f"{self.path}: inputs.{name}"
         if kind.kind == "data":
             return data_block(name, value, where=where)
@@ -251,15 +251,11 @@ def data_block(name: str, value: Any, *, where: str = "data") -> str:
     if len(text) > _MOST_DATA:
         raise InputError(f"{where}: {len(text):,} characters; at most {_MOST_DATA:,} can be put into a prompt")
     # Marks are the only angle brackets: in JSON these are written as escapes, which say the same.
-    escaped = "".join(_ESCAPES.get(c, c if c.isprintable() else _escape(c)) for c in text)
+    escaped = "".join(_ESCAPES.get(c, c if c.isprintable() else json.dumps(c, ensure_ascii=True)[1:-1]) for c in text)
     return f'<data name="{name}">\n{escaped}\n</data>'
 
 
 _ESCAPES = {"<": "\\u003c", ">": "\\u003e"}
-
-
-def _escape(character: str) -> str:
-    return json.dumps(character, ensure_ascii=True)[1:-1]
 
 
 def _fill_placeholders(text: str, said: Mapping[str, str]) -> str:

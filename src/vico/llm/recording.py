@@ -142,7 +142,7 @@ class Replay:
         self.base, self.model = self.base or line.base, self.model or line.model
         self._answers[line.digest].append((Answer(line.text, line.finish, line.refusal, usage), line.cached))
 
-    def cached(self, request: Mapping[str, Any]) -> Answer | None:
+    def cached_answer(self, request: Mapping[str, Any]) -> Answer | None:
         """Return the next answer to a request if it came from the cache then, and so cost nothing; else None."""
         with self._lock:
             waiting = self._answers.get(digest_of(request))
@@ -166,18 +166,6 @@ class Replay:
             f"{self.path}: holds {more} to request {digest[:12]} of {request.get('model')}; what is asked has changed "
             "since, so record it anew with VICO_LLM_RECORD"
         )
-
-
-def recorded_endpoint(path: Path) -> Endpoint:
-    """Return the endpoint a recording was made with, without its key: enough to replay it.
-
-    Raises
-    ------
-    MissingFileError, SchemaError, InputError
-        If there is no usable recording.
-    """
-    replay = Replay(path)
-    return Endpoint(replay.base, replay.model)
 
 
 class Cache:

@@ -227,11 +227,6 @@ def _strip_tags(text: str) -> str:
     return "".join(kept)
 
 
-def ends_in_an_object(text: str) -> bool:
-    """Whether a text ends with a JSON object: an answer, where a server put all of it among the thoughts."""
-    return without_thoughts(text).rstrip().removesuffix("```").rstrip().endswith("}")
-
-
 T = TypeVar("T", bound=BaseModel)
 
 #: Says what is wrong with a record that is well formed, one sentence each.
@@ -326,7 +321,8 @@ def reply_text(message: Mapping[str, Any], finish: str) -> str:
         said = f"{called}\n{beside}" if "{" in beside else called
     if not said.strip() and finish != "length":
         thoughts = message.get("reasoning_content") or message.get("reasoning") or message.get("thinking")
-        if isinstance(thoughts, str) and ends_in_an_object(thoughts):
+        # Some servers put all of an answer among the thoughts: it counts if it ends with a JSON object.
+        if isinstance(thoughts, str) and without_thoughts(thoughts).rstrip().removesuffix("```").rstrip().endswith("}"):
             said = thoughts
     return said.encode("utf-8", "replace").decode()  # lone surrogates
 

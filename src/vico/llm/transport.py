@@ -315,18 +315,6 @@ def post(endpoint: Endpoint, body: dict[str, Any], timeout: float) -> dict[str, 
         if error.status is not None:
             raise _refusal(error.status, error.page, endpoint, error.retry_after) from None
         raise RequestError(f"{error}{_hint(error.cause)}", transient=error.transient) from None
-    return _object(received, endpoint)
-
-
-def _hint(cause: object) -> str:
-    if isinstance(cause, socket.gaierror):
-        return " Check VICO_LLM_BASE_URL"
-    if isinstance(cause, ConnectionRefusedError):
-        return ": is the server running, and VICO_LLM_BASE_URL right?"
-    return ""
-
-
-def _object(received: bytes, endpoint: Endpoint) -> dict[str, Any]:
     # Routers that keep a connection open by comments send them before an answer that is no stream, too.
     text = re.sub(r"\A\s*(?::[^\n]*\n\s*)+", "", received.decode("utf-8-sig", "replace"))
     try:
@@ -343,6 +331,14 @@ def _object(received: bytes, endpoint: Endpoint) -> dict[str, Any]:
         status = code if isinstance(code, int) and 400 <= code < 600 else 400
         raise _refusal(status, json.dumps({"error": told}), endpoint)
     return answer
+
+
+def _hint(cause: object) -> str:
+    if isinstance(cause, socket.gaierror):
+        return " Check VICO_LLM_BASE_URL"
+    if isinstance(cause, ConnectionRefusedError):
+        return ": is the server running, and VICO_LLM_BASE_URL right?"
+    return ""
 
 
 def _refusal(status: int, page: str, endpoint: Endpoint, wait: float | None = None) -> RequestError:

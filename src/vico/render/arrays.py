@@ -17,8 +17,11 @@ PAD = 32
 TILE, BLOCK = 8, 4
 # Triangles whose setup the shader keeps at hand; a power of two.
 SETUPS = 2048
-# Where a thing is; what is `SHADOWLESS` is outdoors and darkens nothing.
-OUTDOORS, INDOORS, ANYWHERE, SHADOWLESS = 0, 1, 2, 3
+# Where a thing is.
+OUTDOORS = 0
+INDOORS = 1
+ANYWHERE = 2
+SHADOWLESS = 3  # outdoors, and darkens nothing
 # Static instances that are looked at together.
 INSTANCE_GROUP = 48
 # Rows of `Buffers.vertex`: camera frame, metres; picture, pixels; 1 / metres.

@@ -284,14 +284,14 @@ class CubeMap:
     corners: NDArray[np.int64]
     shares: NDArray[np.float32]
 
-    def taken(self, pictures: NDArray[Any]) -> NDArray[Any]:
+    def sample_nearest(self, pictures: NDArray[Any]) -> NDArray[Any]:
         """Return what the lens sees of pictures of the faces, shape ``(f, side, side, ...)``: nearest pixel, else 0."""
         flat = pictures.reshape(-1, *pictures.shape[3:])
         out = flat[np.maximum(self.nearest, 0)]
         out[self.nearest < 0] = 0
         return out
 
-    def blended(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def sample_bilinear(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return colours that the lens sees, of the four pixels around each ray."""
         flat = pictures.reshape(-1, pictures.shape[-1])
         mixed = np.zeros((*self.nearest.shape, pictures.shape[-1]), np.float32)

@@ -31,7 +31,7 @@ from vico.render.shading.post_processing import draw_weather, occlude, smooth_ed
 from vico.render.shading.surfaces import write_surface
 from vico.render.shadows.casters import new_caster
 from vico.render.uniforms import NO_LIGHT, Light, Record, camera_uniforms
-from vico.render.view import NO_STATIC_PICTURE, ViewCache, ViewOutputs, fitting_buffers, render_view
+from vico.render.view import NO_STATIC_PICTURE, ViewCache, ViewOutputs, render_view
 from vico.world.mesh import Material, Surface
 
 
@@ -529,7 +529,9 @@ def _picture_of_room(scene: Scene, light: Light, moving: bool, camera: Record) -
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:
-    """Return scratch memory of the running thread."""
-    buffers = fitting_buffers(getattr(_local, "buffers", None), scene, width, height)
-    _local.buffers = buffers
+    """Return scratch memory of the running thread: new where the pictures are others or the scene has grown."""
+    buffers: Buffers | None = getattr(_local, "buffers", None)
+    if buffers is None or not buffers.fit(scene.arrays, width, height):
+        buffers = buffers_for(scene.arrays, width, height)
+        _local.buffers = buffers
     return buffers

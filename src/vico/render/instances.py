@@ -150,16 +150,16 @@ def with_avatar_capacity(mesh: Mesh, used: tuple[int, int], vertices: int, trian
     """Return a copy of the static part with space for avatars behind it."""
     t, v = used
 
-    def grown(values: NDArray[Any], keep: int, extra: int) -> NDArray[Any]:
+    def grow(values: NDArray[Any], keep: int, extra: int) -> NDArray[Any]:
         return np.concatenate([values[:keep], np.zeros((extra, *values.shape[1:]), values.dtype)])
 
     return Mesh(
-        grown(mesh.x, v, vertices),
-        grown(mesh.y, v, vertices),
-        grown(mesh.z, v, vertices),
-        grown(mesh.vertex, v, vertices),
-        grown(mesh.triangle, t, triangles),
-        grown(mesh.entity, t, triangles),
+        grow(mesh.x, v, vertices),
+        grow(mesh.y, v, vertices),
+        grow(mesh.z, v, vertices),
+        grow(mesh.vertex, v, vertices),
+        grow(mesh.triangle, t, triangles),
+        grow(mesh.entity, t, triangles),
     )
 
 

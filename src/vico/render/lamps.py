@@ -49,7 +49,7 @@ class Beams(NamedTuple):
     row: NDArray[np.int32]
     lamps: NDArray[np.void]
 
-    def placed(self, prototype: NDArray[np.int32], rows: NDArray[np.float32]) -> NDArray[np.void]:
+    def place(self, prototype: NDArray[np.int32], rows: NDArray[np.float32]) -> NDArray[np.void]:
         """Return the headlights of placed models; `rows` are of their transforms, shape ``(n, 3, 4)``."""
         known = self.row[prototype]
         shining = np.flatnonzero(known >= 0)

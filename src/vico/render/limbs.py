@@ -30,6 +30,8 @@ for _side in ("left", "right"):
         _ENDS[f"{_side}_{_name}"] = (*_joints, 0.0), (*_joints, _way)
 LIMBS = tuple(_ENDS)
 HEAD = LIMBS.index("head")
+#: Column of a limb, as `PosedAvatars` has it, of its radius: after both ends.
+LIMB_RADIUS = 6
 # Joints of both ends, shape (limbs, 2, 2), and how far from the one to the other, shape (limbs, 2).
 LIMB_JOINTS = np.array([[[J[a], J[b]] for a, b, _ in ends] for ends in _ENDS.values()], np.int32)
 LIMB_WAYS = np.array([[way for *_, way in ends] for ends in _ENDS.values()], np.float32)

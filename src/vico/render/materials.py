@@ -52,7 +52,9 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
     start = np.zeros((n, LEVELS), np.int64)
     records = np.zeros(n, MATERIAL)
     # One array from the start: joining the levels at the end would take the memory of a photographed city twice.
-    texels = np.full(1 + sum(_texel_count(*sides) for sides in _shapes(materials)), 0xFFFFFFFF, np.uint32)
+    textures = {id(m.texture): m.texture for m in materials if m.texture is not None}.values()
+    count = 1 + sum(_texel_count(*_sides(*texture.shape[:2])) for texture in textures)
+    texels = np.full(count, 0xFFFFFFFF, np.uint32)
     position = 1
     known: dict[int, int] = {}
     for index, material in enumerate(materials):
@@ -78,11 +80,6 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
 
     for_each(fill, known.values())
     return Textures(texels, start, records)
-
-
-def _shapes(materials: Sequence[Material]) -> list[tuple[int, int]]:
-    """Sides of the finest levels of all textures, each texture once."""
-    return [_sides(*t.shape[:2]) for t in {id(m.texture): m.texture for m in materials}.values() if t is not None]
 
 
 def _sides(height: int, width: int) -> tuple[int, int]:
@@ -217,7 +214,7 @@ class Palette:
             self._packed = None
         return self._known[key]
 
-    def packed(self) -> Textures:
+    def pack(self) -> Textures:
         """Return the textures of all materials so far; the same arrays until there is another one."""
         if self._packed is None:
             self._packed = pack_textures(self._entries)

@@ -202,7 +202,8 @@ def show_interpolated(before: SceneMoment, after: SceneMoment, share: float) -> 
     scene = after.scene
     scene.moment = before.second + share * (after.second - before.second)
     if before.scene is not scene or share >= 1.0:
-        _show(after)
+        _set_rigid(after, after.placement.matrix)
+        _set_avatars(after)
         return scene
     a, b = before.placement, after.placement
     place, known = match_instances(a, b)
@@ -250,11 +251,6 @@ def interpolate_transforms(a: NDArray[np.float32], b: NDArray[np.float32], share
     out = a + np.float32(share) * (b - a)
     out[:, :, :3] = turned * size
     return np.asarray(out, np.float32)
-
-
-def _show(moment: SceneMoment) -> None:
-    _set_rigid(moment, moment.placement.matrix)
-    _set_avatars(moment)
 
 
 def _set_avatars(moment: SceneMoment) -> None:

@@ -19,13 +19,15 @@ from vico.render.scene import Scene
 from vico.render.uniforms import Record, set_room
 from vico.render.visibility.rasteriser import box_in_picture, inverse_depth, triangle_number
 
-# No more rooms than this are shown in one picture, none farther away, nor from nearer to the wall, metres.
-_MOST, _FARTHEST, _NEAREST = 3, 38.0, 0.25
+_MOST = 3  # rooms that one picture shows
+_FARTHEST = 38.0  # of these, metres
+_NEAREST = 0.25  # to the wall, metres: from nearer none is shown
 # The pane lies no farther than this off the wall, metres.
 _OFF_WALL = 0.12
-# Least height of a room, pixels of a picture of 256; and the least part of a picture that shows a room: so large a
-# share, and so many pixels that it can be told from a painted one.
-_LEAST_PIXELS, _LEAST_SHARE, _LEAST_SEEN = 10.0, 0.0015, 300
+_LEAST_PIXELS = 10.0  # height of a room, pixels of a picture of 256
+# The least part of a picture that shows a room.
+_LEAST_SHARE = 0.0015
+_LEAST_SEEN = 300  # pixels: it can be told from a painted one
 # Pixels of a room's picture beside those in which it is seen.
 _FINER = 1.0
 # Light indoors beside that on the street by day.

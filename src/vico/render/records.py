@@ -50,8 +50,13 @@ MATERIAL = np.dtype(
     ],
     align=True,
 )
-CUTOUT, DOUBLE_SIDED = 1, 2
-NO_WINDOWS, UPPER_WINDOWS, GROUND_WINDOWS = 0, 1, 2
+# Bits of a material.
+CUTOUT = 1
+DOUBLE_SIDED = 2
+# Of which windows a material's light is.
+NO_WINDOWS = 0
+UPPER_WINDOWS = 1
+GROUND_WINDOWS = 2
 # How much of the light of a building's windows is on. As `surface.frag` reads it, too.
 LIT_WINDOWS = np.dtype(
     [
@@ -203,10 +208,17 @@ TRIANGLE_SETUP = np.dtype(
     ],
     align=True,
 )
-FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED, MOVES = 1, 2, 4, 8, 16
+# Bits of a triangle.
+FLAT_NORMAL = 1
+PLAIN_COLOUR = 2
+TWO_SIDED = 4
+SHELTERED = 8
+MOVES = 16
 
-# A window's number: storeys of the picture in the low bits, whether it is on the ground floor, the building above.
-WINDOW_STOREYS, WINDOW_GROUND, WINDOW_SHIFT = 7, 8, 4
+# A window's number.
+WINDOW_STOREYS = 7  # mask of the low bits: storeys of the picture
+WINDOW_GROUND = 8  # bit: on the ground floor
+WINDOW_SHIFT = 4  # above these bits is the building
 
 # Glass on a street, and the room behind it: two frames that are laid over each other (right as seen from the street,
 # inwards, up), with their origins at the foot of the door and of the middle of the wall that has it.

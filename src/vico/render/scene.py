@@ -115,7 +115,7 @@ class Scene:
         ]
         # Avatars have no texture: their colour is in the vertices.
         self._skin = materials.number(_SKIN)
-        textures = materials.packed()
+        textures = materials.pack()
         self.material_names = materials.names
         outside, outer = cluster_triangles(outside, textures.double_sided)
         inside, inner = cluster_triangles(inside, textures.double_sided)
@@ -250,7 +250,7 @@ class Scene:
         self.shadowless = shadowless
         where = np.full(len(number), ANYWHERE, np.uint8)
         where[len(number) - shadowless :] = SHADOWLESS
-        self._replace(beams=self._beams.placed(number, rows))
+        self._replace(beams=self._beams.place(number, rows))
         self._set_instances(self._instances(rows, number, entities_of(entity, len(number)), where))
 
     def keep_detail(self, names: Iterable[str]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vico.assets.people import PARENTS, J, SkinnedBody
 from vico.io.compiled import compiled
-from vico.render.limbs import HEAD, LIMB_JOINTS, LIMB_WAYS, LIMBS, LimbSizes, limb_sizes
+from vico.render.limbs import HEAD, LIMB_JOINTS, LIMB_RADIUS, LIMB_WAYS, LIMBS, LimbSizes, limb_sizes
 from vico.threads import for_each
 
 
@@ -82,7 +82,7 @@ def batch_bodies(bodies: Sequence[SkinnedBody], entities: Sequence[int]) -> Body
         parts = [getattr(body, name) for body in bodies]
         return np.ascontiguousarray(np.concatenate(parts) if parts else np.zeros((0, width)), dtype)
 
-    def stacked(name: str, *shape: int) -> NDArray[np.float32]:
+    def stack(name: str, *shape: int) -> NDArray[np.float32]:
         parts = [getattr(body, name) for body in bodies]
         return np.ascontiguousarray(np.stack(parts) if parts else np.zeros((0, 55, *shape)), np.float32)
 
@@ -97,9 +97,9 @@ def batch_bodies(bodies: Sequence[SkinnedBody], entities: Sequence[int]) -> Body
         together("colour", 3, np.uint8),
         np.ascontiguousarray(np.concatenate(triangles) if triangles else np.zeros((0, 3)), np.int32),
         np.repeat(np.asarray(entities, np.int32), np.diff(starts)),
-        stacked("rest_joints", 3),
-        stacked("joints", 3),
-        stacked("frames", 3, 3),
+        stack("rest_joints", 3),
+        stack("joints", 3),
+        stack("frames", 3, 3),
         limb_sizes(list(bodies)),
     )
 
@@ -269,7 +269,7 @@ def _skin(bodies: Any, poses: Any, parents: Any, which: Any, out: Any) -> None:
         if len(limbs):
             _set_limbs(placed, turned[_HEAD_JOINT], bodies.head[body], limbs[body])
             for k in range(len(LIMB_WAYS)):
-                limbs[body, k, 6] = bodies.limb_radius[body, k]
+                limbs[body, k, LIMB_RADIUS] = bodies.limb_radius[body, k]
                 for end in range(2):
                     x, y = limbs[body, k, 3 * end], limbs[body, k, 3 * end + 1]
                     limbs[body, k, 3 * end] = cosine * x - sine * y + position[0]

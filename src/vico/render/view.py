@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.render.arrays import Buffers, buffers_for
+from vico.render.arrays import Buffers
 from vico.render.compiled import inlined, kernel
 from vico.render.records import BOX, MODEL_VIEW
 from vico.render.scene import Scene
@@ -134,18 +134,13 @@ def is_motion_noticeable(scene: Any, camera: Any, light: Any, coarse: Any, scrat
     """Return whether a moving thing may be seen in a room, or darken something that is.
 
     `coarse`, a `CoarseDepth`, is that of the room without such things: what lies behind all of it is hidden. `scratch`
-    is as from `new_scratch`.
+    is empty `CASTER`, `MODEL_VIEW` and `BOX` records.
     """
     caster, model_view, box = scratch
     reach = shadow_reach(camera)
     if _may_instance_be_noticed(scene, camera, light, coarse, reach, caster, model_view, box):
         return True
     return bool(_may_avatar_be_noticed(scene, camera, coarse, model_view, box))
-
-
-def new_scratch() -> tuple[Record, Record, Record]:
-    """Return empty `CASTER`, `MODEL_VIEW` and `BOX` records."""
-    return new_caster(), np.zeros(1, MODEL_VIEW)[0], np.zeros(1, BOX)[0]
 
 
 @inlined
@@ -263,7 +258,7 @@ class Background:
 
     def take(self, scene: Scene, camera: Record, light: Light, buffers: Buffers, out: ViewOutputs) -> bool:
         """Take pictures of a camera, as little as possible being done anew; return whether they were but copied."""
-        scratch = new_scratch()
+        scratch = new_caster(), np.zeros(1, MODEL_VIEW)[0], np.zeros(1, BOX)[0]
         if self._is_all(scene, camera, light, scratch):
             self._copy_to(out)
             return True
@@ -310,10 +305,3 @@ class Background:
     def _is_lit(self, camera: Record, light: Light) -> bool:
         """Return whether the colours are those of this light; the camera says how a room is lit."""
         return self._light is light or (self._light is not None and bool(camera["indoors"]))
-
-
-def fitting_buffers(known: Buffers | None, scene: Scene, width: int, height: int) -> Buffers:
-    """Return the same scratch memory, or new one where the pictures are others or the scene has grown."""
-    if known is not None and known.fit(scene.arrays, width, height):
-        return known
-    return buffers_for(scene.arrays, width, height)

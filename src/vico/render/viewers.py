@@ -151,10 +151,10 @@ class Viewers:
             past=tuple(past),
             quality=self.quality,
         )
-        frames = self._rendered(lens, cameras, request)
+        frames = self._render(lens, cameras, request)
         return _Part(lens, cube, members, frames)
 
-    def _rendered(self, lens: Lens, cameras: Cameras, request: PictureRequest) -> Frames:
+    def _render(self, lens: Lens, cameras: Cameras, request: PictureRequest) -> Frames:
         if self.renderer == "cpu":
             cache = self._caches.setdefault(lens, ViewCache(deferred=True))
             return take_pictures(self.scene, cameras, request, cache=cache)
@@ -277,21 +277,21 @@ class PictureSet:
                 frames.wait_for(face)
         out = {name: pictures[k] for name, pictures in self.pictures.items()}
 
-        def seen(values: NDArray[Any]) -> NDArray[Any]:
-            return values[place] if cube is None else cube.taken(values[faces])
+        def through_lens(values: NDArray[Any]) -> NDArray[Any]:
+            return values[place] if cube is None else cube.sample_nearest(values[faces])
 
         if cube is not None and "rgb" in out:
-            out["rgb"][:] = cube.blended(frames.rgb[faces])
+            out["rgb"][:] = cube.sample_bilinear(frames.rgb[faces])
         if cube is not None and "depth" in out:
-            out["depth"][:] = seen(frames.depth) * cube.stretch
+            out["depth"][:] = through_lens(frames.depth) * cube.stretch
         if cube is not None and "segmentation" in out:
-            out["segmentation"][:] = seen(frames.segmentation)
+            out["segmentation"][:] = through_lens(frames.segmentation)
         if "semantic" in out and self._asked.classify is not None:
-            out["semantic"][:] = self._asked.classify(seen(frames.segmentation))
+            out["semantic"][:] = self._asked.classify(through_lens(frames.segmentation))
         if "normals" in out:
-            out["normals"][:] = apply_matrix(seen(frames.normals), self._asked.rotation[k].astype(np.float32))
+            out["normals"][:] = apply_matrix(through_lens(frames.normals), self._asked.rotation[k].astype(np.float32))
         if "flow" in out:
-            out["flow"][:] = self._flow(k, seen(frames.places))
+            out["flow"][:] = self._flow(k, through_lens(frames.places))
 
     def _flow(self, k: int, places: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return how many pixels each seen point has moved since the viewer looked last; 0 where that is not known."""

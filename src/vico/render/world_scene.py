@@ -34,11 +34,16 @@ LAMP_KINDS = ("street_lamp", "lamp", "lantern")
 HEAD = Material("lamp head", emission=1.0)
 # A part shines that is at least this bright in each channel, sRGB, and this far up, metres.
 _BRIGHT, _UP = 190, 1.8
-# Light below a lamp, whatever its height, 1 = a sunny wall's; and how far it reaches, in its heights and metres.
-_BELOW, _HEIGHTS, _FARTHEST = 0.72, 3.4, 24.0
-# Shop windows: metres from one point that shines to the next along a front, before the pane, and above its foot; light
-# of each, and how far it reaches, metres.
-_APART, _BEFORE, _ABOVE, _SHOP_LIGHT, _SHOP_REACH = 4.0, 0.5, 2.0, 1.8, 9.0
+_BELOW = 0.72  # light below a lamp, whatever its height; 1 is a sunny wall's
+# How far a lamp's light reaches.
+_HEIGHTS = 3.4  # in its heights
+_FARTHEST = 24.0  # metres
+# Points that shine along the front of a shop, metres.
+_APART = 4.0
+_BEFORE = 0.5  # the pane
+_ABOVE = 2.0  # its foot
+_SHOP_LIGHT = 1.8  # of each
+_SHOP_REACH = 9.0
 _TALL = 1.8
 
 

@@ -171,12 +171,17 @@ _ORBIT_SPEED = math.radians(14.0)  # a second
 _RIDING = {Vehicle.NONE: 1.0, Vehicle.BIKE: 1.3, Vehicle.BUS: 3.6}
 _FOV, _EYES_FOV = math.radians(42.0), math.radians(60.0)
 # Seconds in which the camera makes up for two thirds of a change.
-_TURNS, _SHIFTS, _WIDENS, _NARROWS = 0.55, 0.12, 0.9, 0.12
+_TURNS = 0.55
+_SHIFTS = 0.12
+_WIDENS = 0.9
+_NARROWS = 0.12
 _ASIDE = tuple(math.radians(k) for k in (0, 35, -35, 70, -70, 110, -110, 150, -150, 180))
 _SWING = 1.0  # radians a second at most
 _RIM = 0.25  # metres to whatever is behind the camera
-# Who comes as near to the camera as the first makes it rise, metres; at the second it is so far above them.
-_RISES, _RISEN, _ABOVE = 2.6, 1.2, 0.4
+# Who comes near makes the camera rise.
+_RISES = 2.6  # from this distance on, metres
+_RISEN = 1.2  # at this distance it has risen, metres
+_ABOVE = 0.4  # them, metres
 _LIFTS = 0.3  # seconds, as above
 _NEAREST = 0.45
 

@@ -23,7 +23,6 @@ from typing import Any, Literal
 from urllib.request import urlopen
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError, MissingExtraError, VicoError, some_of
@@ -415,10 +414,7 @@ def write_film(
         # One picture for itself puts the camera where it comes to rest.
         stage.picture(shot, begin)
         for k in range(count):
-            film.add(_pixels(stage.picture(shot, begin + k / rate, seconds=1 / rate, form="image/jpeg")))
+            picture = stage.picture(shot, begin + k / rate, seconds=1 / rate, form="image/jpeg")
+            film.add(np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")))
             report(k + 1, count)
         return film.frames
-
-
-def _pixels(picture: bytes) -> NDArray[np.uint8]:
-    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"))

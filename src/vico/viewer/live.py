@@ -100,7 +100,7 @@ class LiveViewer(Hook):
         source.plans = lambda names: self._plans(agents, names)
         if self._server is None:
             state = ViewerState(source, self.view, city=self._city, hands=self.control, player=self._player)
-            state.visited = self._visited
+            state.visited = self._note_visitors
             self._server = ViewerServer(state, port=self._port, keep=recorder.out, hosts=self._hosts).__enter__()
             self.announce(self.url)
         else:
@@ -129,7 +129,7 @@ class LiveViewer(Hook):
             self.control.attend(False)
             self.announce_idle(self._recorder.sim.state.second)
 
-    def _visited(self, clients: int) -> None:
+    def _note_visitors(self, clients: int) -> None:
         """Note whether a page is there; asked by the server's thread."""
         self._left = None if clients else time.monotonic()
         if clients:

@@ -43,7 +43,13 @@ def motion_sheet(clip: MotionClip, *, moments: int = 8, height: int = 360) -> ND
     rotations = np.stack([clip.rotations(frame) for frame in frames])
     limbs = np.empty((moments, len(LIMBS), 7), np.float32)
     vertices, normals = skin(batch, rotations, offsets, spots, np.zeros(moments), limbs=limbs)
-    scene = Scene([_floor()], lighting=Lighting())
+    half = 60.0
+    corners = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]], np.float32)
+    faces: Any = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    scene = Scene(
+        [Surface.from_triangles(corners, faces, colour=(150, 150, 148), entity=1, material=Material("floor"))],
+        lighting=Lighting(),
+    )
     scene.set_skinned(vertices, normals, batch.triangles, batch.colour, batch.entity, limbs=limbs)
     middle, wide = float(spots[:, 1].mean()), _APART * (moments - 1) + _WIDE
     tall = 2.3
@@ -57,10 +63,3 @@ def motion_sheet(clip: MotionClip, *, moments: int = 8, height: int = 360) -> ND
     picture = render(scene, cameras, depth=False, segmentation=False, samples=2).rgb[0]
     top = (full - height) // 2
     return np.ascontiguousarray(picture[top : top + height])
-
-
-def _floor() -> Surface:
-    half = 60.0
-    corners = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]], np.float32)
-    faces: Any = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    return Surface.from_triangles(corners, faces, colour=(150, 150, 148), entity=1, material=Material("floor"))

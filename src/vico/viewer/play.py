@@ -159,7 +159,9 @@ def _hints_of_robot(sim: Simulation, index: int) -> Iterator[Hint]:
     if not robots.has_arm(k):
         return
     if held := robots.in_hand(k):
-        spot = _before(here, float(robots.bodies().yaw[k]))
+        x, y, z = (float(value) for value in here)
+        yaw = float(robots.bodies().yaw[k])
+        spot = [x + 0.8 * math.cos(yaw), y + 0.8 * math.sin(yaw), z]  # metres ahead
         yield Hint("N", f"put {state.entity(held)['name']} down", {"type": "place", "target": spot})
         for j, name in enumerate(robots.names):
             if j != k and _apart(robots.bodies().position[j], here) < 2 * EARSHOT:
@@ -168,11 +170,6 @@ def _hints_of_robot(sim: Simulation, index: int) -> Iterator[Hint]:
     away = [(_apart(position, here), j) for j, position in enumerate(state.objects.position)]
     for _, j in sorted(away)[:_MOST_OF_A_KEY]:
         yield Hint("B", f"pick up {state.objects.names[j]}", {"type": "pick", "object": int(state.objects.entity[j])})
-
-
-def _before(position: Any, yaw: float) -> list[float]:
-    x, y, z = (float(value) for value in position)
-    return [x + 0.8 * math.cos(yaw), y + 0.8 * math.sin(yaw), z]
 
 
 def _apart(a: Any, b: Any) -> float:
@@ -186,7 +183,7 @@ _VEHICLES = {Vehicle.NONE: "", Vehicle.BUS: "bus", Vehicle.BIKE: "bike"}
 
 
 class PlayedAgent:
-    """The `vico.viewer.server.state.Player` of a human agent.
+    """Takes what a person at the page does to the agent that is played.
 
     Parameters
     ----------
@@ -258,7 +255,7 @@ class PlayedAgent:
     def tell(self, sim: Simulation) -> None:
         """Note what the person is to be told of a step; asked by the thread that simulates."""
         if self._owner is not None or self._you is None:
-            self._you = self._told(sim)
+            self._you = self._you_message(sim)
 
     def _takes_turn(self, client: int) -> bool:
         with self._lock:
@@ -271,7 +268,7 @@ class PlayedAgent:
         self._present(True)
         return True
 
-    def _told(self, sim: Simulation) -> dict[str, Any]:
+    def _you_message(self, sim: Simulation) -> dict[str, Any]:
         state = sim.state
         index = sim.agents.index(self._agent)
         told = {"step": sim.metrics.steps, "time": state.second, "seq": self.human.mailbox.taken, "agent": self._agent}
@@ -364,14 +361,19 @@ def _entity_record(sim: Simulation, entity: int) -> dict[str, Any] | None:
     return {"entity": entity, "name": sim.state.entity(entity)["name"]} if entity else None
 
 
-# Doors count from here to there, metres, the nearer the more, within so much of the way one looks, radians.
-_NEAREST, _FARTHEST, _FADES, _SIDE = 6.0, 80.0, 40.0, 0.6
+# Doors that count for a look, the nearer the more.
+_NEAREST = 6.0  # metres
+_FARTHEST = 80.0  # metres
+_FADES = 40.0  # metres in which a door's weight falls to 1/e
+_SIDE = 0.6  # within so much of the way one looks, radians
 # Looks that are tried at a spot; spots lie this far apart, metres, and as far from walls at least as `clearance`.
 _LOOKS, _APART = 16, 4.0
 # Of the window's half side: beyond, the city ends in sight.
 _WITHIN = 0.6
-# The best of them are tried for what stands in the way, each some metres along a look.
-_TRIED, _STEP, _WANTED = 60, 0.5, 60.0
+# The best of them are tried for what stands in the way.
+_TRIED = 60
+_STEP = 0.5  # along a look, metres
+_WANTED = 60.0  # metres of view
 # People go in and out of others than these all day.
 _QUIET = ("apartments", "company", "office", "house")
 

@@ -108,7 +108,7 @@ class Recording:
         for step, picture in self.views[agent].key_frames():
             yield min(int(np.searchsorted(self.view_steps, step)), self.steps), picture
 
-    def travelled(self) -> NDArray[np.float64]:
+    def travelled_metres(self) -> NDArray[np.float64]:
         """Metres each body covered, leaving out jumps through doors; shape ``(n,)``."""
         moves = np.diff(self.tracks[:, :, :2].astype(np.float64), axis=0)
         metres = np.linalg.norm(moves, axis=2)
@@ -122,7 +122,10 @@ _SILENT = {"refused", "collision"}
 
 def recording_of(run: Run) -> Recording:
     """Read what the page and the film show out of a run: its state at every whole second."""
-    chosen = _whole_seconds(run)
+    # The last recorded step of each second since the start: every step, where all agents act once a second.
+    times = run.times - run.times[0]
+    seconds = np.arange(int(times[-1] + 1e-6) + 1)
+    chosen = np.searchsorted(times, seconds + 1e-6) - 1
     tracks = run.tracks()
     cast = {int(entity): run.cast[int(entity)] for entity in tracks.entity}
     bodies = [RecordedBody(e, b.kind, b.name, b.size[0], b.size[1], b.agent) for e, b in cast.items()]
@@ -149,13 +152,6 @@ def recording_of(run: Run) -> Recording:
         metrics=run.metrics,
         state_hash=run.hashes[-1],
     )
-
-
-def _whole_seconds(run: Run) -> NDArray[np.int64]:
-    """Return the last recorded step of each second since the start: every step, where all agents act once a second."""
-    times = run.times - run.times[0]
-    seconds = np.arange(int(times[-1] + 1e-6) + 1)
-    return np.searchsorted(times, seconds + 1e-6) - 1
 
 
 def _agent_record(agent: dict[str, Any], shown: str) -> dict[str, Any]:
@@ -394,7 +390,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 def _most_alive(recording: Recording, count: int) -> list[str]:
     """Agents with a film of their own who moved most: they have something to show."""
-    metres = recording.travelled()
+    metres = recording.travelled_metres()
     names = [name for name in recording.people if name in recording.views]
     names.sort(key=lambda name: (-metres[recording.body_of(name)], name))
     robots = [name for name in names if recording.bodies[recording.body_of(name)].kind == "robot"]

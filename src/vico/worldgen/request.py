@@ -7,6 +7,7 @@ a world.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass, field, fields
 from importlib.resources import files
@@ -15,7 +16,7 @@ from typing import Any
 
 from vico.errors import InputError, MissingFileError
 from vico.geo.frame import LocalFrame, split_crs
-from vico.geo.overpass import MapSource
+from vico.geo.overpass import MapSource, Overpass
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.seams.joins import HALO, TilePlace
@@ -197,6 +198,22 @@ def map_for(lat: float | None, lon: float | None, half: float, *, source: MapSou
             "pass --osm FILE, or --overpass URL"
         )
     return source.fetch(lat, lon, half)
+
+
+def locate_map(
+    lat: float | None, lon: float | None, half: float, *, overpass: str | None = None, refresh: bool = False
+) -> Path:
+    """Find a map that covers a window: the packaged extract, else one from an Overpass server.
+
+    Parameters
+    ----------
+    overpass
+        Its address, or ``off``; else the environment's VICO_OVERPASS, else the public one.
+    refresh
+        Ask the server even if its answer is in the cache.
+    """
+    endpoint = overpass or os.environ.get("VICO_OVERPASS")
+    return map_for(lat, lon, half, source=None if endpoint == "off" else Overpass(endpoint, refresh=refresh))
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def served(run: Path, *, keep: Path | None = None) -> Iterator[str]:
     from vico.viewer.sources.source import Source
     from vico.viewer.sources.views import RecordedViews
 
-    source = Source.recorded(run)
+    source = Source.of_run(run)
     assert source.tables.run is not None
     assert source.world is not None
     state = ViewerState(source, RecordedViews(source.tables.run).view, city=city_folder(source.world))

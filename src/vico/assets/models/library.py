@@ -166,9 +166,17 @@ def street_models() -> dict[str, Model]:
     return read_all(packaged) | {plant.name: plant for plant in plant_models()} | read_all(own)
 
 
-_LENS_RADIUS, _LENS_SIDES = 0.105, 10  # radius, m, as the model's
-_LENS_FRONT, _LENS_HIGHEST, _LENS_STEP = 0.302, 3.26, 0.31  # of the lenses, m: just before the model's
-_WALK_FRONT, _WALK_HIGHEST, _WALK_STEP, _WALK_HALF = 0.362, 2.37, 0.24, 0.08
+# Lenses of a signal, metres: as the model's, and just before them.
+_LENS_RADIUS = 0.105
+_LENS_SIDES = 10
+_LENS_FRONT = 0.302
+_LENS_HIGHEST = 3.26
+_LENS_STEP = 0.31
+# Those of its walking part, metres.
+_WALK_FRONT = 0.362
+_WALK_HIGHEST = 2.37
+_WALK_STEP = 0.24
+_WALK_HALF = 0.08
 _LIT: dict[str, Colour] = {"red": (255, 62, 48), "amber": (255, 190, 40), "green": (70, 250, 150)}
 _UNLIT: dict[str, Colour] = {"red": (52, 16, 14), "amber": (48, 38, 12), "green": (12, 40, 26)}
 _SHINING = Material("signal", emission=1.0)

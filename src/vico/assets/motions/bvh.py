@@ -61,7 +61,12 @@ def read_bvh(path: Path) -> MotionClip:
     lines = iter(enumerate(text.splitlines(), start=1))
     hierarchy = _hierarchy(lines, path)
     values, rate, note = _frames(lines, sum(map(len, hierarchy.channels)), path)
-    skeleton = _skeleton(hierarchy)
+    places = np.zeros((len(hierarchy.names), 3))
+    for k, parent in enumerate(hierarchy.parents):
+        places[k] = hierarchy.offsets[k]
+        if parent >= 0:
+            places[k] += places[parent]
+    skeleton = Skeleton(tuple(hierarchy.names), np.array(hierarchy.parents, np.int64), places)
     turned, moved = _joint_transforms(hierarchy, values)
     pelvis = joints_by_name(skeleton, source=str(path))["pelvis"]
     clip = retarget(skeleton, turned, moved[:, pelvis], rate, name=path.stem, source=str(path))
@@ -186,16 +191,6 @@ def _row(text: str, channels: int) -> NDArray[np.float64]:
     if len(row) != channels or not np.isfinite(row).all():
         raise ValueError(text)
     return row
-
-
-def _skeleton(hierarchy: _Hierarchy) -> Skeleton:
-    """Return the joints at rest."""
-    places = np.zeros((len(hierarchy.names), 3))
-    for k, parent in enumerate(hierarchy.parents):
-        places[k] = hierarchy.offsets[k]
-        if parent >= 0:
-            places[k] += places[parent]
-    return Skeleton(tuple(hierarchy.names), np.array(hierarchy.parents, np.int64), places)
 
 
 def _joint_transforms(

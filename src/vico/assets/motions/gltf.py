@@ -46,7 +46,12 @@ def read_gltf_motion(path: Path, *, animation: str = "") -> MotionClip:
     with gltf_errors(str(path)):
         rig = Rig(GltfFile.of(data, lambda uri: _beside(path, uri)))
         name, tracks = rig.tracks(animation)
-        times = _times(tracks)
+        first = min(float(times[0]) for times, _, _ in tracks.values())
+        last = max(float(times[-1]) for times, _, _ in tracks.values())
+        count = round((last - first) * _RATE) + 1
+        if not (math.isfinite(first) and math.isfinite(last)) or not 1 <= count <= MOST_FRAMES:
+            raise GltfFault(f"its animation goes from {first} to {last} s; cut it into pieces")
+        times = first + np.arange(count) / _RATE
         moving = rig.moving(tracks, times)
         rest = rig.rest()
     skeleton = Skeleton(rig.names, rig.parents, rest[:, :3, 3])
@@ -73,15 +78,6 @@ def _rotations(transforms: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 Tracks = dict[tuple[int, str], tuple[NDArray[np.float64], NDArray[np.float64], str]]
-
-
-def _times(tracks: Tracks) -> NDArray[np.float64]:
-    first = min(float(times[0]) for times, _, _ in tracks.values())
-    last = max(float(times[-1]) for times, _, _ in tracks.values())
-    count = round((last - first) * _RATE) + 1
-    if not (math.isfinite(first) and math.isfinite(last)) or not 1 <= count <= MOST_FRAMES:
-        raise GltfFault(f"its animation goes from {first} to {last} s; cut it into pieces")
-    return first + np.arange(count) / _RATE
 
 
 class Rig:

@@ -151,7 +151,10 @@ def _words(names: Sequence[str]) -> list[tuple[str, str]]:
         split = [parts[:-1] if len(parts) > 1 and parts[-1].isdigit() else parts for parts in split]
     for at in (0, -1):  # a prefix, such as the figure's name; a suffix, such as _jnt
         while common := _common(split, at):
-            split = [_without(parts, at) if len(parts) > 1 and parts[at] == common else parts for parts in split]
+            split = [
+                (parts[1:] if at == 0 else parts[:-1]) if len(parts) > 1 and parts[at] == common else parts
+                for parts in split
+            ]
     return [_word(parts) for parts in split]
 
 
@@ -168,10 +171,6 @@ def _common(split: list[list[str]], at: int) -> str:
     part, count = counts.most_common(1)[0] if counts else ("", 0)
     means = part in _SIDES or part in _KNOWN or part.isdigit()
     return "" if means or 2 * count <= len(split) else part
-
-
-def _without(parts: list[str], at: int) -> list[str]:
-    return parts[1:] if at == 0 else parts[:-1]
 
 
 def _word(parts: list[str]) -> tuple[str, str]:

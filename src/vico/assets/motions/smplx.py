@@ -36,8 +36,10 @@ _PARTS = {"root_orient": 1, "pose_body": 21, "pose_jaw": 1, "pose_eye": 2, "pose
 # Rows: our axes (forward, left, up) in those of an SMPL-X body (left, up, forward).
 _AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _BODY, _HANDS = 21, 30
-# Full poses: with jaw and eyes (SMPL-X), without (SMPL-H), and bodies without hands (SMPL: its two hand joints rest).
-_WHOLE, _WITHOUT_FACE, _WITHOUT_HANDS = 55, 52, 24
+# Joints of full poses.
+_WHOLE = 55  # SMPL-X: with jaw and eyes
+_WITHOUT_FACE = 52  # SMPL-H
+_WITHOUT_HANDS = 24  # SMPL: its two hand joints rest
 
 
 def motion_from_smplx(

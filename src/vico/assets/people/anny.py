@@ -20,17 +20,22 @@ from vico.io.arrays import read_npz
 from vico.io.cache import cache_folder
 
 Points = NDArray[np.float64]
-# The mouth of the average young adult, metres from where the rows of teeth meet: half its width, how far its line is
-# below, how high the lips are above and below that line.
-_MOUTH, _LINE, _UPPER, _LOWER = 0.0235, -0.0048, 0.0088, 0.0078
+# The mouth of the average young adult, metres from where the rows of teeth meet.
+_MOUTH = 0.0235  # half its width
+_LINE = -0.0048  # its line's height
+_UPPER = 0.0088  # the upper lip, above that line
+_LOWER = 0.0078  # the lower lip, below it
 # What blood shows through: place (folded to the left), radii, what the skin's colour is multiplied with.
 _FLUSHED = (
     ((0.000, 0.036, 0.030), (0.030, 0.022, 0.020), (1.0, 0.93, 0.92)),  # cheeks
     ((0.026, 0.000, 0.022), (0.018, 0.020, 0.014), (1.0, 0.94, 0.93)),  # the nose's tip
     ((-0.004, 0.030, 0.058), (0.020, 0.024, 0.013), (0.94, 0.89, 0.89)),  # around the eyes
 )
-# Angles from an eye's axis at which the pupil, the iris and its darker rim end, and that of the last ring.
-_PUPIL, _IRIS, _RIM, _BACK = 0.17, 0.44, 0.51, 1.75
+# Angles from an eye's axis, radians, at which these end.
+_PUPIL = 0.17
+_IRIS = 0.44
+_RIM = 0.51  # the iris's darker rim
+_BACK = 1.75  # the last ring
 # Lids are dark as far as this from an eye's middle, in its radii.
 _LASHES = 1.085
 

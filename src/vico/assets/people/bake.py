@@ -289,7 +289,8 @@ def bake(folder: Path, out: Path, *, say: Callable[[str], None] = lambda _: None
         typical += 0.5 * moved[f"caucasian-{gender}-young"]
         typical += 0.5 * moved[f"universal-{gender}-young-averagemuscle-averageweight"]
     typical = typical @ _AXES.T
-    floor = typical[slice(*_span(groups["joint-ground"]))].mean(0)[2]
+    first, last = groups["joint-ground"][0]
+    floor = typical[first : last + 1].mean(0)[2]
     typical[:, 2] -= floor
     # The mouth is where the rows of teeth meet, at the lips' depth.
     teeth = typical[groups["helper-lower-teeth"][0][0] : groups["helper-upper-teeth"][0][1] + 1]
@@ -299,7 +300,12 @@ def bake(folder: Path, out: Path, *, say: Callable[[str], None] = lambda _: None
     start = 0
     for name, (surfaces, keep, budget, care) in _pieces(typical, joints @ typical, weights, mouth).items():
         triangles = np.concatenate([faces[surface] for surface in surfaces])
-        rows, triangles = _cut_out(triangles, keep, len(base))
+        # Triangles are clipped to where every field is positive; new vertices are mixtures of old ones.
+        used, triangles = np.unique(triangles, return_inverse=True)
+        triangles = triangles.reshape(-1, 3)
+        rows = csr_matrix((np.ones(len(used)), (np.arange(len(used)), used)), shape=(len(used), len(base)))
+        for field in keep:
+            rows, triangles = cut(rows, triangles, rows @ field)
         points = rows @ typical
         importance = np.ones(len(points)) if care is None else care(points)
         kept, triangles = decimate(points, triangles, budget, importance)
@@ -340,10 +346,6 @@ def _is_covered(
             ahead = (1 - u - v) * depth[:, 0] + u * depth[:, 1] + v * depth[:, 2] - points[k, 0]
             covered[k] = bool(((u > 0) & (v > 0) & (u + v < 1) & (ahead > 0.0005)).any())
     return covered
-
-
-def _span(ranges: list[list[int]]) -> tuple[int, int]:
-    return ranges[0][0], ranges[0][1] + 1
 
 
 Keep = list[NDArray[np.float64]]
@@ -417,13 +419,3 @@ def _pieces(
         "shoes": (("helper-tights",), [np.where(is_arm, -1.0, ankle + 0.022 - z)], 230, None),
         "boots": (("helper-tights",), [np.where(is_arm, -1.0, ankle + 0.17 - z)], 280, None),
     }
-
-
-def _cut_out(triangles: NDArray[np.int64], keep: Keep, count: int) -> tuple[csr_matrix, NDArray[np.int64]]:
-    """Clip triangles to where every field is positive; new vertices are mixtures of old ones."""
-    used, triangles = np.unique(triangles, return_inverse=True)
-    triangles = triangles.reshape(-1, 3)
-    rows = csr_matrix((np.ones(len(used)), (np.arange(len(used)), used)), shape=(len(used), count))
-    for field in keep:
-        rows, triangles = cut(rows, triangles, rows @ field)
-    return rows, triangles

@@ -129,7 +129,7 @@ class _Reader:
         if self.skin is None:
             points = points @ here[:3, :3].T + here[:3, 3]
         else:
-            points, shares = self._bound(attributes, points)
+            points, shares = self._bind_pose(attributes, points)
         picture, factor = self._material(primitive)
         colour = np.tile(factor, (count, 1))
         if "COLOR_0" in attributes:
@@ -144,7 +144,7 @@ class _Reader:
         sampled = columns[:, 3:6] * _sample_picture(picture, columns[:, 6:8]) / 255.0
         return _Mesh(columns[:, :3], triangles, sampled, columns[:, 8:])
 
-    def _bound(
+    def _bind_pose(
         self, attributes: dict[str, Any], points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return points where their nodes have them at rest, and their shares of our joints."""

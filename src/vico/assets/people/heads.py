@@ -124,10 +124,15 @@ _BROW = np.array(
 _OFF, _IN = 0.007, 0.006
 # Across a coarse eyebrow: share of its half width, how far it is off the skin, how pale.
 _COARSE = ((-1.2, 0.0, 0.2), (0.0, 0.024, 0.1), (1.2, 0.0, 0.2))
-# A lens: how far aside of the nose its middle is, its height on the head, half its width and height.
-_ASIDE, _LEVEL, _HALF_WIDTH, _HALF_HEIGHT = 0.145, 0.520, 0.098, 0.074
-# Frames: half their thickness, how far they are off the skin, how far they curve around the face.
-_THICK, _CLEAR, _CURVE = 0.0055, 0.014, 0.22
+# A lens.
+_ASIDE = 0.145  # of the nose: its middle
+_LEVEL = 0.520  # its height on the head
+_HALF_WIDTH = 0.098
+_HALF_HEIGHT = 0.074
+# Frames.
+_THICK = 0.0055  # half their thickness
+_CLEAR = 0.014  # off the skin
+_CURVE = 0.22  # around the face
 _FRAME: Colour = (30, 28, 30)
 
 
@@ -200,8 +205,10 @@ def _wire(path: list[NDArray[np.float64]], size: float, forward: tuple[float, fl
     )
 
 
-# Columns of hair around the head, and rows for each of a coarse shell, of bodies for close-ups.
-_COLUMNS, _FINE_COLUMNS, _FINE_ROWS = 20, 48, 1.7
+_COLUMNS = 20  # of hair around the head
+# Of bodies for close-ups.
+_FINE_COLUMNS = 48
+_FINE_ROWS = 1.7  # for each of a coarse shell
 #: Above this share of the head's height nothing grows on bald heads.
 BALD = 0.72
 # A ponytail's way: height on the head, distance from it.

@@ -16,9 +16,10 @@ from vico.assets.people.model import JOINTS, J, SkinnedBody
 from vico.assets.simplification import Worth, collapse_edges, is_sound
 from vico.io.compiled import compiled
 
-# Triangles of a light body, and of one that is seen from far away; procedural ones are a tenth darker in pictures with
-# as few as the others (`tests/sim/test_detail.py`).
-LIGHT, FAR, FAR_PROCEDURAL = 1900, 600, 900
+# Triangles of a body.
+LIGHT = 1900
+FAR = 600  # seen from far away
+FAR_PROCEDURAL = 900  # with as few as the others they are a tenth darker in pictures (`tests/sim/test_detail.py`)
 # A place is hidden if something that moves with it lies within this many metres all around.
 _COVER = 0.05
 # Boxes are this much larger than what is looked for in them, metres: more than rounding makes of a hit.
@@ -28,9 +29,13 @@ _COLOUR_METRES, _JOINT_METRES = 0.018, 0.010
 # Layers nearer than this must not come through each other.
 _LAYERS = 0.006
 # Factors on what is lost at a place: faces are looked at.
-_FACE, _EARS, _HAIR = 30.0, 60.0, 8.0
-# How far the surface (or, at its rate, its colour) may move, metres: between layers, in a face, in a hand.
-_LAYERED_LIMIT, _FACE_LIMIT, _HAND_LIMIT = 0.0006, 0.0014, 0.0060
+_FACE = 30.0
+_EARS = 60.0
+_HAIR = 8.0
+# How far the surface (or, at its rate, its colour) may move, metres.
+_LAYERED_LIMIT = 0.0006  # between layers
+_FACE_LIMIT = 0.0014
+_HAND_LIMIT = 0.0060
 
 Array = NDArray[Any]
 

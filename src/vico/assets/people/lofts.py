@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -102,7 +102,7 @@ def loft(
     for ring, following in zip(rings, [*rings[1:], rings[-1]], strict=True):
         doubled.append(ring)
         if following.colour != ring.colour:
-            doubled.append(_with_colour_of(following, ring))
+            doubled.append(replace(ring, colour=following.colour))
     centres = np.array([np.asarray(ring.centre, np.float64) for ring in doubled])
     axes = _axes(centres)
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
@@ -136,21 +136,14 @@ def loft(
             for i in range(sides):
                 a0, b0 = k * sides + i, k * sides + (i + 1) % sides
                 faces.append((b0, a0, tip) if flip else (a0, b0, tip))
-    return _outward(with_normals(BodyPart(vertices, np.array(faces, np.int64), colour, weights)))
-
-
-def _outward(part: BodyPart) -> BodyPart:
-    """Lofts that run down or backwards come inside out: turn those whose volume is negative."""
+    part = with_normals(BodyPart(vertices, np.array(faces, np.int64), colour, weights))
+    # Lofts that run down or backwards come inside out: those whose volume is negative are turned.
     corners = part.vertices[part.triangles] - part.vertices.mean(0)
     volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum())
     if volume < 0:
         part.triangles = part.triangles[:, ::-1].copy()
         return with_normals(part)
     return part
-
-
-def _with_colour_of(following: LoftRing, ring: LoftRing) -> LoftRing:
-    return LoftRing(ring.centre, ring.front, ring.back, ring.side, ring.weights, following.colour, ring.square)
 
 
 def _axes(centres: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -363,7 +363,10 @@ def _enumerate_words(words: list[str]) -> str:
 
 
 # From these temperatures on, degrees Celsius, it is hot, mild, cool; below the last it is cold, and freezing at 0.
-_HOT, _MILD, _COOL, _COLD = 23.0, 16.0, 9.0, 3.0
+_HOT = 23.0
+_MILD = 16.0
+_COOL = 9.0
+_COLD = 3.0
 # From so much rain on, mm/h, people dress for it; snow counts by the water in it.
 _WET = 0.2
 _LIGHT = ("t-shirt", "dress")

@@ -30,20 +30,28 @@ from vico.assets.shapes import ball, box, cylinder, facing_x, pose_matrix, tube
 from vico.world.mesh import Surface, merge_surfaces
 
 ROTORS = ("front_right", "rear_left", "front_left", "rear_right")
-#: Of a rotor from the middle, along and across, and above the base's origin; its radius; metres.
-REACH, RISE, RADIUS = 0.174, 0.06, 0.1396
+REACH = 0.174  # of a rotor from the middle, along and across, metres
+RISE = 0.06  # of a rotor above the base's origin, metres
+RADIUS = 0.1396  # of a rotor, metres
 PLACES = np.array([[1, -1], [-1, 1], [1, 1], [-1, -1]]) * REACH
 #: To the left seen from above, by rotor.
 TURNS = np.array([1.0, 1.0, -1.0, -1.0])
 MASS, PROPELLER = 2.0, 0.016
 INERTIA = np.array([0.0216667, 0.0216667, 0.04])
-#: Skids: half their length, how far aside and how deep; their radius.
-SKID, SKID_Y, SKID_Z, SKID_RADIUS = 0.125, 0.132, -0.2195, 0.0075
+# Skids, metres.
+SKID = 0.125  # half their length
+SKID_Y = 0.132  # aside
+SKID_Z = -0.2195
+SKID_RADIUS = 0.0075
 #: Rad/s.
 FASTEST = 1000.0
 HALF, HEIGHT = 0.315, 0.31
-# Newtons, metres, seconds: motorConstant, momentConstant, timeConstantUp, timeConstantDown, rotorDragCoefficient.
-_THRUST, _MOMENT, _UP, _DOWN, _DRAG = 8.54858e-6, 0.016, 0.0125, 0.025, 8.06428e-5
+# Of rotors: newtons, metres, seconds.
+_THRUST = 8.54858e-6  # motorConstant
+_MOMENT = 0.016  # momentConstant
+_UP = 0.0125  # timeConstantUp
+_DOWN = 0.025  # timeConstantDown
+_DRAG = 8.06428e-5  # rotorDragCoefficient
 _CAPACITY = 74.0 * 3600.0
 _STAND = -SKID_Z + SKID_RADIUS
 _CAMERA = (0.125, 0.0, -0.045)

@@ -29,10 +29,18 @@ from vico.world.mesh import Surface, merge_surfaces
 
 LEGS = ("FL", "FR", "RL", "RR")
 JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in ("hip", "thigh", "calf"))
-#: Hip in the base's frame, sideways from there to the leg's plane, thigh and shin, metres.
-HIP_X, HIP_Y, SIDE, THIGH, SHIN, FOOT = 0.1934, 0.0465, 0.0955, 0.213, 0.213, 0.022
+# Of a leg, metres.
+HIP_X = 0.1934  # in the base's frame
+HIP_Y = 0.0465
+SIDE = 0.0955  # sideways from the hip to the leg's plane
+THIGH = 0.213
+SHIN = 0.213
+FOOT = 0.022  # radius
 TORQUE = {"hip": 23.7, "thigh": 23.7, "calf": 45.43}
-HALF_LENGTH, HALF_WIDTH, HEIGHT = 0.36, 0.19, 0.40
+# Of the outline, metres.
+HALF_LENGTH = 0.36
+HALF_WIDTH = 0.19
+HEIGHT = 0.40
 # Gains the policy was trained with (Nm/rad, Nms/rad), and the stiffer ones our own gait needs.
 _POLICY_GAINS, _GAIT_GAINS = (20.0, 0.5), (120.0, 3.0)
 _LIMITS = {"hip": (-1.0472, 1.0472), "front": (-1.5708, 3.4907), "rear": (-0.5236, 4.5379), "calf": (-2.7227, -0.8378)}

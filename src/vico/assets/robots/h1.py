@@ -341,9 +341,15 @@ PARTS = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle")
 JOINTS = tuple(f"{side}_{part}" for side in SIDES for part in PARTS)
 #: Angles of a leg at rest, rad, in the order of `PARTS`.
 REST = np.array([0.0, 0.0, -0.18, 0.5, -0.32])
-THIGH, SHIN, SOLE = 0.4, 0.4, 0.07
+# Of a leg, metres.
+THIGH = 0.4
+SHIN = 0.4
+SOLE = 0.07
 STAND = 0.1742 + (THIGH + SHIN) * float(np.cos(0.25)) + SOLE
-HALF_LENGTH, HALF_WIDTH, HEIGHT = 0.26, 0.32, 1.8
+# Of the outline, metres.
+HALF_LENGTH = 0.26
+HALF_WIDTH = 0.32
+HEIGHT = 1.8
 MASS = 51.4
 #: 864 Wh (data sheet); what computer and motors take at rest is an estimate of ours.
 BATTERY = BatteryModel(capacity=864.0 * 3600.0, idle_power=120.0, holding=0.03)

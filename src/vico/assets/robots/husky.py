@@ -26,8 +26,13 @@ from vico.assets.robots.packs import husky_shapes
 from vico.assets.shapes import box, cylinder, extrusion
 from vico.world.mesh import Surface, merge_surfaces
 
-RADIUS, WIDTH = 0.165, 0.1143
-AXLE, TRACK, HUB = 0.256, 0.2854, 0.0328
+# Of a wheel, metres.
+RADIUS = 0.165
+WIDTH = 0.1143
+# Of its middle in the base's frame, metres.
+AXLE = 0.256  # before or behind
+TRACK = 0.2854  # aside
+HUB = 0.0328  # above
 MASS, WHEEL_MASS = 50.0, 2.637
 # How much faster than by rolling alone the wheels have to turn for the base to turn, on pavement.
 _SLIP = 2.2

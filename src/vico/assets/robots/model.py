@@ -176,10 +176,10 @@ class NoController:
     name: str = "motors"
 
 
-#: Collision bits: 1 is what touches everything that is solid (links, ground, walls, objects, people, vehicles), 2 is
-#: what keeps out of the outline that traffic and people see of a robot (all but ground and objects), 4 touches all but
-#: other links: a contype of parts that lie within the motion of their neighbours.
-TOUCH, BUMP, LIMB = 1, 2, 4
+# Collision bits.
+TOUCH = 1  #: touches everything that is solid: links, ground, walls, objects, people, vehicles
+BUMP = 2  #: keeps out of the outline that traffic and people see of a robot: all but ground and objects
+LIMB = 4  #: touches all but other links: a contype of parts that lie within the motion of their neighbours
 #: A box of the robot's whole outline, which is what `Bodies` show of it: it keeps out of walls, people, vehicles and
 #: other robots' outlines. Ground and objects meet links alone, and links meet all.
 BUMPER = "bumper"

@@ -28,10 +28,20 @@ from vico.world.mesh import Surface, merge_surfaces
 
 # Field numbers of onnx.proto (ModelProto, GraphProto, NodeProto, TensorProto, AttributeProto).
 _MODEL_GRAPH = 7
-_GRAPH_NODE, _GRAPH_INITIALISER = 1, 5
-_NODE_INPUT, _NODE_OUTPUT, _NODE_KIND, _NODE_ATTRIBUTE = 1, 2, 4, 5
-_TENSOR_DIMS, _TENSOR_TYPE, _TENSOR_FLOATS, _TENSOR_NAME, _TENSOR_RAW = 1, 2, 4, 8, 9
-_ATTRIBUTE_NAME, _ATTRIBUTE_FLOAT, _ATTRIBUTE_INT = 1, 2, 3
+_GRAPH_NODE = 1
+_GRAPH_INITIALISER = 5
+_NODE_INPUT = 1
+_NODE_OUTPUT = 2
+_NODE_KIND = 4
+_NODE_ATTRIBUTE = 5
+_TENSOR_DIMS = 1
+_TENSOR_TYPE = 2
+_TENSOR_FLOATS = 4
+_TENSOR_NAME = 8
+_TENSOR_RAW = 9
+_ATTRIBUTE_NAME = 1
+_ATTRIBUTE_FLOAT = 2
+_ATTRIBUTE_INT = 3
 _FLOAT32 = 1
 
 Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -263,7 +273,7 @@ def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
     meshes = folder / "pybullet_data" / "husky" / "meshes"
     dark, grey, yellow = (60, 62, 66), (44, 45, 48), (238, 186, 24)
 
-    def moved(surface: Surface, x: float, z: float, *, turned: bool = False) -> Surface:
+    def place(surface: Surface, x: float, z: float, *, turned: bool = False) -> Surface:
         c = -1.0 if turned else 1.0
         return surface.moved(np.array([[c, 0, 0, x], [0, c, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]], np.float64))
 
@@ -271,9 +281,9 @@ def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
     base = [
         _light(meshes / "base_link.stl", 900, grey),
         _light(meshes / "top_plate.stl", 900, yellow),
-        moved(_light(meshes / "user_rail.stl", 700, dark), 0.272, 0.245),
-        moved(bumper, 0.48, 0.091),
-        moved(bumper, -0.48, 0.091, turned=True),
+        place(_light(meshes / "user_rail.stl", 700, dark), 0.272, 0.245),
+        place(bumper, 0.48, 0.091),
+        place(bumper, -0.48, 0.091, turned=True),
     ]
     wheel = [_light(meshes / "wheel.stl", 900, dark, wheel_radius / 0.17775)]
     shapes = {"base": merge_surfaces(base)}

@@ -102,8 +102,19 @@ def light_uniforms(light: Light) -> dict[str, Any]:
 
 #: Open doors that a shader knows at a time.
 OPENINGS = 16
-#: Four numbers each that a shader reads of a caster: see `packed_casters`.
-CASTER_ROWS = 11 + 2 * len(LIMBS)
+# Rows of a caster, of four numbers each, as a shader reads them: see `packed_casters`.
+_TO_UNIT_ROW = 0  # and two more
+_SUN_ROW = 3
+_BOUNDS_ROW = 4
+_FOOT_ROW = 5
+_SUN_FRAME_ROW = 6  # and two more
+_AREA_ROW = 9
+_OWNER_ROW = 10
+_LIMBS_ROW = 11  # and all after it
+#: How many they are.
+CASTER_ROWS = _LIMBS_ROW + 2 * len(LIMBS)
+# Where it is said of an instance whether its last matrix is known: after three rows of the matrix.
+_IS_KNOWN = 12
 
 
 def packed_casters(arrays: SceneArrays, camera: Record, light: Light) -> NDArray[np.float32]:
@@ -120,23 +131,24 @@ def packed_casters(arrays: SceneArrays, camera: Record, light: Light) -> NDArray
     found, numbers = found[:count], numbers[:count]
     eye = np.array([camera["x"], camera["y"], camera["z"]], np.float64)
     out = np.zeros((count, CASTER_ROWS, 4), np.float32)
-    for at, frame in ((0, found["to_unit"]), (6, found["sun_frame"])):
+    for at, frame in ((_TO_UNIT_ROW, found["to_unit"]), (_SUN_FRAME_ROW, found["sun_frame"])):
         out[:, at : at + 3, :3] = frame[:, :, :3]
         out[:, at : at + 3, 3] = frame[:, :, 3] + frame[:, :, :3] @ eye
-    out[:, 3, :3], out[:, 3, 3] = found["sun"], found["inverse_soft"]
+    out[:, _SUN_ROW, :3], out[:, _SUN_ROW, 3] = found["sun"], found["inverse_soft"]
     for k, name in enumerate(("first_column", "end_column", "first_row", "end_row")):
-        out[:, 4, k] = found[name]
-    out[:, 5, 0], out[:, 5, 1] = found["foot"] - eye[2], TALLEST * found["half_height"]
-    out[:, 5, 2], out[:, 5, 3] = found["is_round"], found["limb_count"]
-    out[:, 9] = found["area"]
+        out[:, _BOUNDS_ROW, k] = found[name]
+    foot = out[:, _FOOT_ROW]
+    foot[:, 0], foot[:, 1] = found["foot"] - eye[2], TALLEST * found["half_height"]
+    foot[:, 2], foot[:, 3] = found["is_round"], found["limb_count"]
+    out[:, _AREA_ROW] = found["area"]
     avatar = numbers - int(arrays.counts["instances"])
     owner = np.zeros((count, 3), np.int32)
     owner[:, 0] = np.where(avatar < 0, numbers, -1)
     if len(arrays.avatars.span):
         owner[:, 1] = arrays.mesh.entity[arrays.avatars.span["first_triangle"][np.maximum(avatar, 0)]]
     owner[:, 2] = found["cabin"]
-    out[:, 10, :3] = owner.view(np.float32)
-    out[:, 11:] = found["limbs"].reshape(count, 2 * len(LIMBS), 4)
+    out[:, _OWNER_ROW, :3] = owner.view(np.float32)
+    out[:, _LIMBS_ROW:] = found["limbs"].reshape(count, 2 * len(LIMBS), 4)
     return out.reshape(count, 4 * CASTER_ROWS)
 
 
@@ -173,8 +185,8 @@ def packed_past(past: PastPlaces) -> tuple[NDArray[np.float32], NDArray[np.float
     things = np.zeros((len(past.matrix), 16), np.float32)
     matrix: NDArray[Any] = past.matrix.astype(np.float64)
     matrix[:, :, 3] -= past.eye
-    things[:, :12] = matrix.reshape(-1, 12)
-    things[:, 12] = past.known[: len(things)]
+    things[:, :_IS_KNOWN] = matrix.reshape(-1, 12)
+    things[:, _IS_KNOWN] = past.known[: len(things)]
     return bodies.astype(np.float32), things
 
 

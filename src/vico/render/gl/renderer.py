@@ -184,7 +184,7 @@ class Target:
         found = self._read(self._places, np.empty((*self._shape, 4), np.float32)).astype(np.float64)
         return _with_sky(np.where(found[..., 3:] > 0.5, found[..., :3], np.nan), depth, camera)
 
-    def seen(self, depth: NDArray[np.float32], entity: NDArray[np.int32]) -> PictureBuffers:
+    def picture_of(self, depth: NDArray[np.float32], entity: NDArray[np.int32]) -> PictureBuffers:
         """Return the picture, given the depths and who is seen in it."""
         size = self._shape[0] * self._shape[1]
         colours = self._read(self._colours, self._read_colours)
@@ -294,7 +294,7 @@ class GlRenderer:
         if samples > 1 and request.rgb:
             fine = camera_uniforms(cameras, k, samples, room)
             target = self._draw(fine, light, moving=request.moving)
-            wide = self._with_rooms(target.seen(target.depth(), target.entities()), fine, light, request)
+            wide = self._with_rooms(target.picture_of(target.depth(), target.entities()), fine, light, request)
             blocks = wide.reshape(cameras.height, samples, cameras.width, samples, 3).astype(np.float32)
             rgb = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
         target = self._draw(camera, light, moving=request.moving, past=request.past[k] if request.past else None)
@@ -305,7 +305,7 @@ class GlRenderer:
         if len(frames.normals):
             frames.normals[k] = target.normals()
         if request.rgb:
-            seen = target.seen(depth, entity)
+            seen = target.picture_of(depth, entity)
             if samples == 1:
                 rgb = self._with_rooms(seen, camera, light, request)
             if request.quality.ambient_occlusion:
@@ -323,7 +323,7 @@ class GlRenderer:
 
             def draw(inside: Record) -> NDArray[np.uint8]:
                 target = self._draw(inside, light, moving=request.moving)
-                return target.seen(target.depth(), target.entities()).rgb
+                return target.picture_of(target.depth(), target.entities()).rgb
 
             show_rooms(self.scene, camera, light.uniforms, seen.keys, seen.glass, draw, seen.rgb)
         return seen.rgb

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vico.assets.vehicle_parts import Cabin
 from vico.render.arrays import PAD, SHADOWLESS, STRIDE
 from vico.render.compiled import inlined, kernel
+from vico.render.limbs import LIMB_RADIUS
 from vico.render.records import CABIN, CABIN_STEPS, CASTER
 from vico.render.uniforms import Record
 
@@ -132,8 +133,13 @@ _RIM, _SPREAD = np.float32(0.03), np.float32(0.012)
 _WIDEST = np.float32(2.5)
 # The inverse of the way past a limb from which on its shadow is whole, 1/m: what it rests on is lit beside it.
 _BEHIND = np.float32(25.0)
-# Half width of the shadow at the foot, metres; and half the height of the layer it lies in.
-_FOOT_WIDTH, _FOOT_HEIGHT = 0.62, 0.5
+_FOOT_WIDTH = 0.62  # half width of the shadow at the foot, metres
+_FOOT_HEIGHT = 0.5  # half the height of the layer it lies in, metres
+# Columns of a caster's limb, in the frame across (p, q) and along (r) the light: its start, and from there to its end.
+_P, _Q, _ALONG_P, _ALONG_Q = range(4)
+_INVERSE_SQUARE = 4  # of its length across the light
+_R, _ALONG_R = 5, 6
+_RADIUS = 7  # metres
 
 
 @inlined
@@ -162,10 +168,10 @@ def set_limbs(limbs: Any, light: Any, caster: Any) -> None:
         p0, q0, r0 = _place_limb(frame, 0, limb, 0), _place_limb(frame, 1, limb, 0), _place_limb(frame, 2, limb, 0)
         p1, q1, r1 = _place_limb(frame, 0, limb, 3), _place_limb(frame, 1, limb, 3), _place_limb(frame, 2, limb, 3)
         p, q = p1 - p0, q1 - q0
-        row[0], row[1], row[2], row[3] = np.float32(p0), np.float32(q0), np.float32(p), np.float32(q)
-        row[4] = np.float32(1.0 / max(p * p + q * q, 1e-9))
-        row[5], row[6], row[7] = np.float32(r0), np.float32(r1 - r0), limb[6]
-        rim = limb[6] * np.float32(1.0 + 0.5 * _WIDEST)
+        row[_P], row[_Q], row[_ALONG_P], row[_ALONG_Q] = np.float32(p0), np.float32(q0), np.float32(p), np.float32(q)
+        row[_INVERSE_SQUARE] = np.float32(1.0 / max(p * p + q * q, 1e-9))
+        row[_R], row[_ALONG_R], row[_RADIUS] = np.float32(r0), np.float32(r1 - r0), limb[LIMB_RADIUS]
+        rim = limb[LIMB_RADIUS] * np.float32(1.0 + 0.5 * _WIDEST)
         area[0], area[1] = min(area[0], np.float32(min(p0, p1)) - rim), max(area[1], np.float32(max(p0, p1)) + rim)
         area[2], area[3] = min(area[2], np.float32(min(q0, q1)) - rim), max(area[3], np.float32(max(q0, q1)) + rim)
 
@@ -180,12 +186,12 @@ def _place_limb(frame: Any, axis: int, limb: Any, end: int) -> float:
 @inlined
 def limb_shadow(limb: Any, p: Any, q: Any, r: Any) -> Any:
     """Return how dark a limb makes a point, 0..1; all float32, in the frame across and along the light."""
-    x, y = p - limb[0], q - limb[1]
-    way = min(max((x * limb[2] + y * limb[3]) * limb[4], _ZERO), _ONE)
-    x, y = x - way * limb[2], y - way * limb[3]
-    ahead = limb[5] + way * limb[6] - r
-    rim = min(_RIM + _SPREAD * max(ahead, _ZERO), _WIDEST * limb[7])
-    dark = min(max((limb[7] - np.sqrt(x * x + y * y)) / rim + _HALF, _ZERO), _ONE)
+    x, y = p - limb[_P], q - limb[_Q]
+    way = min(max((x * limb[_ALONG_P] + y * limb[_ALONG_Q]) * limb[_INVERSE_SQUARE], _ZERO), _ONE)
+    x, y = x - way * limb[_ALONG_P], y - way * limb[_ALONG_Q]
+    ahead = limb[_R] + way * limb[_ALONG_R] - r
+    rim = min(_RIM + _SPREAD * max(ahead, _ZERO), _WIDEST * limb[_RADIUS])
+    dark = min(max((limb[_RADIUS] - np.sqrt(x * x + y * y)) / rim + _HALF, _ZERO), _ONE)
     return dark * min(max(ahead * _BEHIND, _ZERO), _ONE)
 
 
@@ -193,9 +199,10 @@ def limb_shadow(limb: Any, p: Any, q: Any, r: Any) -> Any:
 AVATAR_HALF_WIDTH = 0.30
 # Whoever is as high as this in the picture throws a shadow with arms and legs, pixels.
 _LIMB_PIXELS = 24.0
-# Lengths of the light's way through an avatar's ball and through a box that make a full shadow, metres; of what is
-# thinner, such as a robot's legs, its thinnest side does.
-_SOFT_BALL, _SOFT_BOX, _THINNEST = 0.22, 0.5, 0.02
+# Lengths of the light's way that make a full shadow, metres.
+_SOFT_BALL = 0.22  # through an avatar's ball
+_SOFT_BOX = 0.5  # through a box; of what is thinner, such as a robot's legs, its thinnest side does
+_THINNEST = 0.02
 # The longest shadow, metres; a sun this low casts no longer ones.
 _LONGEST_SHADOW, _LOWEST_SUN = 14.0, 0.08
 # Out of doors, what is further away than this casts no shadow, metres.

@@ -22,8 +22,12 @@ from vico.render.shadows.casters import (
 )
 from vico.render.visibility.rasteriser import inverse_depth, triangle_number
 
-# Contact shadows: how far from the middle they reach (in half axes), how steeply they grow, how dark at most.
-_ROUND_EDGE, _BOX_EDGE, _ROUND_GAIN, _BOX_GAIN, _DARKEST = 2.0, 1.25, 1.5, 4.0, 0.75
+# Contact shadows: how far from the middle they reach, half axes; how steeply they grow; how dark they are at most.
+_ROUND_EDGE = 2.0
+_BOX_EDGE = 1.25
+_ROUND_GAIN = 1.5
+_BOX_GAIN = 4.0
+_DARKEST = 0.75
 # Half the height of the layer at the ground in which they lie, metres.
 _CONTACT_HEIGHT = 0.5
 _ZERO, _ONE, _TWO, _THREE, _TINY = (np.float32(value) for value in (0.0, 1.0, 2.0, 3.0, 1e-9))
@@ -34,8 +38,10 @@ _INDEX = 0x7FFFFFFF
 _DEPTH, _REACHED, _ABOVE, _UNIT_A, _UNIT_B, _UNIT_C, _LEFT = (k * STRIDE for k in range(7))
 
 
-#: What `cast_moving` found: nothing, shadows, insides of vehicles as well.
-NO_SHADOWS, SHADOWS, CABINS = 0, 1, 2
+# What `cast_moving` found.
+NO_SHADOWS = 0
+SHADOWS = 1
+CABINS = 2  # insides of vehicles as well
 
 
 @kernel

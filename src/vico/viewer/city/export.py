@@ -35,14 +35,14 @@ from vico.sim.pictures.buildings import hall_size
 from vico.version import __version__
 from vico.viewer.city.models import (
     PLAIN,
+    SHAPES,
     Blob,
     PackedMesh,
     TextureLayers,
-    array_entries,
+    model_entry,
     moving_models,
     pack_surfaces,
     write_instances,
-    write_models,
     write_robots,
     write_rooms,
 )
@@ -60,7 +60,6 @@ __all__ = [
     "far_tiles",
     "ground_grid",
     "ground_picture",
-    "lamps_of",
     "near_tiles",
     "write_city",
 ]
@@ -118,7 +117,7 @@ def _middle(footprint: Sequence[Any]) -> NDArray[np.float64]:
 
 def _split_mesh(mesh: PackedMesh, tiles: NDArray[np.int64], found: dict[int, list[PackedMesh]]) -> None:
     for tile in np.unique(tiles).tolist():
-        found.setdefault(tile, []).append(mesh.chosen(tiles == tile))
+        found.setdefault(tile, []).append(mesh.select(tiles == tile))
 
 
 def far_tiles(world: World, grid: Grid, textures: TextureLayers) -> dict[int, PackedMesh]:
@@ -138,7 +137,7 @@ def far_tiles(world: World, grid: Grid, textures: TextureLayers) -> dict[int, Pa
     tiles = np.array(
         [tile_of_building.get(e, int(t)) for e, t in zip(mesh.entity[first].tolist(), own, strict=True)], np.int64
     )
-    return {tile: mesh.chosen(tiles == tile) for tile in np.unique(tiles).tolist()}
+    return {tile: mesh.select(tiles == tile) for tile in np.unique(tiles).tolist()}
 
 
 def _mean_colours(surfaces: list[Surface], textures: TextureLayers) -> dict[int, NDArray[np.float64]]:
@@ -295,18 +294,22 @@ def write_city(world: World, folder: Path) -> None:
     shapes = Blob()
     standing = world.prototypes()
     used = {entry["prototype"] for entry in instances}
-    lamps = lamps_of(world)
+    # What shines at night.
+    is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
+    lamps = set(world.objects.prototype[is_lamp].tolist())
     models = {
         name: with_lit_heads(standing[name]) if name in lamps else standing[name] for name in used
     } | moving_models()
     doors, leaves = door_entries(world)
     models |= leaves
-    written = write_models(models, textures, shapes)
+    written = {name: model_entry(list(models[name]), textures, shapes) for name in sorted(models)}
     robots = write_robots(textures, shapes)
     write_json(folder / "rooms.json", write_rooms(world, textures, folder))
     write_bytes(folder / "outlook.bin", outlook.bytes())
     write_bytes(folder / "models.bin", shapes.bytes())
-    write_bytes(folder / "ground.jpg", _jpeg(ground_picture(world, textures)))
+    jpeg = io.BytesIO()
+    ground_picture(world, textures).save(jpeg, "JPEG", quality=88)
+    write_bytes(folder / "ground.jpg", jpeg.getvalue())
     write_json(
         folder / MANIFEST,
         {
@@ -317,7 +320,7 @@ def write_city(world: World, folder: Path) -> None:
             "tile": TILE,
             "count": grid.count,
             "attribution": [source.attribution for source in world.manifest.sources if source.attribution],
-            "arrays": array_entries(),
+            "arrays": [{"height": height, "width": width} for height, width in SHAPES],
             "textures": _write_textures(folder, textures),
             "ground": ground,
             "tiles": tiles,
@@ -334,12 +337,6 @@ def write_city(world: World, folder: Path) -> None:
             ],
         },
     )
-
-
-def lamps_of(world: World) -> set[str]:
-    """Return the prototypes that shine at night."""
-    is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
-    return set(world.objects.prototype[is_lamp].tolist())
 
 
 def _tile(
@@ -360,9 +357,3 @@ def _write_textures(folder: Path, textures: TextureLayers) -> list[dict[str, Any
         entries.append(entry | {"offset": blob.add(content), "size": len(content)})
     write_bytes(folder / "textures.bin", blob.bytes())
     return entries
-
-
-def _jpeg(image: Image.Image) -> bytes:
-    out = io.BytesIO()
-    image.save(out, "JPEG", quality=88)
-    return out.getvalue()

@@ -8,7 +8,7 @@ with the joints between them. Rooms are one file a building, fetched only when s
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,10 @@ class TextureLayers:
         assert material.texture is not None
         key = repr((material.texture.shape, material.cutout)).encode() + material.texture.tobytes()
         if key not in self._known:
-            picture = _with_alpha(material)
+            picture = material.texture
+            if picture.shape[2] != 4:  # without an alpha channel: opaque
+                alpha = np.full((*picture.shape[:2], 1), 255, np.uint8)
+                picture = np.concatenate([picture, alpha], axis=2)
             array = _array_for(*picture.shape[:2])
             if len(self.pictures[array]) >= 255:
                 # More pictures than a byte can number: the mean colour is left of the rest.
@@ -108,15 +111,6 @@ class TextureLayers:
                 yield {"array": array, "layer": number, "what": "colour"}, _encode(picture[:, :, :3], "JPEG")
                 if picture[:, :, 3].min() < 255:
                     yield {"array": array, "layer": number, "what": "alpha"}, _encode(picture[:, :, 3], "PNG")
-
-
-def _with_alpha(material: Material) -> NDArray[np.uint8]:
-    texture = material.texture
-    assert texture is not None
-    if texture.shape[2] == 4:
-        return texture
-    alpha = np.full((*texture.shape[:2], 1), 255, np.uint8)
-    return np.concatenate([texture, alpha], axis=2)
 
 
 def _array_for(height: int, width: int) -> int:
@@ -180,7 +174,7 @@ class PackedMesh:
     entity: NDArray[np.int32]
     triangles: NDArray[np.int32]
 
-    def chosen(self, triangles: NDArray[Any]) -> PackedMesh:
+    def select(self, triangles: NDArray[Any]) -> PackedMesh:
         """Return some of the triangles, with the vertices they need."""
         used, faces = np.unique(self.triangles[triangles], return_inverse=True)
         return PackedMesh(
@@ -267,14 +261,10 @@ class Blob:
         return b"".join(self._parts)
 
 
-def array_entries() -> list[dict[str, int]]:
-    """Return the sizes of the texture arrays as the manifest has them."""
-    return [{"height": height, "width": width} for height, width in SHAPES]
-
-
-Models = Mapping[str, Sequence[Surface]]
-# From far away a shape has this share of its triangles, but some at least; leaves this share, each larger.
-_FAR_SHARE, _FAR_LEAST, _FAR_LEAVES = 0.14, 12, 0.17
+# What a shape has from far away.
+_FAR_SHARE = 0.14  # of its triangles
+_FAR_LEAST = 12  # triangles
+_FAR_LEAVES = 0.17  # share of its leaves, each larger
 
 
 def moving_models() -> dict[str, Sequence[Surface]]:
@@ -289,12 +279,8 @@ def moving_models() -> dict[str, Sequence[Surface]]:
     return found
 
 
-def write_models(models: Models, textures: TextureLayers, blob: Blob) -> dict[str, Any]:
-    """Write shapes, from near and from far; return their entries by name."""
-    return {name: _model_entry(list(models[name]), textures, blob) for name in sorted(models)}
-
-
-def _model_entry(surfaces: list[Surface], textures: TextureLayers, blob: Blob) -> dict[str, Any]:
+def model_entry(surfaces: list[Surface], textures: TextureLayers, blob: Blob) -> dict[str, Any]:
+    """Write a shape, from near and from far; return its entry."""
     near = [blob.mesh(mesh) for mesh in pack_surfaces(surfaces, textures)]
     far = [blob.mesh(mesh) for mesh in pack_surfaces(coarse(surfaces, textures), textures)]
     low = np.min([mesh["low"] for mesh in near], axis=0) if near else np.zeros(3)

@@ -85,7 +85,7 @@ def _resting_pose(style: Any, clip: int, phase: float) -> NDArray[np.float64]:
     for k, second in enumerate(seconds.tolist()):
         causes[k, 1:] = restlessness(second, float(style["asymmetry"]), float(style["rhythm"]))
         rotations, offsets = pose(np.array([clip]), np.array([phase]), np.zeros(1), one, second=second)
-        poses[k, :55], poses[k, 55] = rotations[0], offsets[0]
+        poses[k, :-1], poses[k, -1] = rotations[0], offsets[0]
     fitted, *_ = np.linalg.lstsq(causes, poses.reshape(_MOMENTS, -1), rcond=None)
     return np.asarray(fitted.reshape(4, 56, 3))
 
@@ -156,7 +156,7 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
     body = body_of(look)
     columns: list[NDArray[Any]] = []
     head: dict[str, Any] = {"height": float(body.height), "parents": PARENTS.tolist(), "meshes": []}
-    for mesh in (body, _far_body(body)):
+    for mesh in (body, simplify_body(body, _FAR_TRIANGLES)):
         head["meshes"].append(
             {
                 "vertices": len(mesh.vertices),
@@ -179,10 +179,6 @@ def _rows_of(table: NDArray[Any]) -> list[list[float]]:
     """Return the rows of a table, to a tenth of a millimetre."""
     rows: list[list[float]] = np.round(table.astype(np.float64), 4).tolist()
     return rows
-
-
-def _far_body(body: SkinnedBody) -> SkinnedBody:
-    return simplify_body(body, _FAR_TRIANGLES)
 
 
 def _mesh_columns(mesh: SkinnedBody) -> list[NDArray[Any]]:

@@ -33,10 +33,13 @@ from vico.viewer.sources.frames import OF_RANGE
 from vico.viewer.sources.source import PROTOCOL
 from vico.viewer.sources.views import NoPictureError
 
-#: JSON messages that may wait for a client; ranges that it may ask for at a time; frames of one.
-MOST_WAITING, MOST_RANGES, MOST_FRAMES_OF_RANGE = 256, 8, 600
-#: Close codes: it broke the rules; it reads too slowly; the server ends.
-BROKE_RULES, TOO_SLOW, ENDS = 1008, 1013, 1001
+MOST_WAITING = 256  #: JSON messages for a client
+MOST_RANGES = 8  #: that a client may ask for at a time
+MOST_FRAMES_OF_RANGE = 600
+# Close codes.
+BROKE_RULES = 1008  #: the client broke the rules
+TOO_SLOW = 1013  #: the client reads too slowly
+ENDS = 1001  #: the server ends
 
 # Frames of a range that are encoded at once.
 _BATCH = 30
@@ -195,7 +198,7 @@ class Client:
             self._end(asked)
             return True
         try:
-            frames = await asyncio.to_thread(self._encoded, *steps, asked)
+            frames = await asyncio.to_thread(self._encode_range, *steps, asked)
         except VicoError as error:
             self._end(asked, str(error))
             return True
@@ -207,9 +210,9 @@ class Client:
             await self._send_waiting()
         return True
 
-    def _encoded(self, first: int, last: int, asked: _Range) -> list[bytes]:
+    def _encode_range(self, first: int, last: int, asked: _Range) -> list[bytes]:
         frames = self._hub.state.source.frames(first, last, asked.every)
-        return [frame.encoded(flags=OF_RANGE, range_id=asked.id) for frame in frames]
+        return [frame.to_bytes(flags=OF_RANGE, range_id=asked.id) for frame in frames]
 
     def _end(self, asked: _Range, error: str = "") -> None:
         if self._ranges.pop(asked.id, None) is not None:
@@ -381,7 +384,11 @@ PAGE = Path(__file__).parents[1] / "page"
 #: Steps whose frames one answer holds at most.
 MOST_FRAMES = 600
 
-_MOST_EVENTS, _MOST_POINTS, _MOST_HITS, _LONGEST_QUERY = 5000, 5000, 100, 200
+# Of one answer.
+_MOST_EVENTS = 5000
+_MOST_POINTS = 5000
+_MOST_HITS = 100
+_LONGEST_QUERY = 200  # characters
 
 Handler = Callable[[Request], Awaitable[Response]]
 _Answer = Callable[[ViewerState, Request], Awaitable[Response]]
@@ -492,7 +499,7 @@ async def _frames_answer(state: ViewerState, request: Request) -> Response:
         raise InputError(f"frames of {(last - first) // every + 1} steps; ask for {MOST_FRAMES} at most")
 
     def content() -> bytes:
-        frames = [frame.encoded() for frame in state.source.frames(first, last, every)]
+        frames = [frame.to_bytes() for frame in state.source.frames(first, last, every)]
         return b"".join(struct.pack("<I", len(frame)) + frame for frame in frames)
 
     return Response(await run_in_threadpool(content), media_type="application/octet-stream")

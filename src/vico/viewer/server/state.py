@@ -13,13 +13,13 @@ from __future__ import annotations
 import asyncio
 import re
 import secrets
-from collections.abc import Awaitable, Callable, Mapping, MutableMapping, Sequence
-from concurrent.futures import CancelledError, Future
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import cached_property
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from vico.errors import InputError, MissingFileError
@@ -27,40 +27,11 @@ from vico.sim.recording.run import looks_and_manners
 from vico.viewer.sources.frames import NEWEST
 from vico.viewer.sources.source import Source
 
+if TYPE_CHECKING:
+    from vico.runner.control import Control
+    from vico.viewer.play import PlayedAgent
+
 View = Callable[[str, int, str], tuple[bytes | dict[str, Any], str]]
-
-
-class Hands(Protocol):
-    """Takes commands to a run that goes on, in this process; asked from the server's threads."""
-
-    def told(self) -> dict[str, Any]:
-        """Return what the message ``control`` holds."""
-
-    def command(self, name: str, arguments: Mapping[str, Any]) -> Future[dict[str, Any]]:
-        """Have a command done between two steps; its result is the reply, its error a sentence."""
-
-
-class Player(Protocol):
-    """Takes what a person at the page does to the agent that is played."""
-
-    @property
-    def agent(self) -> str:
-        """Who is played."""
-
-    def keys(self, client: int, message: Mapping[str, Any]) -> bool:
-        """Take in what is held down; return whether it was this client's turn."""
-
-    def do(self, client: int, action: Any) -> Future[dict[str, Any]]:
-        """Have an action done; its result is the reply."""
-
-    def leave(self, client: int) -> None:
-        """Let go of all keys of a client that is gone."""
-
-    def owner(self) -> int | None:
-        """Return who plays; None for nobody."""
-
-    def newest(self) -> dict[str, Any] | None:
-        """Return the message ``you`` of the agent's newest step."""
 
 
 class ViewerState:
@@ -84,8 +55,8 @@ class ViewerState:
         view: View,
         *,
         city: Path | None = None,
-        hands: Hands | None = None,
-        player: Player | None = None,
+        hands: Control | None = None,
+        player: PlayedAgent | None = None,
     ) -> None:
         self.source, self.view, self.city, self.hands, self.player = source, view, city, hands, player
         #: Told how many clients are connected whenever one comes or leaves.
@@ -142,8 +113,10 @@ _LOOKS_EVERY, _COUNTS_EVERY = 1.0, 1.0
 _MOST_STEPS = 100_000
 # News of some steps are kept for the clients that are told the same.
 _MOST_NEWS = 16
-# Seconds that the end waits for replies, and then for clients that read slowly; between looks at them.
-_REPLIES_WITHIN, _READ_WITHIN, _LOOKS_AT_THEM = 1.0, 1.0, 0.01
+# Seconds that the end of the server takes at most.
+_REPLIES_WITHIN = 1.0  # for replies
+_READ_WITHIN = 1.0  # then for clients that read slowly
+_LOOKS_AT_THEM = 0.01  # between looks at them
 
 
 class Hub:
@@ -215,7 +188,7 @@ class Hub:
         last = self.state.source.last
         if last != self._frame[0] and last >= 0:
             frame = next(self.state.source.frames(last, last))
-            self._frame = last, frame.encoded(flags=NEWEST)
+            self._frame = last, frame.to_bytes(flags=NEWEST)
         return self._frame
 
     def news(self, since: int, until: int) -> list[dict[str, Any]]:
@@ -316,7 +289,7 @@ class Gate:
                 scope, send, "open the address that the command printed: this one lacks its token", self._headers
             )
         else:
-            await self._app(scope, receive, self._guarded(scope, send))
+            await self._app(scope, receive, self._with_headers(scope, send))
 
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> str:
         """Return why a request is refused whatever it knows; "" if it is not."""
@@ -367,18 +340,18 @@ class Gate:
         more = [(b"location", b"./"), (b"set-cookie", cookie.encode())]
         await _answer(send, 303, "", [*self._headers, *more])
 
-    def _guarded(self, scope: Scope, send: Send) -> Send:
+    def _with_headers(self, scope: Scope, send: Send) -> Send:
         """Return `send` with our headers on every answer."""
         kept = scope.get("path", "").startswith(("/city/", "/three/"))
         caching = (b"cache-control", b"no-cache" if kept else b"no-store")
 
-        async def guarded(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 others = [pair for pair in message.get("headers", []) if pair[0].lower() != b"cache-control"]
                 message["headers"] = [*others, *self._headers[:-1], caching]
             await send(message)
 
-        return guarded
+        return send_with_headers
 
 
 def checked_host(text: str) -> str:

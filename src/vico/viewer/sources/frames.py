@@ -59,7 +59,7 @@ class Skylight:
         found[:4] = self._sun(int(time))
         if air is not None:
             found[4 : 4 + len(_WEATHER_FIELDS)] = [air[key] for key in _WEATHER_FIELDS]
-        found[15] = 0.0
+        found[-1] = 0.0
         return found
 
     def _sun_at(self, second: int) -> tuple[float, float, float, float]:
@@ -134,7 +134,7 @@ class Frame:
     sky: NDArray[np.float32]
     tables: Mapping[str, Columns]
 
-    def encoded(self, *, flags: int = 0, range_id: int = 0) -> bytes:
+    def to_bytes(self, *, flags: int = 0, range_id: int = 0) -> bytes:
         """Return the bytes of the frame."""
         most = {"doors": _MOST_DOORS}
         counts = {
@@ -187,19 +187,15 @@ def frames_between(tables: StepTables, skylight: Skylight, first: int, last: int
     chunk = max(_CHUNK // every, 1)
     for begin in range(0, len(wanted), chunk):
         steps = wanted[begin : begin + chunk]
-        yield from _frames(tables, skylight, steps)
-
-
-def _frames(tables: StepTables, skylight: Skylight, steps: range) -> Iterator[Frame]:
-    first, last = steps[0], steps[-1]
-    times = tables.stored("steps", first, last)["time"]
-    weather = tables.stored("weather", first, last)
-    rows = {name: _ByStep(tables.stored(name, first, last)) for name in FRAME_COLUMNS}
-    for step in steps:
-        time = float(times[step - first])
-        air = {key: values[step - first] for key, values in weather.items()} if len(weather["step"]) else None
-        found = {name: rows[name].of(step, FRAME_COLUMNS[name]) for name in FRAME_COLUMNS}
-        yield Frame(step, time, skylight.sky(time, air), found)
+        begin_step, end_step = steps[0], steps[-1]
+        times = tables.rows_between("steps", begin_step, end_step)["time"]
+        weather = tables.rows_between("weather", begin_step, end_step)
+        rows = {name: _ByStep(tables.rows_between(name, begin_step, end_step)) for name in FRAME_COLUMNS}
+        for step in steps:
+            time = float(times[step - begin_step])
+            air = {key: values[step - begin_step] for key, values in weather.items()} if len(weather["step"]) else None
+            found = {name: rows[name].of(step, FRAME_COLUMNS[name]) for name in FRAME_COLUMNS}
+            yield Frame(step, time, skylight.sky(time, air), found)
 
 
 class _ByStep:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vico.community.folder import read_community
 from vico.errors import InputError, MissingFileError, VicoError
@@ -136,7 +135,7 @@ class Source:
         self.plans: Callable[[Sequence[str]], Mapping[str, Any]] = lambda names: {}
 
     @classmethod
-    def recorded(cls, path: Path, *, world: Path | None = None) -> Source:
+    def of_run(cls, path: Path, *, world: Path | None = None) -> Source:
         """Return the source of a run folder.
 
         Parameters
@@ -210,7 +209,11 @@ class Source:
     def cast(self, since: int | None = None) -> dict[str, Any]:
         """Return what ``/api/cast`` tells."""
         cast = self.tables.cast().values()
-        told = [_member(m) for m in cast if since is None or _changed_since(m, since)]
+        told = [
+            asdict(m) | {"size": list(m.size), "intervals": [list(interval) for interval in m.intervals]}
+            for m in cast
+            if since is None or _changed_since(m, since)
+        ]
         return {"step": self.last, "cast": told}
 
     def moment(self, step: int, agent: str = "") -> dict[str, Any]:
@@ -224,18 +227,18 @@ class Source:
         wanted = [a for a in self.agents if not agent or a["name"] == agent]
         if not wanted:
             raise InputError(f"nobody is called {agent!r}")
-        head = self.tables.stored("steps", step, step)
+        head = self.tables.rows_between("steps", step, step)
         if not len(head["step"]):
             raise InputError(f"step {step} is not there")
         events = self.events(step, step)["events"]
-        rows = _rows(self.tables.stored("agents", step, step), "agents")
-        motions = {row["entity"]: row for row in _rows(self.tables.stored("people", step, step), "people")}
-        joints = self.tables.stored("joints", step, step)
+        rows = _rows(self.tables.rows_between("agents", step, step), "agents")
+        motions = {row["entity"]: row for row in _rows(self.tables.rows_between("people", step, step), "people")}
+        joints = self.tables.rows_between("joints", step, step)
         names = [a["name"] for a in wanted]
         plans = self.plans(names) if step == self.last else {}
         about = {row["entity"]: row for row in rows}
         found = {
-            a["name"]: self._told(about[a["entity"]], motions.get(a["entity"]), joints, events)
+            a["name"]: self._agent_state(about[a["entity"]], motions.get(a["entity"]), joints, events)
             | {"plan": plans.get(a["name"])}
             for a in wanted
             if a["entity"] in about
@@ -246,7 +249,7 @@ class Source:
 
     def events(self, first: int, last: int, limit: int = 1000) -> dict[str, Any]:
         """Return what ``/api/events`` tells of some steps."""
-        table = self.tables.stored("events", first, last)
+        table = self.tables.rows_between("events", first, last)
         rows = _rows({key: values[:limit] for key, values in table.items()}, "events")
         for row in rows:
             row["data"] = json.loads(row["data"])
@@ -294,7 +297,7 @@ class Source:
         end, oldest = self.last, max(self.last - _SEARCHED_IN_ALL, 0)
         while end >= oldest and len(found) < limit:
             first = max(end - _SEARCHED + 1, 0)
-            for row in reversed(_rows(self.tables.stored("events", first, end), "events")):
+            for row in reversed(_rows(self.tables.rows_between("events", first, end), "events")):
                 if row["kind"] not in ("refused", "collision") and wanted in row["text"].casefold():
                     place = [row["x"], row["y"], row["z"]]
                     entity = entities.get(row["agent"])
@@ -323,7 +326,7 @@ class Source:
         period = periods.get(agent["name"], usual)
         return float(period) if isinstance(period, int | float) else None
 
-    def _told(
+    def _agent_state(
         self, row: dict[str, Any], motion: dict[str, Any] | None, joints: Columns, events: Sequence[dict[str, Any]]
     ) -> dict[str, Any]:
         name, mine = self.names[row["entity"]], joints["entity"] == row["entity"]
@@ -382,11 +385,6 @@ def _world_record(world: World) -> dict[str, Any]:
     }
 
 
-def _member(member: CastMember) -> dict[str, Any]:
-    told = asdict(member)
-    return told | {"size": list(member.size), "intervals": [list(interval) for interval in member.intervals]}
-
-
 def _changed_since(member: CastMember, since: int) -> bool:
     """Whether a body came or went after a step."""
     first, until = member.intervals[-1]
@@ -401,13 +399,13 @@ def _entity(entity: int, cast: Mapping[int, CastMember]) -> dict[str, Any] | Non
 
 def _rows(columns: Columns, table: str) -> list[dict[str, Any]]:
     """Return rows as dicts of plain values, in quantities."""
-    form = TABLES[table]
-    values = {key: _quantity(columns[key], form[key].unit) for key in form}
+    values = {}
+    for key, column in TABLES[table].items():
+        if column.unit:
+            values[key] = [round(value, 4) for value in (columns[key] * column.unit).tolist()]
+        else:
+            values[key] = np.asarray(columns[key]).tolist()
     return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
-
-
-def _quantity(values: NDArray[Any], unit: float) -> list[Any]:
-    return [round(value, 4) for value in (values * unit).tolist()] if unit else list(np.asarray(values).tolist())
 
 
 def _hit(

@@ -34,7 +34,7 @@ class StepTables(Protocol):
     def last(self) -> int:
         """The newest step there is; -1 before the first."""
 
-    def stored(self, table: str, first: int, last: int) -> Columns:
+    def rows_between(self, table: str, first: int, last: int) -> Columns:
         """Return the rows of steps `first` to `last`, both included, as stored, in the order of the format.
 
         Raises
@@ -79,10 +79,11 @@ class RecordedTables:
         with self._lock:
             return self._run.refresh()
 
-    def stored(self, table: str, first: int, last: int) -> Columns:
-        """Return rows as stored; see `StepTables.stored`."""
+    def rows_between(self, table: str, first: int, last: int) -> Columns:
+        """Return rows as stored; see `StepTables.rows_between`."""
         with self._lock:
-            return _columns(self._run.table(table, first, last), table)
+            rows = self._run.table(table, first, last)
+            return {key: _column(rows, key, column) for key, column in TABLES[table].items()}
 
     def cast(self) -> dict[int, CastMember]:
         """Everybody and everything that was there at some step, by entity."""
@@ -146,8 +147,8 @@ class LiveTables:
                 take_line(self._cast, line)
         self._last = step
 
-    def stored(self, table: str, first: int, last: int) -> Columns:
-        """Return rows as stored; see `StepTables.stored`."""
+    def rows_between(self, table: str, first: int, last: int) -> Columns:
+        """Return rows as stored; see `StepTables.rows_between`."""
         with self._lock:
             ring = list(self._ring)
         oldest = ring[0][0] if ring else self._last + 1
@@ -158,7 +159,9 @@ class LiveTables:
         if first >= oldest:
             return newer
         older = self._older(table, first, min(last, oldest - 1))
-        return older if last < oldest else _in_order(table, _concatenate(table, [older, newer]))
+        if last < oldest:
+            return older
+        return _in_order(table, {key: np.concatenate([older[key], newer[key]]) for key in TABLES[table]})
 
     def cast(self) -> dict[int, CastMember]:
         """Everybody and everything that was there at some step, by entity."""
@@ -171,7 +174,7 @@ class LiveTables:
             recorded.refresh()
         if recorded is None or recorded.last < last:
             raise InputError(f"steps {first} to {last} are neither kept nor written yet")
-        return recorded.stored(table, first, last)
+        return recorded.rows_between(table, first, last)
 
     def _on_disk(self) -> RecordedTables | None:
         with self._reading:
@@ -181,10 +184,6 @@ class LiveTables:
                 except EmptyInputError:
                     return None
             return self._recorded
-
-
-def _columns(table: pa.Table, name: str) -> Columns:
-    return {key: _column(table, key, column) for key, column in TABLES[name].items()}
 
 
 def _column(table: pa.Table, key: str, column: Column) -> NDArray[Any]:
@@ -202,10 +201,6 @@ def _kept_columns(name: str, rows: Sequence[tuple[int, Mapping[str, Mapping[str,
         else:
             found[key] = to_stored(np.concatenate([np.zeros(0), *(part[key] for part in parts)]), column)
     return _in_order(name, found)
-
-
-def _concatenate(name: str, parts: Sequence[Columns]) -> Columns:
-    return {key: np.concatenate([part[key] for part in parts]) for key in TABLES[name]}
 
 
 def _in_order(name: str, columns: Columns) -> Columns:
@@ -266,6 +261,6 @@ class Timeline:
         known, last = len(self._times), self._tables.last
         if last < known:
             return
-        new = self._tables.stored("steps", known, last)
+        new = self._tables.rows_between("steps", known, last)
         self._times = np.concatenate([self._times, new["time"]])
         self._counts = {name: np.concatenate([values, new[name]]) for name, values in self._counts.items()}

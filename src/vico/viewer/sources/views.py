@@ -93,7 +93,7 @@ def picture_of(seen: AgentView, output: str) -> tuple[bytes | dict[str, Any], st
         near[image > _FARTHEST] = 1.0
         return _bytes(near.astype(np.uint8), "PNG"), "image/png"
     if output == "segmentation":
-        return _bytes(_colours(image), "PNG"), "image/png"
+        return _bytes(_colour(image.astype(np.int64)), "PNG"), "image/png"
     return {"names": _entity_names(image, seen.names)}, "application/json"
 
 
@@ -168,10 +168,6 @@ def _colour(entity: NDArray[np.int64]) -> NDArray[np.uint8]:
     mixed = (entity.astype(np.uint64) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)
     parts = np.stack([(mixed >> np.uint64(shift)) & np.uint64(0xFF) for shift in (24, 16, 8)], axis=-1)
     return np.where(entity[..., None] > 0, 40 + parts * 200 // 255, 0).astype(np.uint8)
-
-
-def _colours(image: NDArray[np.int32]) -> NDArray[np.uint8]:
-    return _colour(image.astype(np.int64))
 
 
 def _entity_names(image: NDArray[np.int32], names: Mapping[int, Mapping[str, str]]) -> list[dict[str, Any]]:
