@@ -6,7 +6,8 @@ import gc
 import io
 import json
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -20,9 +21,10 @@ from shared_folders import FOLDERS, Shared
 from vico.community import build_community, write_community
 from vico.io.compiled import compiled_folder
 from vico.world.folder import read_world
-from vico.world.world import World
+from vico.world.world import STAGES, World
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
+from vico.worldgen.stages import SUFFIX
 
 # The same examples in every run; HYPOTHESIS_PROFILE=search draws others.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -92,6 +94,22 @@ def helsinki(helsinki_path: Path) -> World:
 def corner_path(shared: Shared) -> Path:
     """A folder with 120 m x 120 m of central Helsinki: as small as a world can be and have everything."""
     return shared("corner", lambda out: _world(out, 60.0), ["worldgen"])
+
+
+@pytest.fixture
+def begun(corner_path: Path) -> Callable[..., None]:
+    """Lay what the stages of `corner` made where a build of the same place goes on with it: ``begun(out, *without)``.
+
+    As if it had been killed at its end; or, without some stages, before they had been made.
+    """
+
+    def lay(out: Path, *without: str) -> None:
+        stages = out.with_name(f"{out.name}.partial") / STAGES
+        shutil.copytree(corner_path / STAGES, stages)
+        for name in without:
+            (stages / f"{name}{SUFFIX}").unlink()
+
+    return lay
 
 
 @pytest.fixture(scope="session")
