@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Collection, Iterator
 from hashlib import sha256
@@ -39,15 +40,15 @@ def digest(rooms: Collection[str] | None, *more: Path) -> str:
     rooms
         Of the house; those below count too. None stands for all, with the front doors.
     more
-        Other files that count.
+        Files of tests that count, with the helpers that they import.
 
     Returns
     -------
     str
-        Of source text, packaged data, the tests' helpers, installed packages and assets, Python, and our variables.
+        Of source text, packaged data, files of tests, installed packages and assets, Python, and our variables.
     """
     whole = sha256()
-    for path in (*_files(rooms), *_HELPERS, *more):
+    for path in (*_files(rooms), *_with_helpers(more)):
         whole.update(f"\n{os.path.relpath(path, SOURCE)} ".encode() + path.read_bytes())
     whole.update(_SURROUNDINGS)
     return whole.hexdigest()[:16]
@@ -60,11 +61,27 @@ def _surroundings() -> bytes:
     return repr((sys.version, sorted(packages), sorted(assets), sorted(ours.items()))).encode()
 
 
+_SET_BY_TESTS}
+    return repr((sys.version, sorted(packages), sorted(assets), sorted(ours.items()))).encode()
+
+
 _HELPERS = sorted(
     path for path in Path(__file__).parent.rglob("*.py") if not path.name.startswith(("test_", "conftest"))
 )
 _SET_BY_TESTS = {"VICO_CACHE", "VICO_OVERPASS"}
 _SURROUNDINGS = _surroundings()  # as a run begins: single tests set variables and cache folders of their own
+
+
+def _with_helpers(makers: Collection[Path]) -> list[Path]:
+    """Return files of tests with the helpers that they import, directly or not."""
+    found, waiting = set(makers), list(makers)
+    while waiting:
+        for name in re.findall(r"^\s*(?:from|import) (\w+)", waiting.pop().read_text(encoding="utf-8"), re.MULTILINE):
+            helper = Path(__file__).with_name(name)
+            files = {*helper.glob("*.py"), *(path for path in [helper.with_suffix(".py")] if path.is_file())}
+            waiting += files - found
+            found |= files
+    return sorted(found)
 
 
 def _files(rooms: Collection[str] | None) -> Iterator[Path]:
