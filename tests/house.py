@@ -57,18 +57,7 @@ def digest(rooms: Collection[str] | None, *more: Path) -> str:
 def _surroundings() -> bytes:
     packages = {path.name for folder in map(Path, sys.path) for path in folder.glob("*.dist-info")}
     assets = {path.name for path in cache_folder().glob("assets/*")}
-    ours = {name: value for name, value in os.environ.items() if name.startswith("VICO_") and name not in _SET_BY_TESTS}
-    return repr((sys.version, sorted(packages), sorted(assets), sorted(ours.items()))).encode()
-
-
-_SET_BY_TESTS}
-    return repr((sys.version, sorted(packages), sorted(assets), sorted(ours.items()))).encode()
-
-
-_HELPERS = sorted(
-    path for path in Path(__file__).parent.rglob("*.py") if not path.name.startswith(("test_", "conftest"))
-)
-_SET_BY_TESTS = {"VICO_CACHE", "VICO_OVERPASS"}
+    ours = {name: value for name, value in os.environ.items() if name.startswith("VICO_") and name not in _SET_BY_TESTS = {"VICO_CACHE", "VICO_OVERPASS"}
 _SURROUNDINGS = _surroundings()  # as a run begins: single tests set variables and cache folders of their own
 
 
@@ -78,6 +67,8 @@ def _with_helpers(makers: Collection[Path]) -> list[Path]:
     while waiting:
         for name in re.findall(r"^\s*(?:from|import) (\w+)", waiting.pop().read_text(encoding="utf-8"), re.MULTILINE):
             helper = Path(__file__).with_name(name)
+            if name.startswith("test_"):
+                continue
             files = {*helper.glob("*.py"), *(path for path in [helper.with_suffix(".py")] if path.is_file())}
             waiting += files - found
             found |= files
