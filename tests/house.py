@@ -57,7 +57,11 @@ def digest(rooms: Collection[str] | None, *more: Path) -> str:
 def _surroundings() -> bytes:
     packages = {path.name for folder in map(Path, sys.path) for path in folder.glob("*.dist-info")}
     assets = {path.name for path in cache_folder().glob("assets/*")}
-    ours = {name: value for name, value in os.environ.items() if name.startswith("VICO_") and name not in _SET_BY_TESTS = {"VICO_CACHE", "VICO_OVERPASS"}
+    ours = {name: value for name, value in os.environ.items() if name.startswith("VICO_") and name not in _SET_BY_TESTS}
+    return repr((sys.version, sorted(packages), sorted(assets), sorted(ours.items()))).encode()
+
+
+_SET_BY_TESTS = {"VICO_CACHE", "VICO_OVERPASS"}
 _SURROUNDINGS = _surroundings()  # as a run begins: single tests set variables and cache folders of their own
 
 
