@@ -73,7 +73,8 @@ def _with_helpers(makers: Collection[Path]) -> list[Path]:
             helper = Path(__file__).with_name(name)
             if name.startswith("test_"):
                 continue
-            files = {*helper.glob("*.py"), *(path for path in [helper.with_suffix(".py")] if path.is_file())}
+            package = helper.glob("*.py") if (helper / "__init__.py").is_file() else ()
+            files = {*package, *(path for path in [helper.with_suffix(".py")] if path.is_file())}
             waiting += files - found
             found |= files
     return sorted(found)
