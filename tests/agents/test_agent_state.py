@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from itertools import count
 from typing import Any
 
 import pytest
@@ -61,7 +62,7 @@ def carried_on(
 ) -> tuple[set[str], int]:
     """Let agents act; every so often others are restored from their state, and asked beside them from then on.
 
-    It ends after some steps, or when there were all actions of some types.
+    It ends after some steps, or some after there were all actions of some types.
 
     Returns the types of actions there were, and how many restored agents were followed.
     """
@@ -69,7 +70,7 @@ def carried_on(
     restored: list[Mapping[str, Agent]] = []
     observations, infos = sim.observe()
     types: set[str] = set()
-    for step in range(steps):
+    for step in count():
         if step % every == every // 2:
             fresh = make()
             for name, agent in fresh.items():
@@ -81,6 +82,8 @@ def carried_on(
                 assert agent.act(observations[name], infos[name]) == actions[name], f"{name} at step {step}"
         types |= {str(action["type"]) for action in actions.values()}
         if until and types.issuperset(until):
+            steps, until = min(steps, step + 3 * every), ()
+        if step == steps - 1:
             break
         result = sim.step(actions)
         observations, infos = result.observations, result.infos
@@ -94,8 +97,8 @@ def test_residents() -> None:
     sim.scenario.place_agent("assistant_0", (0.0, 3.9))
     sim.scenario.place_agent("assistant_1", (-5.0, 3.2))
     public_map = PublicMap.from_world(sim.world)
-    types, count = carried_on(sim, lambda: followers_of(toy_city.community(), public_map), steps=300, every=30)
-    assert count == 10
+    types, followed = carried_on(sim, lambda: followers_of(toy_city.community(), public_map), steps=300, every=30)
+    assert followed == 10
     assert {"move_forward", "turn_left", "exit", "enter", "wait"} <= types
 
 
@@ -165,7 +168,7 @@ def test_planners(method: str, category: str) -> None:
 
     able = method in ("heuristic", "ours")
     # To the end of the task, or as long as it takes to see that nothing of the state is lost.
-    types, _ = carried_on(sim, make, steps=300 if able else 120, every=25, until=DONE[category] if able else ())
+    types, _ = carried_on(sim, make, steps=300 if able else 120, every=15, until=DONE[category] if able else ())
     assert "move_forward" in types
     assert types & {"turn_left", "turn_right"}
     if able:
