@@ -66,11 +66,15 @@ _SURROUNDINGS = _surroundings()  # as a run begins: single tests set variables a
 
 
 def _with_helpers(makers: Collection[Path]) -> list[Path]:
-    """Return files of tests with the helpers that they import, directly or not."""
-    found, waiting = set(makers), list(makers)
+    """Return files of tests with the fixtures that they share and the helpers that they import, directly or not."""
+    tests = Path(__file__).parent
+    # What a maker is given comes from the fixtures of its folder and of those above.
+    folders = {folder for maker in makers for folder in maker.parents if folder.is_relative_to(tests)}
+    found = {*makers, *(path for folder in folders for path in folder.glob("conftest.py"))}
+    waiting = list(found)
     while waiting:
         for name in re.findall(r"^\s*(?:from|import) (\w+)", waiting.pop().read_text(encoding="utf-8"), re.MULTILINE):
-            helper = Path(__file__).with_name(name)
+            helper = tests / name
             if name.startswith("test_"):
                 continue
             package = helper.glob("*.py") if (helper / "__init__.py").is_file() else ()
