@@ -6,7 +6,7 @@ SEED ?= 0
 USE := worldgen,viewer
 DEV := worldgen,viewer,photos,usd,s3,docs,dev
 
-.PHONY: demo test check docs wheel bench clean
+.PHONY: demo test test-changed test-all check docs wheel bench clean
 
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 15)))' \
@@ -40,8 +40,18 @@ demo: .venv/assets
 	$(BIN)/vico demo --out $(DEMO) --seed $(SEED) --force
 
 # Many tests start processes: none need compile the sources' byte code, whatever the environment says.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
+
 test: .venv/dev
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --durations 60 --durations-min 4
+	$(PYTEST)
+
+# Those of the rooms that changed since this branch left main, and of the rooms above them.
+test-changed: .venv/dev
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python scripts/test_changed.py
+
+# Those too that take minutes each.
+test-all: .venv/dev
+	$(PYTEST) -m ''
 
 # The Khronos glTF validator, for a test; without npm that test is skipped.
 .venv/gltf:

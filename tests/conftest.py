@@ -1,4 +1,4 @@
-"""Worlds that many tests look at, built once a run from real data, whichever process needs them first."""
+"""Worlds that many tests look at, built once from real data by whichever process needs them first, and kept."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import gc
 import io
 import json
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,14 @@ import pytest
 from hypothesis import settings
 
 from command_line import vico
-from shared_folders import Shared, SharedFolders
+from shared_folders import FOLDERS, Shared
 from vico.community import build_community, write_community
 from vico.io.compiled import compiled_folder
 from vico.world.folder import read_world
-from vico.world.world import World
+from vico.world.world import STAGES, World
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
+from vico.worldgen.stages import SUFFIX
 
 # The same examples in every run; HYPOTHESIS_PROFILE=search draws others.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -63,11 +65,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
-    """Make a folder once for all processes of this run: ``shared(name, make)``. No test may change what lies there."""
-    made = SharedFolders(tmp_path_factory.getbasetemp())
-    yield made.folder
-    made.confirm()
+def shared() -> Iterator[Shared]:
+    """Make a folder once for all processes and runs: ``shared(name, make, rooms)``. No test may change what lies there.
+
+    It is made anew when the sources of the rooms have changed that make it; without rooms, when anything has.
+    """
+    yield FOLDERS.folder
+    FOLDERS.confirm()
 
 
 def _world(out: Path, half: float) -> None:
@@ -77,7 +81,7 @@ def _world(out: Path, half: float) -> None:
 @pytest.fixture(scope="session")
 def helsinki_path(shared: Shared) -> Path:
     """A folder with 300 m x 300 m of central Helsinki, built from the packaged extract."""
-    return shared("helsinki", lambda out: _world(out, 150.0))
+    return shared("helsinki", lambda out: _world(out, 150.0), ["worldgen"])
 
 
 @pytest.fixture(scope="session")
@@ -89,7 +93,23 @@ def helsinki(helsinki_path: Path) -> World:
 @pytest.fixture(scope="session")
 def corner_path(shared: Shared) -> Path:
     """A folder with 120 m x 120 m of central Helsinki: as small as a world can be and have everything."""
-    return shared("corner", lambda out: _world(out, 60.0))
+    return shared("corner", lambda out: _world(out, 60.0), ["worldgen"])
+
+
+@pytest.fixture
+def begun(corner_path: Path) -> Callable[..., None]:
+    """Lay what the stages of `corner` made where a build of the same place goes on with it: ``begun(out, *without)``.
+
+    As if it had been killed at its end; or, without some stages, before they had been made.
+    """
+
+    def lay(out: Path, *without: str) -> None:
+        stages = out.with_name(f"{out.name}.partial") / STAGES
+        shutil.copytree(corner_path / STAGES, stages)
+        for name in without:
+            (stages / f"{name}{SUFFIX}").unlink()
+
+    return lay
 
 
 @pytest.fixture(scope="session")
@@ -101,7 +121,7 @@ def corner(corner_path: Path) -> World:
 @pytest.fixture(scope="session")
 def helsinki_city(shared: Shared) -> World:
     """700 m x 700 m of central Helsinki: large enough for bus lines and bicycle stations."""
-    return read_world(shared("city", lambda out: _world(out, 350.0)))
+    return read_world(shared("city", lambda out: _world(out, 350.0), ["worldgen"]))
 
 
 @pytest.fixture(scope="session")
@@ -116,7 +136,9 @@ def shared_data() -> Path:
 def helsinki_people(helsinki: World, helsinki_path: Path, shared: Shared) -> Path:
     """A community folder with four residents of `helsinki_path`."""
     return shared(
-        "people", lambda out: write_community(build_community(helsinki, residents=4), out, world=helsinki_path)
+        "people",
+        lambda out: write_community(build_community(helsinki, residents=4), out, world=helsinki_path),
+        ["worldgen", "community"],
     )
 
 

@@ -1,14 +1,16 @@
-"""Streets of real places for the tests of roads, lanes, transit and traffic: built once a session."""
+"""Streets of real places for the tests of roads, lanes, transit and traffic: built once, and kept."""
 
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from shared_folders import FOLDERS
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
 from vico.geo.overlay import polygons_of
@@ -73,14 +75,20 @@ def road_city(
     edges: tuple[float, float, float, float] | None = None,
 ) -> RoadCity:
     """Roads, lanes and transit of 800 m x 800 m; central Helsinki where nothing else is asked for."""
-    osm = replace(read_osm(path, LocalFrame(lat, lon), half), edges=edges)
-    network = network_of(osm)
-    lanes = lanes_of(network)
-    solids = [
-        polygon
-        for area in osm.areas
-        if area.tags.get("building", "no") != "no"
-        for polygon in polygons_of(area.polygon)
-    ]
-    transit = transit_from_osm(site_facts(osm), lanes, HeightField.flat(half), solids=solids)
-    return RoadCity(osm, network, lanes, transit, solids)
+
+    def make() -> tuple[OsmData, RoadNetwork, Transit, list[shapely.Polygon]]:
+        osm = replace(read_osm(path, LocalFrame(lat, lon), half), edges=edges)
+        network = network_of(osm)
+        solids = [
+            polygon
+            for area in osm.areas
+            if area.tags.get("building", "no") != "no"
+            for polygon in polygons_of(area.polygon)
+        ]
+        lanes = lanes_of(network)
+        return osm, network, transit_from_osm(site_facts(osm), lanes, HeightField.flat(half), solids=solids), solids
+
+    asked = repr((path.stat().st_size, path.stat().st_mtime_ns, lat, lon, half, edges)).encode()
+    name = f"roads_{path.name.partition('.')[0]}_{sha256(asked).hexdigest()[:8]}"
+    osm, network, transit, solids = FOLDERS.product(name, make, ["worldgen"])
+    return RoadCity(osm, network, lanes_of(network), transit, solids)

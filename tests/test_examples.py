@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from command_line import script
 from vico.community import build_community, write_community
 from vico.io.files import read_json
 from vico.world.world import World
@@ -15,6 +16,14 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def run(name: str, *arguments: str) -> str:
+    """Run an example in this process: one of its own costs seconds of imports."""
+    done = script(EXAMPLES / name, *arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def run_alone(name: str, *arguments: str) -> str:
+    """Run one in a process of its own, as those need that start others; the first, too."""
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name), *arguments], capture_output=True, text=True, timeout=400, check=False
     )
@@ -23,7 +32,7 @@ def run(name: str, *arguments: str) -> str:
 
 
 def test_first_world_builds_and_is_seen(tmp_path: Path) -> None:
-    printed = run("01_first_world.py", "--out", str(tmp_path / "w"), "--radius", "100")
+    printed = run_alone("01_first_world.py", "--out", str(tmp_path / "w"), "--radius", "100")
     assert "buildings" in printed
     assert (tmp_path / "w.png").stat().st_size > 20_000
 
@@ -46,13 +55,13 @@ def test_a_parcel_goes_with_the_robot(helsinki_path: Path) -> None:
 
 
 def test_an_agent_keeps_the_contract_alone_in_its_process(helsinki_path: Path) -> None:
-    printed = run("05_agent_contract.py", "--world", str(helsinki_path), "--steps", "20")
+    printed = run_alone("05_agent_contract.py", "--world", str(helsinki_path), "--steps", "20")
     assert "findings: []" in printed
     assert "went on from the middle to the same end: True; faults: {}" in printed
 
 
 def test_environments_side_by_side_branches_and_periods(helsinki_path: Path, helsinki_people: Path) -> None:
-    printed = run("06_many_environments.py", "--world", str(helsinki_path), "--community", str(helsinki_people))
+    printed = run_alone("06_many_environments.py", "--world", str(helsinki_path), "--community", str(helsinki_people))
     assert "2 environments: poses of shape (2, 6)" in printed
     assert "time is still 28800 s" in printed
     assert "50 observations of the robot and 1 of the assistant" in printed
@@ -62,7 +71,7 @@ def test_a_policy_is_trained_a_little(helsinki_path: Path, tmp_path: Path) -> No
     pytest.importorskip("stable_baselines3", reason='needs pip install "virtual-community[rl]"')
     curve = tmp_path / "curve.csv"
     words = ("--steps", "1024", "--episodes", "2", "--curve", str(curve))
-    printed = run("14_train_with_sb3.py", "--world", str(helsinki_path), *words)
+    printed = run_alone("14_train_with_sb3.py", "--world", str(helsinki_path), *words)
     assert re.search(r"\ntrained: success [01]\.\d\d\n", printed)
     assert curve.read_text().splitlines()[1].startswith("1024,")
 
@@ -75,7 +84,7 @@ def test_getting_around_prints_trips_and_arrives(helsinki_path: Path) -> None:
 
 def test_an_agent_is_written_scored_and_ranked(helsinki_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    printed = run("11_write_an_agent.py", "--worlds", str(helsinki_path), "--out", str(out), "--steps", "15")
+    printed = run_alone("11_write_an_agent.py", "--worlds", str(helsinki_path), "--out", str(out), "--steps", "15")
     assert "findings: []" in printed
     assert printed.count(" of 6 found; why not: {") == 2
     assert {entry["method"].rpartition(":")[2] for entry in read_json(out / "leaderboard.json")["entries"]} == {
@@ -112,7 +121,7 @@ def test_a_function_stands_in_for_a_language_model(corner_path: Path) -> None:
 @pytest.mark.slow
 def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> None:
     small = ("--residents", "20", "--size", "128x72", "--samples", "1", "--scenes", "street")
-    printed = run("10_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
+    printed = run_alone("10_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
     assert "walks to work, from step" in printed
     assert printed.endswith("film.mp4: 17 s\n")
 
@@ -130,8 +139,7 @@ def test_people_are_asked_and_answer(residents: int, helsinki: World, helsinki_p
 def test_in_a_community_of_one_nobody_can_be_asked(helsinki: World, helsinki_path: Path, tmp_path: Path) -> None:
     write_community(build_community(helsinki, residents=1), tmp_path / "people", world=helsinki_path)
     where = ("--world", str(helsinki_path), "--community", str(tmp_path / "people"))
-    command = [sys.executable, str(EXAMPLES / "12_asking_people.py"), *where]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
+    done = script(EXAMPLES / "12_asking_people.py", *where)
     assert done.returncode == 2
     assert done.stderr == ("asking: nobody in this community walks by who knows somebody indoors: make a larger one\n")
 
@@ -151,7 +159,7 @@ def test_a_learned_arm_is_a_method_of_the_challenge(helsinki_path: Path) -> None
 
 
 def test_work_of_ones_own_is_shared_out(helsinki_path: Path) -> None:
-    printed = [run("17_many_machines.py", str(helsinki_path), "nowhere", "--workers", n) for n in ("1", "2")]
+    printed = [run_alone("17_many_machines.py", str(helsinki_path), "nowhere", "--workers", n) for n in ("1", "2")]
     assert sorted(printed[0].splitlines()) == sorted(printed[1].splitlines())
     assert re.search(r"^\w+: \d+ buildings, \d+\.\d\d ha to walk on$", printed[0], re.MULTILINE)
     assert "nowhere: nowhere: no such folder" in printed[0]
@@ -162,7 +170,7 @@ def test_a_program_watches_a_run_and_reaches_into_it(
 ) -> None:
     pytest.importorskip("uvicorn", reason="needs pip install 'virtual-community[viewer]'")
     where = ("--world", str(helsinki_path), "--community", str(helsinki_people), "--out", str(tmp_path / "live"))
-    printed = run("15_live.py", *where)
+    printed = run_alone("15_live.py", *where)
     assert "4 residents; the run is paused" in printed
     assert printed.count("step 5: ") == 4
     assert "step 10: 4.0 mm of rain an hour\nwhat if it stayed dry, in live.from-5\nstep 10: 0.0 mm" in printed
@@ -170,7 +178,7 @@ def test_a_program_watches_a_run_and_reaches_into_it(
 
 
 def test_what_was_shown_is_done_again(tmp_path: Path) -> None:
-    printed = run("19_imitation.py", "--out", str(tmp_path / "demos"), "--episodes", "1")
+    printed = run_alone("19_imitation.py", "--out", str(tmp_path / "demos"), "--episodes", "1")
     assert "frames: Pick up the blue shoe box and put it down next to the pink thermos flask." in printed
     assert "seed 7 done again: done" in printed
 

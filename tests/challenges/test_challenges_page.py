@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import toy_city
 from assistant_by_hand import CAFE_TABLE, SHOP, subtask, task
+from command_line import script
 from vico.challenges.assistant import tasks as t
 from vico.challenges.assistant.challenge import ASSISTANT
 from vico.challenges.assistant.evaluate import CAUSES
@@ -28,8 +27,7 @@ def first_column(text: str) -> list[str]:
 
 
 def test_the_automata_are_drawn_as_they_are() -> None:
-    script = ROOT / "scripts" / "draw_automata.py"
-    done = subprocess.run([sys.executable, str(script), "--check"], capture_output=True, text=True, check=False)
+    done = script(ROOT / "scripts" / "draw_automata.py", "--check")
     assert (done.returncode, done.stdout) == (0, ""), done.stdout + done.stderr
 
 

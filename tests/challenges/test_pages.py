@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import command_line
 from toy_challenge import TOY
 from vico.challenges.episodes import Outcome
 from vico.challenges.influence import INFLUENCE
@@ -21,9 +21,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 def script(name: str, *words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(BENCHMARKS / name), *map(str, words)], capture_output=True, text=True, check=False
-    )
+    return command_line.script(BENCHMARKS / name, *words)
 
 
 def planted(

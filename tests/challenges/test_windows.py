@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from command_line import script
 from vico.challenges.windows import PACKAGED_MAP, overlap, overlaps, window_list, window_lists
 from vico.errors import InputError, SchemaError
 from vico.worldgen.request import covers, packaged_extract
@@ -79,7 +79,7 @@ def test_a_list_of_ones_own_is_read_strictly(tmp_path: Path, monkeypatch: pytest
 
 def test_the_script_shows_a_list_and_says_what_it_lacks(tmp_path: Path) -> None:
     def run(*words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([sys.executable, str(SCRIPT), *words], capture_output=True, text=True, check=False)
+        return script(SCRIPT, *words)
 
     shown = run("--show")
     assert "monaco_b" in shown.stdout
@@ -92,8 +92,7 @@ def test_the_script_shows_a_list_and_says_what_it_lacks(tmp_path: Path) -> None:
 
 def test_the_script_of_the_tables_says_what_it_lacks(tmp_path: Path) -> None:
     def said(*words: str) -> str:
-        command = [sys.executable, str(SCRIPT.with_name("tables.py")), *words, "--out", str(tmp_path / "out")]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = script(SCRIPT.with_name("tables.py"), *words, "--out", tmp_path / "out")
         assert done.returncode == 2
         return done.stderr
 

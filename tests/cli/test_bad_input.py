@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -360,14 +361,18 @@ def test_a_run_on_another_day_than_its_communitys_says_so(
     assert f"its schedules are of {day:%A} {day}; the run is on 2026-12-24" in capsys.readouterr().err
 
 
-def test_a_world_built_without_heights_says_that_it_is_flat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_world_built_without_heights_says_that_it_is_flat(
+    begun: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begun(tmp_path / "w")
     assert vico("world", "build", "--radius", 60, "--lat", 60.169, "--lon", 24.9435, "--out", tmp_path / "w") == 0
     assert "the ground is flat: no source tells its heights" in capsys.readouterr().err
 
 
 def test_a_timetable_that_gives_nothing_is_told_with_its_reason(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    begun: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    begun(tmp_path / "w")
     tables = {
         "stops.txt": "stop_id,stop_lat,stop_lon\na,60.169,24.9435\n",
         "routes.txt": "route_id,route_type\nr,1\n",

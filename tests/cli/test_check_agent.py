@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from command_line import vico
+from vico.io.cache import cache_folder
 from vico.worldgen import pipeline
 
 PLANTED = Path(__file__).parents[1] / "planted_agents.py"
@@ -24,6 +25,9 @@ def built(helsinki_path: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
         shutil.copytree(helsinki_path, out)
 
     monkeypatch.setattr(pipeline, "build_world", copied)
+    # No world is kept; people's bodies are.
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "cache" / "bodies").symlink_to(cache_folder() / "bodies")
     monkeypatch.setenv("VICO_CACHE", str(tmp_path / "cache"))
     return folders
 

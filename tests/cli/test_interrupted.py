@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from command_line import interrupted, vico
+from shared_folders import Shared
 from vico.cli import console
 from vico.cli import run as run_verb
 from vico.cli.console import CommandInterrupted, ended_by_signals, exit_code, progress_bars, stopped_between_steps
@@ -45,11 +46,13 @@ def words(helsinki_path: Path, helsinki_people: Path) -> list[object]:
 
 
 @pytest.fixture(scope="module")
-def whole(words: list[object], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(words: list[object], shared: Shared) -> Path:
     """The run, uninterrupted."""
-    out = tmp_path_factory.mktemp("whole") / "run"
-    assert vico(*words, "--out", out) == 0
-    return out
+
+    def make(out: Path) -> None:
+        assert vico(*words, "--out", out / "run") == 0
+
+    return shared("run_to_interrupt", make) / "run"
 
 
 def send_after(monkeypatch: pytest.MonkeyPatch, step: int, number: int) -> None:

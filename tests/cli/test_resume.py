@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from command_line import kill_once, vico
+from shared_folders import Shared
 from vico.io.files import read_json
 from vico.sim.recording import Run, read_run
 from vico.sim.recording.schema import checkpoint_steps
@@ -38,11 +39,13 @@ def words(helsinki_path: Path, helsinki_people: Path) -> list[object]:
 
 
 @pytest.fixture(scope="module")
-def whole(words: list[object], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(words: list[object], shared: Shared) -> Path:
     """The run, uninterrupted."""
-    out = tmp_path_factory.mktemp("whole") / "run"
-    assert vico(*words, "--out", out) == 0
-    return out
+
+    def make(out: Path) -> None:
+        assert vico(*words, "--out", out / "run") == 0
+
+    return shared("run_to_resume", make) / "run"
 
 
 def at_step(out: Path, step: int) -> Callable[[], bool]:

@@ -14,6 +14,7 @@ import pytest
 
 from command_line import vico
 from ray_nodes import needs_ray
+from shared_folders import Shared
 from vico.datasets.build import BuildRequest, Contents, SplitRule, build_dataset, tasks_of
 from vico.datasets.folder import Dataset, card_of
 from vico.datasets.formats import webdataset
@@ -43,11 +44,15 @@ def bytes_of(folder: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def built(kept_runs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Dataset]:
+def built(kept_runs: list[Path], shared: Shared) -> dict[str, Dataset]:
     """A dataset of each format, of the same runs."""
-    folder = tmp_path_factory.mktemp("built")
-    for to in FORMATS:
-        build_dataset(request(kept_runs, to, rule=SplitRule("episode", 0.2)), folder / to)
+
+    def make(out: Path) -> None:
+        out.mkdir()
+        for to in FORMATS:
+            build_dataset(request(kept_runs, to, rule=SplitRule("episode", 0.2)), out / to)
+
+    folder = shared("datasets_built", make)
     return {to: Dataset(folder / to) for to in FORMATS}
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from command_line import vico
 from person_at_keys import Person, shown, stopped
+from shared_folders import Shared
 from vico.datasets.folder import Dataset
 from vico.io.files import read_json
 from vico.sim.recording import Run, read_run
@@ -17,20 +18,22 @@ from viewer_client import stream
 
 
 @pytest.fixture(scope="module")
-def results(helsinki_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(helsinki_path: Path, shared: Shared) -> Path:
     """What `vico play --task` leaves of a delivery that somebody begins, asks about and gives up."""
-    out = tmp_path_factory.mktemp("played") / "results"
-    with shown("play", helsinki_path, "--task", "delivery", "--seed", 0, "--out", out) as page:
-        with stream(page.url) as client:
-            person = Person(client)
-            person.keep("forward", steps=8)
-            person.keep("forward", "turn_left", steps=8)
-            assert person.do(type="communicate", text="Where is it?")["ok"]
-            person.keep("turn_right", steps=4)
-            assert client.command("stop")["ok"]
-        page.ended()
-        assert page.process.returncode == 0
-    return out
+
+    def make(out: Path) -> None:
+        with shown("play", helsinki_path, "--task", "delivery", "--seed", 0, "--out", out / "results") as page:
+            with stream(page.url) as client:
+                person = Person(client)
+                person.keep("forward", steps=8)
+                person.keep("forward", "turn_left", steps=8)
+                assert person.do(type="communicate", text="Where is it?")["ok"]
+                person.keep("turn_right", steps=4)
+                assert client.command("stop")["ok"]
+            page.ended()
+            assert page.process.returncode == 0
+
+    return shared("played_by_hand", make) / "results"
 
 
 def the_run(results: Path) -> Run:
@@ -39,12 +42,14 @@ def the_run(results: Path) -> Run:
 
 
 @pytest.fixture(scope="module")
-def played(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+def played(results: Path, shared: Shared) -> Dataset:
     """A dataset of it, made by the command of the page."""
-    out = tmp_path_factory.mktemp("dataset") / "demos"
-    runs = sorted((results / "runs").iterdir())
-    assert vico("dataset", "build", "--runs", *runs, "--to", "lerobot", "--size", 64, "--test", 0, "--out", out) == 0
-    return Dataset(out)
+
+    def make(out: Path) -> None:
+        words = ["--runs", *sorted((results / "runs").iterdir()), "--to", "lerobot", "--size", 64, "--test", 0]
+        assert vico("dataset", "build", *words, "--out", out / "demos") == 0
+
+    return Dataset(shared("played_by_hand_dataset", make) / "demos")
 
 
 def test_it_says_what_was_asked_for_and_what_came_of_it(played: Dataset, results: Path) -> None:

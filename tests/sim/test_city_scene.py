@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from shared_folders import Shared
 from vico.community.author import build_community
 from vico.community.model import Community
 from vico.errors import InputError, MissingFileError
@@ -62,12 +63,15 @@ def test_a_budget_is_some_memory() -> None:
 
 
 @pytest.fixture(scope="module")
-def city(tmp_path_factory: pytest.TempPathFactory) -> CityWorld:
+def city(shared: Shared) -> CityWorld:
     """Four tiles in a row."""
-    box = LON - 0.0055, LAT - 0.0005, LON + 0.0035, LAT + 0.0005
-    out = tmp_path_factory.mktemp("city") / "row"
-    build_city(city_request(Sources(EXTRACT), lat=LAT, lon=LON, extent=box, tile=160.0, out=out), workers=2)
-    world = read_world(out)
+
+    def make(out: Path) -> None:
+        box = LON - 0.0055, LAT - 0.0005, LON + 0.0035, LAT + 0.0005
+        out.mkdir()
+        build_city(city_request(Sources(EXTRACT), lat=LAT, lon=LON, extent=box, tile=160.0, out=out / "row"), workers=2)
+
+    world = read_world(shared("row_of_tiles", make, ["worldgen"]) / "row")
     assert isinstance(world, CityWorld)
     assert len(world.city.manifest.tiles) == 4
     return world

@@ -230,22 +230,32 @@ def contents(folder: Path) -> dict[str, Any]:
 
 
 KILLED = """
-import os, sys
+import os, shutil, sys
 from pathlib import Path
 sys.path[:0] = {folders!r}
-from test_recording import fresh, go_on
+from test_recording import EVERY, fresh, go_on
 recorder, agents = fresh(Path(sys.argv[1]))
-go_on(recorder, agents, int(sys.argv[2]))
+go_on(recorder, agents, EVERY)
+shutil.copytree(sys.argv[1], sys.argv[2])
+go_on(recorder, agents, 95, begin=False)
 os.kill(os.getpid(), 9)
 """
 
 
-@pytest.mark.parametrize("killed_after", [EVERY, 95])
-def test_a_killed_run_goes_on_to_the_same_folder(path: Path, tmp_path: Path, killed_after: int) -> None:
-    here = Path(__file__).parent
-    out, code = tmp_path / "run", KILLED.format(folders=[str(here), str(here.parent)])
-    process = subprocess.run([sys.executable, "-c", code, str(out), str(killed_after)], check=False)
+@pytest.fixture(scope="module")
+def left(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """What a process leaves that is killed after 95 steps, and what it would have left after some fewer."""
+    here, folder = Path(__file__).parent, tmp_path_factory.mktemp("killed")
+    code = KILLED.format(folders=[str(here), str(here.parent)])
+    found = {after: folder / f"after_{after}" for after in (95, EVERY)}
+    process = subprocess.run([sys.executable, "-c", code, *map(str, found.values())], check=False)
     assert process.returncode == -signal.SIGKILL
+    return found
+
+
+@pytest.mark.parametrize("killed_after", [EVERY, 95])
+def test_a_killed_run_goes_on_to_the_same_folder(path: Path, left: dict[int, Path], killed_after: int) -> None:
+    out = left[killed_after]
     killed = read_run(out)
     assert not killed.complete
     assert killed.last == {EVERY: EVERY, 95: 80}[killed_after]

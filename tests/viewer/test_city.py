@@ -10,6 +10,7 @@ from shutil import which
 import numpy as np
 import pytest
 
+from shared_folders import Shared
 from vico.assets.robots import robot_model, robot_names
 from vico.io.files import read_json
 from vico.viewer.city import write_city
@@ -22,10 +23,12 @@ _PAGE = Path(__file__).parents[2] / "src" / "vico" / "viewer" / "page"
 
 
 @pytest.fixture(scope="module")
-def city(helsinki: World, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("city")
-    write_city(helsinki, folder)
-    return folder
+def city(helsinki: World, shared: Shared) -> Path:
+    def make(out: Path) -> None:
+        out.mkdir()
+        write_city(helsinki, out)
+
+    return shared("city_of_the_page", make, ["viewer"])
 
 
 def test_near_tiles_hold_every_triangle_of_the_world(helsinki: World, city: Path) -> None:

@@ -18,33 +18,33 @@ pytestmark = needs_s3
 
 
 @pytest.fixture
-def url(helsinki_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+def url(corner_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """Return where the small world is in a bucket."""
     monkeypatch.setenv("VICO_CACHE", str(tmp_path / "cache"))
     with S3Server() as server:
         bucket = server.bucket("worlds")
         with store_at(bucket).new_folder("helsinki", last="world.json") as folder:
-            shutil.copytree(helsinki_path, folder)
+            shutil.copytree(corner_path, folder)
         yield f"{bucket}/helsinki"
 
 
-def test_a_world_is_copied_once_and_is_the_same(url: str, helsinki_path: Path) -> None:
+def test_a_world_is_copied_once_and_is_the_same(url: str, corner_path: Path) -> None:
     with ThreadPoolExecutor(3) as threads:
         folders = set(threads.map(fetch_world, [url] * 3))
     (folder,) = folders
     assert folder.name == "helsinki"
     world = read_world(folder)
-    assert world.digest == read_world(helsinki_path).digest
-    assert len(world.buildings) == len(read_world(helsinki_path).buildings)
+    assert world.digest == read_world(corner_path).digest
+    assert len(world.buildings) == len(read_world(corner_path).buildings)
     before = (folder / "terrain.npz").stat().st_mtime_ns
     assert fetch_world(f"{url}/") == folder
     assert (folder / "terrain.npz").stat().st_mtime_ns == before
 
 
-def test_its_manifest_says_which_it_is(url: str, helsinki_path: Path) -> None:
+def test_its_manifest_says_which_it_is(url: str, corner_path: Path) -> None:
     folder = fetch_manifest(url)
     assert [path.name for path in folder.iterdir()] == ["world.json"]
-    assert read_world(folder).digest == read_world(helsinki_path).digest
+    assert read_world(folder).digest == read_world(corner_path).digest
 
 
 def test_what_is_not_whole_is_refused_and_not_kept(url: str) -> None:

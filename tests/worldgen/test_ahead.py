@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,9 @@ from vico.worldgen.request import BuildOptions
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 CENTRE = {"lat": 60.1690, "lon": 24.9435}
+# What all that stands there comes of: a second process is started where nothing of it is kept.
+EARLIER = ("plans", "terrain", "streets", "grading", "bridges", "stairs", "buildings", "ways")
+Begun = Callable[..., None]
 AHEAD = {"clad": "cladding", "ground_from_osm": "ground"}
 
 
@@ -39,10 +44,11 @@ def made_here(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_stages_made_ahead_are_those_that_would_be_made_here(
-    corner: World, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
+    corner: World, begun: Begun, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # However long it takes to start, it is waited for.
     monkeypatch.setattr(Helper, "withdraw", lambda self, number: False)
+    begun(tmp_path / "w", *EARLIER, *AHEAD.values())
     built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert made_here == []
     assert built == corner.manifest
@@ -50,9 +56,10 @@ def test_stages_made_ahead_are_those_that_would_be_made_here(
 
 
 def test_what_has_not_been_begun_is_made_here(
-    corner: World, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
+    corner: World, begun: Begun, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Helper, "withdraw", lambda self, number: True)
+    begun(tmp_path / "w", *EARLIER, *AHEAD.values())
     built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert sorted(made_here) == sorted(AHEAD.values())
     assert built == corner.manifest
@@ -61,6 +68,7 @@ def test_what_has_not_been_begun_is_made_here(
 @pytest.mark.parametrize("maker", ["vico.worldgen.background_stages:nothing", "toy_service:doubler"])
 def test_a_process_that_fails_is_told_and_costs_only_time(
     corner: World,
+    begun: Begun,
     tmp_path: Path,
     made_here: list[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -69,6 +77,7 @@ def test_a_process_that_fails_is_told_and_costs_only_time(
 ) -> None:
     monkeypatch.setattr(background_stages, "_MAKER", maker)
     monkeypatch.setattr(Helper, "withdraw", lambda self, number: False)
+    begun(tmp_path / "w", *EARLIER, *AHEAD.values())
     with caplog.at_level(logging.WARNING, logger="vico"):
         built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert sorted(made_here) == sorted(AHEAD.values())
@@ -80,18 +89,19 @@ def test_a_process_that_fails_is_told_and_costs_only_time(
 
 
 def test_where_no_process_can_be_started_all_is_made_here(
-    corner: World, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
+    corner: World, begun: Begun, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "nothing"))
+    begun(tmp_path / "w", *EARLIER, *AHEAD.values())
     built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert sorted(made_here) == sorted(AHEAD.values())
     assert built == corner.manifest
 
 
 def test_a_build_that_goes_on_with_what_is_kept_starts_no_process(
-    tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
+    corner_path: Path, tmp_path: Path, made_here: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
+    shutil.copytree(corner_path, tmp_path / "w")
 
     def start(*_: object, **__: object) -> None:
         raise AssertionError("a process was started")

@@ -18,6 +18,7 @@ from vico.world.world import World
 from vico.worldgen.buildings import solids
 from vico.worldgen.facts.fault_isolation import NamedShape, buffer_named, collect_losses, drop_on_failure, union_named
 from vico.worldgen.pipeline import build_world
+from vico.worldgen.request import BuildOptions
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 
@@ -32,7 +33,7 @@ def built_with(error: Exception, share: int, out: Path, monkeypatch: pytest.Monk
         return seat_of(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(solids, "seat_of", failing)
-    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=60, out=out)
+    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=60, out=out, options=BuildOptions(previews=False))
     return read_world(out)
 
 

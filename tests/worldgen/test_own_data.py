@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from shared_folders import Shared
 from vico.errors import SchemaError
 from vico.world.check import check_world
 from vico.world.folder import read_world
@@ -92,9 +93,12 @@ def write_map(path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+def world(shared: Shared) -> World:
     """A small world built with a folder of data of somebody's own."""
-    folder = tmp_path_factory.mktemp("own")
+    return read_world(shared("own_data", _build, ["worldgen"]) / "world")
+
+
+def _build(folder: Path) -> None:
     for name, text in FILES.items():
         path = folder / "vico" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -105,7 +109,6 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
             write_map(folder / "stadt.osm"), lat=LAT, lon=LON, half=60.0, out=folder / "world",
             options=BuildOptions(keep_stages=False, previews=False),
         )  # fmt: skip
-    return read_world(folder / "world")
 
 
 def test_the_object_stands_where_it_is_mapped_with_its_model(world: World) -> None:

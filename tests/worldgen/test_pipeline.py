@@ -1,6 +1,7 @@
 """The build as a whole: whole or not at all, the same bytes from the same input, one sentence for bad input."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -34,12 +35,13 @@ def test_an_existing_folder_is_refused_and_left_alone(helsinki_path: Path) -> No
     assert (helsinki_path / "world.json").read_bytes() == before
 
 
-def test_force_replaces_the_folder_and_what_a_killed_build_left(tmp_path: Path) -> None:
+def test_force_replaces_the_folder_and_what_a_killed_build_left(begun: Callable[..., None], tmp_path: Path) -> None:
     out = tmp_path / "world"
+    begun(out)
     build_world(EXTRACT, **CENTRE, half=60, out=out, options=BuildOptions(previews=True, keep_stages=False))
     assert (out / "previews").is_dir()
     partial = tmp_path / "world.partial"
-    partial.mkdir()
+    begun(out)
     (partial / "rubbish").write_text("left by a killed build")
     build_world(EXTRACT, **CENTRE, half=60, out=out, force=True, options=BuildOptions(previews=False))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["world"]
@@ -47,12 +49,13 @@ def test_force_replaces_the_folder_and_what_a_killed_build_left(tmp_path: Path) 
 
 
 def test_an_interrupted_build_leaves_no_world_but_its_finished_stages(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    begun: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(recipe, "places_from_osm", interrupt)
+    begun(tmp_path / "world", "places")
     with pytest.raises(KeyboardInterrupt):
         build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "world", options=BuildOptions(previews=False))
     assert not (tmp_path / "world").exists()

@@ -18,6 +18,7 @@ from shapely.errors import GEOSException
 from command_line import vico
 from damaged_maps import DrawnMap, DrawnWay, write_map
 from random_windows import painted_once
+from shared_folders import Shared
 from vico.geo.frame import LocalFrame
 from vico.world.check import check_world
 from vico.world.check.world import check_dropped
@@ -119,8 +120,8 @@ def built(place: Place, out: Path) -> World:
 
 
 @pytest.fixture(scope="module")
-def whole(place: Place, tmp_path_factory: pytest.TempPathFactory) -> World:
-    world = built(place, tmp_path_factory.mktemp("whole") / "world")
+def whole(place: Place, shared: Shared) -> World:
+    world = read_world(shared("refusals_whole", lambda out: built(place, out), ["worldgen"]))
     assert check_world(world) == []
     assert lost(world) == {}
     return world

@@ -6,6 +6,7 @@ import gc
 import json
 import shutil
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -73,7 +74,7 @@ def test_a_torn_product_is_made_anew(tmp_path: Path) -> None:
 
 
 def test_a_stopped_build_goes_on_and_gives_the_same_world(
-    corner: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    corner: World, begun: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran: list[str] = []
 
@@ -87,6 +88,7 @@ def test_a_stopped_build_goes_on_and_gives_the_same_world(
         return real(*inputs, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr(construction, "buildings_from_plans", counted)
+    begun(tmp_path / "w", "buildings", "indoor")
     with monkeypatch.context() as patch:
         patch.setattr(recipe, "furnish", stop)
         with pytest.raises(KeyboardInterrupt):
@@ -118,9 +120,10 @@ def test_one_stage_runs_alone_and_changes_nothing_else(
         rebuild_world(tmp_path / "w", ["objectz"])
 
 
-def test_a_stage_is_not_run_alone_when_its_sources_are_gone(tmp_path: Path) -> None:
+def test_a_stage_is_not_run_alone_when_its_sources_are_gone(begun: Callable[..., None], tmp_path: Path) -> None:
     extract = tmp_path / "map.osm.pbf"
     extract.write_bytes(EXTRACT.read_bytes())
+    begun(tmp_path / "w")
     build_world(extract, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     extract.unlink()
     with pytest.raises(MissingFileError, match="it is gone"):

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from command_line import vico
+from shared_folders import Shared
 from vico.community import build_community, write_community
 from vico.world.check import check_world
 from vico.world.folder import read_world
@@ -59,10 +60,13 @@ def _campus(path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def campus(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, World]:
-    folder = tmp_path_factory.mktemp("campus")
-    out = folder / "world"
-    build_world(_campus(folder), lat=0.0, lon=0.0, half=50.0, seed=0, out=out, options=BuildOptions(previews=False))
+def campus(shared: Shared) -> tuple[Path, World]:
+    def make(out: Path) -> None:
+        out.mkdir()
+        place = {"lat": 0.0, "lon": 0.0, "half": 50.0}
+        build_world(_campus(out), **place, seed=0, out=out / "world", options=BuildOptions(previews=False))
+
+    out = shared("campus", make, ["worldgen"]) / "world"
     return out, read_world(out)
 
 

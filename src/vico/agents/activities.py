@@ -11,7 +11,8 @@ import math
 from collections.abc import Callable
 from typing import Literal
 
-from vico.agents.base import Action, AgentState, FieldState, Info, Observation, heading, wrap_angle
+from vico.agents.base import Action, AgentState, FieldState, Info, Observation, heading
+from vico.geometry import wrap_angle
 
 RestPosture = Literal["sit", "lie"]
 #: Return the next action on the way to a point, None within some metres of it: the point, those metres, and what is

@@ -45,7 +45,6 @@ __all__ = [
     "restore_generator",
     "split_groups",
     "usage_of",
-    "wrap_angle",
 ]
 #: What an agent remembers: nested, keys are text, values are what JSON has, or NumPy arrays.
 AgentState = dict[str, Any]
@@ -319,11 +318,6 @@ def heading(observation: Mapping[str, Any]) -> float:
     """Yaw an agent looks along, radians."""
     east, north = observation["pose"][HEADING_SLICE]
     return math.atan2(north, east)
-
-
-def wrap_angle(angle: float) -> float:
-    """Return the same direction within -pi..pi."""
-    return float((angle + math.pi) % (2 * math.pi) - math.pi)
 
 
 class NoStateError(InputError):

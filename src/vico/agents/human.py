@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import Action, AgentState, Info, Observation, heading
 from vico.errors import InputError
+from vico.geometry import wrap_angle
 from vico.rules import BIKE_SPEED, RUN_SPEED, WALK_SPEED
 
 #: Seconds between what a person does: often enough that a walk feels like one's own.

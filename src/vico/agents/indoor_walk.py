@@ -16,8 +16,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import Action, AgentState, Info, Observation, heading
 from vico.agents.perception import DepthGrid
+from vico.geometry import wrap_angle
 from vico.io.compiled import compiled
 from vico.rules import ReasonCode, code_name
 

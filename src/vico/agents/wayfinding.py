@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import HEADING_SLICE, Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import HEADING_SLICE, Action, AgentState, Info, Observation, heading
 from vico.agents.day_plan import EASY_PACE, RUN_PACE, SLACK, SLACK_SHARE
+from vico.geometry import wrap_angle
 from vico.rules import ReasonCode, code_name, walk_speed
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY, WalkableMap

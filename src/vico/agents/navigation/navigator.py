@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import Action, AgentState, Info, Observation, heading, wrap_angle
+from vico.agents.base import Action, AgentState, Info, Observation, heading
 from vico.agents.navigation.path_planning import PathKeeper, Target, furthest_straight_cell
 from vico.agents.navigation.voxels import BESIDE_COST, SIDE, VOXEL, VoxelMap
 from vico.agents.wayfinding import Walker
 from vico.exact import dot
+from vico.geometry import wrap_angle
 from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
 

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, FieldState, Info, Observation, wrap_angle
+from vico.agents.base import Action, FieldState, Info, Observation
 from vico.agents.perception import Sighting, sightings
 from vico.agents.requester import CALL_DISTANCE, ROBOT_PREFIX
 from vico.agents.robot.body import Stance
 from vico.agents.talk.acquaintance import is_called
+from vico.geometry import wrap_angle
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.geometry import distance, distances
+from vico.geometry import distance, distances, wrap_angle
 from vico.rules import EARSHOT, REACH, ReasonCode, reach_up
 from vico.sim.actions.model import ActionType, Actors, Field, Refusal, Situation, Values, short
 from vico.sim.bodies.arrays import RESIDENT
@@ -28,7 +28,6 @@ from vico.sim.people.placement import (
     objects_on,
     overlapping_entity,
     place_in_line,
-    wrap_angle,
 )
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.model import Container

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from vico.clock import DAY, clock_of
+from vico.geometry import wrap_angle
 from vico.rules import (
     BIKE_RATE,
     BIKE_REACH,
@@ -36,7 +37,6 @@ from vico.sim.people.placement import (
     spot_beside_seat,
     spot_outside,
     take_seat,
-    wrap_angle,
 )
 from vico.sim.state.simulation_state import SimulationState
 from vico.sim.transit import TransitSystem

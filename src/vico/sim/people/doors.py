@@ -18,6 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.geometry import wrap_angle
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim.bodies.avatars import CLIP, free_ground
 from vico.sim.bodies.footprints import OUTDOORS, Rectangle, concatenate_records, gaps, records_of
@@ -29,7 +30,6 @@ from vico.sim.people.placement import (
     put_outdoors,
     spot_outside,
     take_umbrella,
-    wrap_angle,
 )
 from vico.sim.state.simulation_state import SimulationState
 from vico.world.model import LIFT, Place

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.models.movable import movable_grip
+from vico.geometry import wrap_angle
 from vico.io.data_files import cached_data
 from vico.rules import WALK_SPEED
 from vico.seeds import rng
@@ -39,11 +40,6 @@ _STEP_ASIDE = 1.5
 
 # Where the eyes are by stature, metres and shares of it.
 _STATURES, _EYES = (1.1, 1.28, 1.45, 1.62), (0.905, 0.915, 0.923, 0.93)
-
-
-def wrap_angle(angle: float) -> float:
-    """Return the same direction within -pi..pi."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def eye_height(state: SimulationState) -> NDArray[np.float64]:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.exact import apply_matrix
+from vico.geometry import wrap_angle
 from vico.rules import BUS_FARE
 from vico.sim.bodies.arrays import Bodies
 from vico.sim.bodies.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies.state_arrays import RADIUS, RIDER_REACH, Posture, Vehicle
-from vico.sim.people.placement import gesture, move_held_objects, wrap_angle
+from vico.sim.people.placement import gesture, move_held_objects
 from vico.sim.state.simulation_state import SimulationState
 from vico.sim.transit import TransitSystem
 from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
