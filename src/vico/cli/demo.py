@@ -42,6 +42,7 @@ from vico.cli import (
 from vico.cli import (
     world as world_verb,
 )
+from vico.cli.compiling import compiling_ahead
 from vico.cli.console import check_output, print_json
 from vico.cli.options import CommunityBuildOptions, RunOptions
 from vico.community.folder import COMMUNITY_FOLDER
@@ -148,7 +149,11 @@ def warm_up() -> int:
     """
     began = time.perf_counter()
     place = packaged_extract()
-    with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
+    with (
+        compiling_ahead(to_the_end=True),
+        tempfile.TemporaryDirectory(prefix="vico-") as folder,
+        redirect_stdout(io.StringIO()),
+    ):
         here = Path(folder)
         world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=_WARM_UP_RADIUS)
         community.build(CommunityBuildOptions(here / "world", here / "people", residents=6))
