@@ -1,14 +1,21 @@
 """Compiled code is kept between runs, and is never that of sources that have changed."""
 
+import dis
+import importlib
 import os
+import pkgutil
 import subprocess
 import sys
-from contextlib import ExitStack
+import time
+from contextlib import ExitStack, suppress
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 
-from vico.io.compiled import source_digest
+import vico
+from vico.io.kernel_digest import kernel_digest, names_looked_up
+from vico.io.sources import source_digest
 
 _RECORDS = """
 from typing import NamedTuple
@@ -125,10 +132,8 @@ def test_a_function_is_compiled_once_for_all_constants_of_a_type(town: Path) -> 
     change(
         town / "rules.py", "@compiled", "@compiled\ndef times(speed, factor):\n    return speed * factor\n\n@compiled"
     )
-    program = _RUN + "from vico.io.compiled import _Callee\nimport gc\n"
-    program += "print([len(one.overloads) for one in gc.get_objects() if isinstance(one, _Callee)"
-    program += " and one.__name__ == 'times'])"
-    assert _printed(town, program) == "10.0 0\n[1]\n"
+    program = _RUN + "from town.rules import times\nprint(len(times.get_call_template.__self__.overloads))\n"
+    assert _printed(town, program) == "10.0 0\n1\n"
 
 
 _GROUND = """
@@ -238,19 +243,79 @@ def test_a_chosen_folder_of_numba_wins(town: Path) -> None:
     assert list(chosen.rglob("drive.drive-*.nbi"))
 
 
-def test_folders_of_old_sources_are_swept(town: Path) -> None:
-    cache = town.parent / "cache" / "compiled"
-    for number in range(12):
-        old = cache / f"town.drive-{number:024x}"
-        old.mkdir(parents=True)
-        os.utime(old, (1.6e9 + number,) * 2)
-    fresh = cache / f"town.drive-{'f' * 24}"
-    fresh.mkdir()
+def test_what_was_not_used_for_long_is_swept(town: Path) -> None:
+    folder = town.parent / "cache" / "compiled" / "town.drive"
+    folder.mkdir(parents=True)
+    for name, when in (("old.nbc", 1.6e9), ("fresh.nbc", time.time() - 86_400.0)):
+        (folder / name).touch()
+        os.utime(folder / name, (when, when))
     run(town)
-    folders = {path.name for path in cache.iterdir()}
-    assert fresh.name in folders
-    assert not any(f"town.drive-{number:024x}" in folders for number in range(12))
-    assert len(folders) == 2
+    assert (folder / "fresh.nbc").is_file()
+    assert not (folder / "old.nbc").exists()
+
+
+def test_what_changes_beside_a_function_compiles_nothing(town: Path) -> None:
+    run(town)
+    change(town / "rules.py", "LIMIT = 10.0", '"""Rules."""\n\nUNUSED = 3.0\nLIMIT = 10.0\n\ndef other():\n    pass\n')
+    change(town / "rules.py", "def slower(speed):", 'def slower(speed):\n    """Brake."""\n    # gently')
+    change(town / "drive.py", "from town.rules", "import json\n\nfrom town.rules")
+    assert run(town)[:2] == (7.0, 1)
+
+
+def test_fields_of_a_record_that_change_places_are_compiled_anew(town: Path) -> None:
+    change(town / "records.py", "speed: float", "speed: float\n    mass: float = 1.0")
+    assert run(town)[:2] == (7.0, 0)
+    change(town / "records.py", "speed: float\n    mass: float = 1.0", "mass: float\n    speed: float = 1.0")
+    assert run(town)[:2] == (0.0, 0)  # what is given first is the mass now
+
+
+_PAIR = """
+from typing import NamedTuple
+
+import numpy as np
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+"""
+
+
+@pytest.mark.parametrize(
+    ("constant", "changed", "expression"),
+    [
+        ("np.array([1.0, 2.0])", "np.array([1.0, 3.0])", "TABLE[1]"),
+        ("(1, (2, 3))", "(1, (2, 4))", "TABLE[1][1]"),
+        ("Pair(1.0, 2.0)", "Pair(2.0, 1.0)", "TABLE.first"),
+        ("np.float32(0.5)", "np.float64(0.5)", "TABLE"),
+    ],
+)
+def test_constants_of_every_kind_are_part_of_the_code(town: Path, constant: str, changed: str, expression: str) -> None:
+    change(town / "rules.py", "LIMIT = 10.0", f"{_PAIR}LIMIT = 10.0\nTABLE = {constant}")
+    change(town / "rules.py", "speed - 1.0", f"speed - {expression}")
+    assert run(town)[1] == 0
+    assert run(town)[1] == 1
+    change(town / "rules.py", f"TABLE = {constant}", f"TABLE = {changed}")
+    assert run(town)[1] == 0
+
+
+def test_what_every_kernel_is_made_from_is_known() -> None:
+    for module in pkgutil.walk_packages(vico.__path__, "vico."):
+        with suppress(ImportError):  # of an extra that is not installed
+            importlib.import_module(module.name)
+    kernels = [
+        value
+        for name, module in sys.modules.items()
+        if name.startswith("vico.")
+        for value in list(vars(module).values())
+        if isinstance(getattr(value, "py_func", None), FunctionType)
+    ]
+    assert len(kernels) > 500
+    for kernel in kernels:
+        kernel_digest(kernel, ())
+        code = kernel.py_func.__code__
+        looked_up = [step.argval for step in dis.get_instructions(code) if step.opname == "LOAD_GLOBAL"]
+        assert names_looked_up(code) == looked_up
 
 
 def test_the_digest_follows_imports_of_packages_and_in_brackets(town: Path) -> None:
@@ -268,7 +333,7 @@ def test_the_digest_follows_imports_of_packages_and_in_brackets(town: Path) -> N
 def _fresh_digest(town: Path) -> str:
     """As another process would see it: in one process a file is read once."""
     program = (
-        "import sys; from pathlib import Path; from vico.io.compiled import source_digest as d;"
+        "import sys; from pathlib import Path; from vico.io.sources import source_digest as d;"
         "print(d(Path(sys.argv[1]), 'town.drive'))"
     )
     return subprocess.run(

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Literal
 from tyro.conf import Positional
 
 from vico.cli.community import community_build
+from vico.cli.compiling import compiling_ahead
 from vico.cli.console import check_output, print_json
 from vico.cli.film import replay
 from vico.cli.options import CommunityBuildOptions, RunOptions, WorldBuildOptions
@@ -140,7 +141,11 @@ def warm_up() -> int:
 
     began = time.perf_counter()
     place = packaged_extract()
-    with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
+    with (
+        compiling_ahead(to_the_end=True),
+        tempfile.TemporaryDirectory(prefix="vico-") as folder,
+        redirect_stdout(io.StringIO()),
+    ):
         here = Path(folder)
         world, people = here / "world", here / "people"
         # A small world, a few seconds in it and a look at it: whatever a real run compiles is compiled.

@@ -17,6 +17,7 @@ from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
 from vico.assets.robots import robot_kind
+from vico.cli.compiling import compiling_ahead
 from vico.cli.console import (
     CommandInterrupted,
     Report,
@@ -109,7 +110,9 @@ def run(options: RunOptions) -> int:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
     talk = _talk_of(options)
     use_workers(options.workers)
-    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).simulate()
+    parts = ("pictures", "people") if options.observe != "none" else ("people",)
+    with compiling_ahead(parts):
+        metrics = Job.of(options, options.world, options.community, options.out, talk=talk).simulate()
     if options.json:
         print_json(metrics)
     else:

@@ -25,8 +25,8 @@ from vico.errors import OutputError
 from vico.geo import overlay
 from vico.io.arrays import npz_bytes, read_npz
 from vico.io.cache import cache_folder
-from vico.io.compiled import source_digest
 from vico.io.files import write_bytes
+from vico.io.sources import source_digest
 from vico.world.heights import HeightField
 from vico.world.walk_clearance import BODY, ClearCourse, courses_past
 

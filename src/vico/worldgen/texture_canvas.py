@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.io.cache import cache_folder
-from vico.io.compiled import source_digest
 from vico.io.files import write_bytes
+from vico.io.sources import source_digest
 from vico.world.glb import packed_png
 
 Colour = Sequence[float] | NDArray[Any]

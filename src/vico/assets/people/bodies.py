@@ -26,8 +26,8 @@ from vico.assets.people.model import JOINTS, Appearance, Colour, SkinnedBody
 from vico.assets.people.procedural import body as procedural_body
 from vico.io.arrays import read_npz
 from vico.io.cache import cache_folder
-from vico.io.compiled import source_digest
 from vico.io.files import sha256_of, write_bytes
+from vico.io.sources import source_digest
 from vico.seeds import rng
 
 _ARRAYS = tuple(field.name for field in fields(SkinnedBody) if field.name != "height")
