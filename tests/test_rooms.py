@@ -170,6 +170,27 @@ def test_every_room_has_a_floor() -> None:
     assert rooms == set(ALLOWED) | OPEN
 
 
+def test_only_kernels_have_no_annotations() -> None:
+    bare: list[str] = []
+
+    def visit(node: ast.AST, path: Path, kernel: bool) -> None:
+        for inner in ast.iter_child_nodes(node):
+            inside = kernel
+            if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
+                # Functions of numba, and of Quadrants, which Genesis compiles with.
+                made_by = {ast.unparse(one).partition("(")[0] for one in inner.decorator_list}
+                inside |= bool(made_by & {"compiled", "inlined", "qd.func", "qd.kernel"})
+                arguments = [*inner.args.posonlyargs, *inner.args.args, *inner.args.kwonlyargs]
+                known = [one.annotation or one.arg in ("self", "cls") for one in arguments]
+                if not inside and not (all(known) and inner.returns):
+                    bare.append(f"{path.relative_to(SOURCE)}:{inner.lineno} {inner.name}")
+            visit(inner, path, inside)
+
+    for path in sorted(SOURCE.rglob("*.py")):
+        visit(ast.parse(path.read_text()), path, kernel=False)
+    assert bare == []
+
+
 def test_modules_stay_readable() -> None:
     long = {str(p.relative_to(SOURCE)): n for p in SOURCE.rglob("*.py") if (n := len(p.read_text().splitlines())) > 700}
     assert long == {}

@@ -101,7 +101,7 @@ def entity_pixels(observation: Mapping[str, Any]) -> EntityPixels:
 
 
 @compiled
-def _tally(segmentation, depth, intrinsics, table):  # type: ignore[no-untyped-def]
+def _tally(segmentation, depth, intrinsics, table):
     """Add every pixel to its entity's slot; -1 where there are more entities than fit."""
     numbers, counts, sums, box = table
     height, width = segmentation.shape

@@ -200,7 +200,7 @@ def _rectangle_distances(box: Area, points: Area) -> Area:
 
 
 @compiled
-def _cheapest_path(gap, wanted, start, aim, near, costs):  # type: ignore[no-untyped-def]
+def _cheapest_path(gap, wanted, start, aim, near, costs):
     """Run A* on a grid to the first wanted cell; return rows and columns from the start on, none if there is no way.
 
     A cell with too little room may be left for one with more, so that whoever touches something gets away from it.
@@ -242,7 +242,7 @@ def _cheapest_path(gap, wanted, start, aim, near, costs):  # type: ignore[no-unt
 
 
 @compiled
-def _path_cells(parent, y, x):  # type: ignore[no-untyped-def]
+def _path_cells(parent, y, x):
     """Return the cells of the way that led to one, the start first."""
     columns = parent.shape[1]
     count, j, i = 1, y, x

@@ -239,7 +239,7 @@ def _a_star(
 
 
 @compiled
-def _search_grid(blocked, start_x, start_y, aim_x, aim_y, reach):  # type: ignore[no-untyped-def]
+def _search_grid(blocked, start_x, start_y, aim_x, aim_y, reach):
     """Run A* on a grid; ties are broken by position."""
     n = blocked.shape[0]
     cost = np.full((n, n), np.inf)
@@ -272,12 +272,12 @@ def _search_grid(blocked, start_x, start_y, aim_x, aim_y, reach):  # type: ignor
 
 
 @compiled(inline="always")
-def _cell_distance(dx, dy):  # type: ignore[no-untyped-def]
+def _cell_distance(dx, dy):
     return math.sqrt(dx * dx + dy * dy)
 
 
 @compiled
-def _backtrack(parent, x, y, start_x, start_y):  # type: ignore[no-untyped-def]
+def _backtrack(parent, x, y, start_x, start_y):
     """Return the cells from after the start to ``(x, y)``."""
     n = parent.shape[0]
     count, i, j = 0, x, y

@@ -11,7 +11,7 @@ import re
 import webbrowser
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from tyro.conf import Positional
@@ -34,6 +34,9 @@ from vico.cli.options import (
 )
 from vico.errors import InputError
 from vico.viewer.server import require_server
+
+if TYPE_CHECKING:
+    from vico.agents.human import Steering
 
 
 @dataclass(frozen=True)
@@ -229,7 +232,7 @@ def play(options: Annotated[PlayOptions, FLAT]) -> int:
 _ASSISTANT = re.compile(r"assistant_\d{1,4}")
 
 
-def _steering(robots: list[str], played: str):  # type: ignore[no-untyped-def]
+def _steering(robots: list[str], played: str) -> Steering:
     """Return what keys and sticks mean to who is played."""
     from vico.agents.human import walk
     from vico.viewer.teleoperation import steering_of

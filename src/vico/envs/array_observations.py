@@ -155,7 +155,7 @@ def free_distances(walkable: WalkableMap, x: float, y: float, heading: float) ->
 
 
 @compiled
-def _march_rays(clearance, half, cell, stance, out):  # type: ignore[no-untyped-def]
+def _march_rays(clearance, half, cell, stance, out):
     x, y, heading = stance
     n = clearance.shape[0]
     for k in range(len(out)):

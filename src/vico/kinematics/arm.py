@@ -34,7 +34,7 @@ class Chain(NamedTuple):
 
 
 @compiled
-def joint_origin(chain, k, r, p):  # type: ignore[no-untyped-def]
+def joint_origin(chain, k, r, p):
     """Move on from joint `k` - 1 to where joint `k` is; `r` and `p` are what has been reached of the chain."""
     for i in range(3):
         step = 0.0
@@ -44,7 +44,7 @@ def joint_origin(chain, k, r, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def joint_turn(chain, k, angle, r):  # type: ignore[no-untyped-def]
+def joint_turn(chain, k, angle, r):
     """Turn what has been reached of the chain about joint `k`."""
     c, s = math.cos(angle), math.sin(angle)
     for i in range(3):
@@ -56,7 +56,7 @@ def joint_turn(chain, k, angle, r):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hand_pose(chain, angles, origins, directions, out):  # type: ignore[no-untyped-def]
+def hand_pose(chain, angles, origins, directions, out):
     """Write the hand's rotation (columns 0-2) and position (column 3) in the base's frame, and each joint's place."""
     r = np.eye(3)
     p = np.zeros(3)
@@ -72,7 +72,7 @@ def hand_pose(chain, angles, origins, directions, out):  # type: ignore[no-untyp
 
 
 @compiled
-def hand_error(pose, goal, error):  # type: ignore[no-untyped-def]
+def hand_error(pose, goal, error):
     """Write what is left to a pose, metres and radians; return both summed."""
     for i in range(3):
         error[i] = goal[i, 3] - pose[i, 3]
@@ -87,7 +87,7 @@ def hand_error(pose, goal, error):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hand_jacobian(pose, origins, directions, out):  # type: ignore[no-untyped-def]
+def hand_jacobian(pose, origins, directions, out):
     """Write how the hand moves and turns with each joint, shape ``(6, n)``."""
     for k in range(len(origins)):
         for i in range(3):
@@ -99,7 +99,7 @@ def hand_jacobian(pose, origins, directions, out):  # type: ignore[no-untyped-de
 
 
 @compiled
-def damped_step(jacobian, error, change):  # type: ignore[no-untyped-def]
+def damped_step(jacobian, error, change):
     """Write J^T (J J^T + d^2)^-1 error: by Cholesky's factors, in one order everywhere."""
     n = jacobian.shape[1]
     lower, half = np.zeros((6, 6)), np.empty(6)
@@ -129,7 +129,7 @@ def damped_step(jacobian, error, change):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def solve(chain, angles, goal, steps):  # type: ignore[no-untyped-def]
+def solve(chain, angles, goal, steps):
     """Bring the hand nearer to a pose, in place; return what is left, metres and radians summed."""
     n = len(angles)
     origins, directions, pose = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 4))
@@ -266,7 +266,7 @@ def _along(start: Array, end: Array, radius: float) -> list[Array]:
 
 
 @compiled
-def sphere_positions(chain, limbs, angles, out):  # type: ignore[no-untyped-def]
+def sphere_positions(chain, limbs, angles, out):
     """Write where an arm's balls are in the base's frame, metres, shape ``(n, 3)``."""
     r = np.eye(3)
     p = np.zeros(3)

@@ -87,7 +87,7 @@ def distance_grid(points: Array, posts: Array, *, ground: float | None = None) -
 
 
 @compiled
-def clearance(room, limbs, places, enough):  # type: ignore[no-untyped-def]
+def clearance(room, limbs, places, enough):
     """Return how far an arm's balls are from everything, metres; once less than enough is found, that.
 
     Parameters
@@ -186,7 +186,7 @@ def plan_path(arm: Arm, start: Array, goal: Array, *, seed: int = 0) -> Array | 
 
 
 @compiled
-def _draw(luck):  # type: ignore[no-untyped-def]
+def _draw(luck):
     """Return a number from 0 to 1 (splitmix64: Steele, Lea and Flood, 2014)."""
     luck[0] += np.uint64(0x9E3779B97F4A7C15)
     z = luck[0]
@@ -197,13 +197,13 @@ def _draw(luck):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_free(arm, angles, places):  # type: ignore[no-untyped-def]
+def _is_free(arm, angles, places):
     sphere_positions(arm.chain, arm.limbs, angles, places)
     return clearance(arm.room, arm.limbs, places, arm.gap) >= arm.gap
 
 
 @compiled
-def _edge(arm, start, end, places):  # type: ignore[no-untyped-def]
+def _edge(arm, start, end, places):
     """Whether a straight way of the joints is free, its start left out."""
     longest = 0.0
     for j in range(len(start)):
@@ -219,7 +219,7 @@ def _edge(arm, start, end, places):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _nearest(nodes, count, angles):  # type: ignore[no-untyped-def]
+def _nearest(nodes, count, angles):
     best, found = 1e18, 0
     for k in range(count):
         away = 0.0
@@ -231,7 +231,7 @@ def _nearest(nodes, count, angles):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _grow(arm, nodes, before, count, towards, places):  # type: ignore[no-untyped-def]
+def _grow(arm, nodes, before, count, towards, places):
     """Add a node a step towards angles; return 0 for none, 1 for one, 2 for one that is there."""
     near = _nearest(nodes, count, towards)
     away = 0.0
@@ -248,7 +248,7 @@ def _grow(arm, nodes, before, count, towards, places):  # type: ignore[no-untype
 
 
 @compiled
-def _connect(arm, start, goal, seed, way):  # type: ignore[no-untyped-def]
+def _connect(arm, start, goal, seed, way):
     """Write a way; return how many angles it has, 0 for none."""
     places = np.empty((len(arm.limbs.link), 3))
     if not _is_free(arm, start, places) or not _is_free(arm, goal, places):
@@ -286,7 +286,7 @@ def _connect(arm, start, goal, seed, way):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _join_trees(nodes, before, counts, way):  # type: ignore[no-untyped-def]
+def _join_trees(nodes, before, counts, way):
     """Write the way from the first tree's root to the second's through their newest nodes."""
     count, k = 0, counts[0] - 1
     while True:
@@ -307,7 +307,7 @@ def _join_trees(nodes, before, counts, way):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _shorten(arm, way, count, places, luck):  # type: ignore[no-untyped-def]
+def _shorten(arm, way, count, places, luck):
     for _ in range(_SHORTCUTS):
         if count < 3:
             break
@@ -369,7 +369,7 @@ def collision_free_reach(
 
 
 @compiled
-def solve_near(chain, angles, goal, posture, steps):  # type: ignore[no-untyped-def]
+def solve_near(chain, angles, goal, posture, steps):
     """Bring the hand to a pose and the joints towards a posture, in place; return what is left, metres plus radians.
 
     Damped least squares; the pull to the posture is in the null space of the hand's motion, and within the bounds.

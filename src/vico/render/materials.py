@@ -142,7 +142,7 @@ def _linear(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.
 
 
 @compiled(nogil=True)
-def _coarser(light, alpha, cutout):  # type: ignore[no-untyped-def]
+def _coarser(light, alpha, cutout):
     """Halve a level: averages in linear light; where alpha means holes of opaque texels alone: leaves keep theirs."""
     tall, wide = min(alpha.shape[0], 2), min(alpha.shape[1], 2)
     height, width = alpha.shape[0] // tall, alpha.shape[1] // wide
@@ -170,7 +170,7 @@ def _coarser(light, alpha, cutout):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True)
-def _pack(light, alpha, gain, texels):  # type: ignore[no-untyped-def]
+def _pack(light, alpha, gain, texels):
     """Write a level as packed sRGB texels; `gain` multiplies alpha."""
     zero, one, most = np.float32(0.0), np.float32(1.0), np.float32(255.0)
     k = 0

@@ -530,6 +530,6 @@ def distinct_entities(image: NDArray[np.int32]) -> list[int]:
 
 
 @compiled(nogil=True)
-def _mark_corners(here, left, above, marks):  # type: ignore[no-untyped-def]
+def _mark_corners(here, left, above, marks):
     for i in range(len(marks)):
         marks[i] = (here[i] != left[i]) & (here[i] != above[i])

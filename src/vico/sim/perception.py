@@ -297,7 +297,7 @@ def is_clear(one: NDArray[np.float64], other: NDArray[np.float64], opaque: Opaqu
 
 
 @compiled
-def _cell_key(column, row):  # type: ignore[no-untyped-def]
+def _cell_key(column, row):
     """Return the key of a cell as wide as one sees; below those of all spaces indoors."""
     return -1 - (((column + _HALF_KEYS) << 20) | (row + _HALF_KEYS))
 
@@ -331,7 +331,7 @@ _NOTICED = 3
 
 
 @compiled
-def _pairs(eyes, mine, targets, theirs, limits, heights, keys, order):  # type: ignore[no-untyped-def]
+def _pairs(eyes, mine, targets, theirs, limits, heights, keys, order):
     """Return who has what in view, and how far away it is; indices of agents and bodies, metres.
 
     `eyes` holds position and gaze (a unit vector over the ground), `mine` and `theirs` entity and space; `keys` are the
@@ -359,7 +359,7 @@ def _pairs(eyes, mine, targets, theirs, limits, heights, keys, order):  # type: 
 
 
 @compiled
-def _distance_in_view(eye, target, outdoors, limits, heights):  # type: ignore[no-untyped-def]
+def _distance_in_view(eye, target, outdoors, limits, heights):
     """Return how far away a point in the same space is, metres; -1 if it is out of view."""
     dx, dy = target[0] - eye[0], target[1] - eye[1]
     away = math.sqrt(dx * dx + dy * dy)
@@ -373,7 +373,7 @@ def _distance_in_view(eye, target, outdoors, limits, heights):  # type: ignore[n
 
 
 @compiled
-def _is_clear(eye, target, away, free_end, half, cell, heights):  # type: ignore[no-untyped-def]
+def _is_clear(eye, target, away, free_end, half, cell, heights):
     """Return whether no building stands as high as the line between two points, looked at every half cell."""
     level, tops = heights
     n = level.shape[0]

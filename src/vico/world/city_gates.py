@@ -526,14 +526,14 @@ class GateGraph:
 
 
 @compiled
-def _least(cell, goal, width):  # type: ignore[no-untyped-def]
+def _least(cell, goal, width):
     """Return a cost that no walk between two cells is below."""
     dx, dy = abs(cell % width - goal % width), abs(cell // width - goal // width)
     return 100 * (STRAIGHT * max(dx, dy) + (DIAGONAL - STRAIGHT) * min(dx, dy))
 
 
 @compiled
-def _relax_neighbours(node, graph, known, queue, aim, width):  # type: ignore[no-untyped-def]
+def _relax_neighbours(node, graph, known, queue, aim, width):
     """Reach the neighbours of a gate that is done; `known` are costs so far, by which gate, and what is done."""
     cells, first, ends, costs = graph
     best, by, done = known
@@ -548,7 +548,7 @@ def _relax_neighbours(node, graph, known, queue, aim, width):  # type: ignore[no
 
 
 @compiled
-def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # type: ignore[no-untyped-def]
+def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):
     """Run A* over the gates; of ways that cost the same, the gates with the lower numbers are taken first."""
     cells = graph[0]
     count = len(cells)
@@ -582,7 +582,7 @@ def _cheapest(graph, leave, leave_costs, arrive, arrive_costs, goal, width):  # 
 
 
 @compiled
-def _search_from_goal(graph, arrive, arrive_costs, leave, start, width):  # type: ignore[no-untyped-def]
+def _search_from_goal(graph, arrive, arrive_costs, leave, start, width):
     """Run A* from the goal to all gates of a tile; of ways that cost the same, those over lower numbers are taken."""
     cells = graph[0]
     count = len(cells)

@@ -90,7 +90,7 @@ EVERYWHERE = goals_at(np.zeros(0, np.int64), np.zeros(0, np.int64), 1)
 
 
 @compiled(inline="always")
-def _unlink(cell, key, work):  # type: ignore[no-untyped-def]
+def _unlink(cell, key, work):
     n, p = cell.after, cell.before
     if p >= 0:
         work.cells[p].after = n
@@ -101,7 +101,7 @@ def _unlink(cell, key, work):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _link(node, cell, key, work):  # type: ignore[no-untyped-def]
+def _link(node, cell, key, work):
     first = work.head[key]
     cell.after, cell.before = first, -1
     if first >= 0:
@@ -110,7 +110,7 @@ def _link(node, cell, key, work):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _step(direction):  # type: ignore[no-untyped-def]
+def _step(direction):
     """Return the step in x and y to the neighbour in a direction."""
     if direction >= _FIRST_DIAGONAL:
         return 1 if direction % 2 == 0 else -1, 1 if direction < 6 else -1
@@ -120,7 +120,7 @@ def _step(direction):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-def]
+def _may_step(cost, width, height, cell, direction):
     """Return whether a step ends on an open cell, and cuts no corner if it is diagonal."""
     step_x, step_y = _step(direction)
     nx, ny = cell % width + step_x, cell // width + step_y
@@ -130,7 +130,7 @@ def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-
 
 
 @compiled(inline="always")
-def _least_cost(node, x, y, aim):  # type: ignore[no-untyped-def]
+def _least_cost(node, x, y, aim):
     """Return a cost that no walk to the goals is below, what A* goes by; 0 without a goal.
 
     The larger of two: the walk to one of them if all were sidewalk without walls, and what is to be paid from there;
@@ -151,7 +151,7 @@ def _least_cost(node, x, y, aim):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _left_from(node, goals):  # type: ignore[no-untyped-def]
+def _left_from(node, goals):
     """Return what is left to go from a cell if it is a goal, else -1."""
     low, high = 0, len(goals.cells)
     while low < high:
@@ -164,14 +164,14 @@ def _left_from(node, goals):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _step_cost(flat, node, other, direction):  # type: ignore[no-untyped-def]
+def _step_cost(flat, node, other, direction):
     """Return the cost of a step between neighbours."""
     length = STRAIGHT if direction < _FIRST_DIAGONAL else DIAGONAL
     return length * (np.int64(flat[node]) + np.int64(flat[other])) // 2
 
 
 @compiled(inline="always")
-def _open_sides(flat, node, x, y, width, height):  # type: ignore[no-untyped-def]
+def _open_sides(flat, node, x, y, width, height):
     """Return whether the cells east, west, north and south of a cell are open."""
     return (
         x < width - 1 and flat[node + 1] != 0,
@@ -182,7 +182,7 @@ def _open_sides(flat, node, x, y, width, height):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _relax(other, x, y, length, here, flat, work, aim):  # type: ignore[no-untyped-def]
+def _relax(other, x, y, length, here, flat, work, aim):
     """Reach a cell from a neighbour, if that is cheaper; return 1 if it was not seen before, else 0."""
     so_far, cost, generation = here
     near = work.cells[other]
@@ -203,7 +203,7 @@ def _relax(other, x, y, length, here, flat, work, aim):  # type: ignore[no-untyp
 
 
 @compiled
-def search(cost, work, start, goals, generation, landmarks):  # type: ignore[no-untyped-def]
+def search(cost, work, start, goals, generation, landmarks):
     """Run A* from `start` with circular buckets; return the goal that the cheapest walk leads to, -1 if there is none.
 
     Without goals it is Dijkstra's search of all cells. Landmarks are for searches with one goal.
@@ -260,7 +260,7 @@ def search(cost, work, start, goals, generation, landmarks):  # type: ignore[no-
 
 
 @compiled
-def _entry_direction(flat, costs, node, width, height, last):  # type: ignore[no-untyped-def]
+def _entry_direction(flat, costs, node, width, height, last):
     """Return the direction in which a cheapest walk enters a cell: straight on if it can, else the first that does."""
     g, stamp, final = costs
     for k in range(-1, 8):
@@ -280,7 +280,7 @@ def _entry_direction(flat, costs, node, width, height, last):  # type: ignore[no
 
 
 @compiled
-def backtrack(cost, costs, start, goal):  # type: ignore[no-untyped-def]
+def backtrack(cost, costs, start, goal):
     """Return the cells of a cheapest walk from `start` to `goal`, the one with the fewest turns near its end.
 
     `costs` are those from the start: the costs, stamps, and the stamp of cells whose cost is final.
@@ -298,7 +298,7 @@ def backtrack(cost, costs, start, goal):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def steps_of(cells, width):  # type: ignore[no-untyped-def]
+def steps_of(cells, width):
     """Return the directions of the steps from each of a walk's cells to the next, uint8."""
     steps = np.empty(len(cells) - 1, np.uint8)
     for k in range(len(steps)):
@@ -311,7 +311,7 @@ def steps_of(cells, width):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def cells_along(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
+def cells_along(cost, start, steps, backwards):
     """Return the cells of a walk, int64, and what it costs up to each; none where it leaves what may be walked on.
 
     Parameters
@@ -345,7 +345,7 @@ def cells_along(cost, start, steps, backwards):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):
     """Cost of a straight walk between points in cell units, or -1 where there is no room for it."""
     height, width = cost.shape
     length = math.hypot(x1 - x0, y1 - y0)
@@ -375,7 +375,7 @@ def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: i
 
 
 @compiled
-def string_pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyped-def]
+def string_pull(cost, clearance, blocked, checks, points, g):
     """Return the points to keep (indices): straight walks that cost no more than the grid's path between their ends."""
     count = len(points)
     keep = np.empty(count, np.int64)
@@ -413,7 +413,7 @@ def string_pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no
 
 
 @compiled
-def nearest_free(free, x, y, reach):  # type: ignore[no-untyped-def]
+def nearest_free(free, x, y, reach):
     """Flat index of the free cell whose centre is nearest to (x, y) in cell units, or -1 within `reach` rings."""
     n = free.shape[0]
     ci, cj = min(n - 1, max(0, int(x))), min(n - 1, max(0, int(y)))

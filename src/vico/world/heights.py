@@ -163,7 +163,7 @@ def _by_cell(box: Floats, boxes: Floats) -> tuple[NDArray[np.int64], NDArray[np.
 
 
 @compiled
-def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
+def _nearest_surface(strips, places, ground):
     """Replace `ground` by the height of the strip nearest to each place, where one is nearer."""
     points, box, boxes = strips.points, strips.box, strips.boxes
     columns = max(int(np.ceil((box[2] - box[0]) / _DECK_CELL)), 1)
@@ -298,7 +298,7 @@ class Stairs:
 
 
 @compiled
-def _find(grid, corners, level, points, found):  # type: ignore[no-untyped-def]
+def _find(grid, corners, level, points, found):
     """Write the number of the tread that lies at each point nearest to it in height."""
     corner, start, numbers = grid
     ny, nx = start.shape[0], start.shape[1] - 1
@@ -501,7 +501,7 @@ class HeightField:
 
 
 @compiled
-def _smooth(heights, half, places, out):  # type: ignore[no-untyped-def]
+def _smooth(heights, half, places, out):
     n = heights.shape[0]
     scale = (n - 1) / (2.0 * half)
     for k in range(len(places)):
@@ -515,7 +515,7 @@ def _smooth(heights, half, places, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _add_steps(edge, low, high, half, places, which, out):  # type: ignore[no-untyped-def]
+def _add_steps(edge, low, high, half, places, which, out):
     """Add the steps: at the point itself (0), or as if it lay on the lower (2) or upper (3) side."""
     n = edge.shape[0]
     scale = (n - 1) / (2.0 * half)

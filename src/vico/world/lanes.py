@@ -301,7 +301,7 @@ class LaneGraph:
 
 
 @compiled
-def lane_pose(first, points, along, lane, offset):  # type: ignore[no-untyped-def]
+def lane_pose(first, points, along, lane, offset):
     """x, y, yaw at `offset` metres along a lane; beyond its ends, on along the end's direction."""
     low, high = first[lane], first[lane + 1] - 1
     a, b = low, high
@@ -318,7 +318,7 @@ def lane_pose(first, points, along, lane, offset):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _poses(first, points, along, lane, offset):  # type: ignore[no-untyped-def]
+def _poses(first, points, along, lane, offset):
     out = np.empty((len(lane), 3))
     for i in range(len(lane)):
         out[i, 0], out[i, 1], out[i, 2] = lane_pose(first, points, along, lane[i], offset[i])

@@ -235,7 +235,7 @@ class Track:
 
 
 @compiled
-def _point(s, along, points, first, last):  # type: ignore[no-untyped-def]
+def _point(s, along, points, first, last):
     """Return the point at a distance along a track."""
     if s <= 0.0:
         return points[0, 0] + first[0] * s, points[0, 1] + first[1] * s
@@ -249,7 +249,7 @@ def _point(s, along, points, first, last):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stand(middles, along, points, first, last, found):  # type: ignore[no-untyped-def]
+def _stand(middles, along, points, first, last, found):
     """Write x, y, yaw of sections whose middles are at distances along a track, shape ``(n, 3)``."""
     for i in range(len(middles)):
         ax, ay = _point(middles[i] - _PIVOT, along, points, first, last)

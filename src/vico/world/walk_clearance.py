@@ -119,7 +119,7 @@ def ways_through(free: Gaps, good: Gaps, room: float, bend: float, depth: Floats
 
 
 @compiled
-def _above_edges(free, depth, columns, room):  # type: ignore[no-untyped-def]
+def _above_edges(free, depth, columns, room):
     places, count = depth.shape
     first = np.zeros(places + 1, np.int64)
     is_cut = np.zeros(places, np.bool_)
@@ -161,7 +161,7 @@ def _above_edges(free, depth, columns, room):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_straight(good, most):  # type: ignore[no-untyped-def]
+def _is_straight(good, most):
     """Return whether the line itself is good, and wide enough, at all places."""
     for k in range(len(good.first) - 1):
         fits = False
@@ -176,7 +176,7 @@ def _is_straight(good, most):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _costs(free, aside, room):  # type: ignore[no-untyped-def]
+def _costs(free, aside, room):
     """Return what it costs to be so far aside at each place, inf in solids, shape ``(places, len(aside))``."""
     places, count = len(free.first) - 1, len(aside)
     costs = np.full((places, count), np.inf)
@@ -191,7 +191,7 @@ def _costs(free, aside, room):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _above_rather(costs, good, depth, columns, aside, room):  # type: ignore[no-untyped-def]
+def _above_rather(costs, good, depth, columns, aside, room):
     """Make dearer what is not above edges; where there is room above one, how narrow it is there is the room's."""
     last = len(columns) - 1
     for k in range(len(costs)):
@@ -216,7 +216,7 @@ def _above_rather(costs, good, depth, columns, aside, room):  # type: ignore[no-
 
 
 @compiled
-def _cheapest(costs):  # type: ignore[no-untyped-def]
+def _cheapest(costs):
     """Return the places at which pieces begin, and the column of each place, -1 where no piece leads past."""
     places, count = costs.shape
     came = np.zeros((places, count), np.int64)
@@ -252,7 +252,7 @@ def _cheapest(costs):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _sides_along(free, good, along, aside, begin, room):  # type: ignore[no-untyped-def]
+def _sides_along(free, good, along, aside, begin, room):
     count = len(aside)
     each = np.empty((count, 4))
     for k in range(count):
@@ -278,7 +278,7 @@ def _sides_along(free, good, along, aside, begin, room):  # type: ignore[no-unty
 
 
 @compiled
-def _sides(free, good, place, room, aside):  # type: ignore[no-untyped-def]
+def _sides(free, good, place, room, aside):
     """Return the room to the left and to the right of a line that is so far aside, and the same in need."""
     low, high = np.nan, np.nan
     for j in range(free.first[place], free.first[place + 1]):

@@ -257,7 +257,7 @@ def read_walkable(path: Path) -> WalkableMap:
 
 
 @compiled
-def fill_polygon(grid, xs, ys, starts, half, cell, value):  # type: ignore[no-untyped-def]
+def fill_polygon(grid, xs, ys, starts, half, cell, value):
     """Set the cells whose centres lie in a polygon: rings end to end in xs, ys (metres), even-odd rule."""
     n = grid.shape[0]
     low, high = ys.min(), ys.max()
@@ -284,7 +284,7 @@ def fill_polygon(grid, xs, ys, starts, half, cell, value):  # type: ignore[no-un
 
 
 @compiled
-def stroke(grid, start, end, radius, half, cell, value):  # type: ignore[no-untyped-def]
+def stroke(grid, start, end, radius, half, cell, value):
     """Set the cells whose centres lie within `radius` of a segment; `start`, `end`: metres, shape ``(k, 2)``."""
     n = grid.shape[0]
     for k in range(len(start)):

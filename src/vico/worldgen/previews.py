@@ -167,7 +167,7 @@ _MARKS: dict[Category, tuple[Rgb, str]] = {
 
 
 @compiled
-def _fill_triangles(image, corners, colours):  # type: ignore[no-untyped-def]
+def _fill_triangles(image, corners, colours):
     """Fill triangles given in pixels, shape (m, 3, 2); where two meet in a pixel's centre the later wins."""
     n = image.shape[0]
     for t in range(len(corners)):

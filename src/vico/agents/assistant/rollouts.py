@@ -121,7 +121,7 @@ def expected_worth(situation: Situation, chance: np.random.Generator, *, worlds:
 
 
 @compiled
-def _choice_values(situation, truth, finds):  # type: ignore[no-untyped-def]
+def _choice_values(situation, truth, finds):
     spots = len(situation.spot_task)
     values = np.full(spots + len(situation.stage), -1.0)
     looked = np.zeros(spots, np.bool_)
@@ -136,7 +136,7 @@ def _choice_values(situation, truth, finds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _mean_worth(situation, truth, finds):  # type: ignore[no-untyped-def]
+def _mean_worth(situation, truth, finds):
     looked = np.zeros(len(situation.spot_task), np.bool_)
     first = _greedy_choice(situation, 0, 0.0, situation.stage, situation.hands, looked)
     if first < 0:
@@ -148,7 +148,7 @@ def _mean_worth(situation, truth, finds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_possible(situation, choice, stage, hands, looked):  # type: ignore[no-untyped-def]
+def _is_possible(situation, choice, stage, hands, looked):
     """Return whether a choice is one: something to bring is in hand, or a spot may still be looked at."""
     spots = len(situation.spot_task)
     if choice >= spots:
@@ -158,7 +158,7 @@ def _is_possible(situation, choice, stage, hands, looked):  # type: ignore[no-un
 
 
 @compiled
-def _play_world(situation, first, truth, finds):  # type: ignore[no-untyped-def]
+def _play_world(situation, first, truth, finds):
     """Return the worth of a choice and what follows from it in one world."""
     spots = len(situation.spot_task)
     stage, looked = situation.stage.copy(), np.zeros(spots, np.bool_)
@@ -195,7 +195,7 @@ def _play_world(situation, first, truth, finds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _greedy_choice(situation, at, time, stage, hands, looked):  # type: ignore[no-untyped-def]
+def _greedy_choice(situation, at, time, stage, hands, looked):
     """Return the choice with the most chance per second of those that may be done in time; -1 if there is none."""
     spots = len(situation.spot_task)
     # What is left of each subtask's chances: the spots that were looked at are out of the question.

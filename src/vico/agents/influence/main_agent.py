@@ -329,7 +329,9 @@ class MainAgent:
 class _WalkTimes:
     """Tells how long walks to places take; positions a few metres apart share their answers."""
 
-    def __init__(self, public_map: PublicMap, here: tuple[float, float], known: dict[tuple[int, int, str], float]):
+    def __init__(
+        self, public_map: PublicMap, here: tuple[float, float], known: dict[tuple[int, int, str], float]
+    ) -> None:
         self._map, self._here, self._known = public_map, here, known
 
     def __call__(self, place: str) -> float:

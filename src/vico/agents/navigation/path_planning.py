@@ -129,7 +129,7 @@ def search_memory(m: int = SIDE, *, layers: int = 1) -> SearchMemory:
 
 
 @compiled(inline="always")
-def box_distance(x, y, target):  # type: ignore[no-untyped-def]
+def box_distance(x, y, target):
     """Return cells from a point to a box (`Target.values`)."""
     dx, dy = x - target[_X], y - target[_Y]
     c, s = math.cos(target[_YAW]), math.sin(target[_YAW])
@@ -139,14 +139,14 @@ def box_distance(x, y, target):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def cost_bound(i, j, target):  # type: ignore[no-untyped-def]
+def cost_bound(i, j, target):
     """Return the least that any way from a cell to a target costs."""
     left = max(box_distance(i + 0.5, j + 0.5, target) - target[_NEAR], 0.0)
     return int(BOUND * STRAIGHT * FREE_COST * left)
 
 
 @compiled
-def search_path(grid, memory, start, target, climb):  # type: ignore[no-untyped-def]
+def search_path(grid, memory, start, target, climb):
     """Run A* from a cell to the first cell within a target.
 
     Parameters
@@ -227,23 +227,23 @@ def search_path(grid, memory, start, target, climb):  # type: ignore[no-untyped-
 
 
 @compiled(inline="always")
-def _queue_entry(cost, i, j, layer):  # type: ignore[no-untyped-def]
+def _queue_entry(cost, i, j, layer):
     """Pack an entry of the queue: ties are broken by position."""
     return (np.int64(cost) << np.int64(26)) | (np.int64(layer) << np.int64(24)) | (np.int64(i) << np.int64(12)) | j
 
 
 @compiled(inline="always")
-def _dx(direction):  # type: ignore[no-untyped-def]
+def _dx(direction):
     return (1, -1, 0, 0, 1, -1, 1, -1)[direction]
 
 
 @compiled(inline="always")
-def _dy(direction):  # type: ignore[no-untyped-def]
+def _dy(direction):
     return (0, 0, 1, -1, 1, -1, -1, 1)[direction]
 
 
 @compiled(inline="always")
-def _estimated_cost(i, j, levels, target, climb):  # type: ignore[no-untyped-def]
+def _estimated_cost(i, j, levels, target, climb):
     least = cost_bound(i, j, target)
     if climb:
         least = max(least, int(_LEVEL_COST * _levels_off(levels, target)))
@@ -251,7 +251,7 @@ def _estimated_cost(i, j, levels, target, climb):  # type: ignore[no-untyped-def
 
 
 @compiled(inline="always")
-def _levels_off(levels, target):  # type: ignore[no-untyped-def]
+def _levels_off(levels, target):
     """Return how many levels are left to climb or to go down to a target; 0 where its height is told by nobody."""
     if target[_LEVEL] == _NO_LEVEL:
         return 0.0
@@ -259,7 +259,7 @@ def _levels_off(levels, target):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _levels_at(mask, levels):  # type: ignore[no-untyped-def]
+def _levels_at(mask, levels):
     """Return between which levels the ground is in a column, coming from one beside it."""
     if mask:
         level = np.float32(lowest_level(mask))
@@ -268,7 +268,7 @@ def _levels_at(mask, levels):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _backtrack(memory, x, y, layer):  # type: ignore[no-untyped-def]
+def _backtrack(memory, x, y, layer):
     """Return the cells from the start to ``(x, y)``, with what each costs to get to."""
     m = memory.cost.shape[1]
     found = []
@@ -286,7 +286,7 @@ def _backtrack(memory, x, y, layer):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def furthest_straight_cell(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
+def furthest_straight_cell(costs, cells, x, y, most):
     """Return the last cell of a way that a straight line leads to for hardly more than the way itself costs.
 
     Parameters
@@ -320,7 +320,7 @@ def furthest_straight_cell(costs, cells, x, y, most):  # type: ignore[no-untyped
 
 
 @compiled(inline="always")
-def _line_cost(costs, x, y, dx, dy):  # type: ignore[no-untyped-def]
+def _line_cost(costs, x, y, dx, dy):
     """Return the greatest cost of a cell on a line, 255 for blocked ones, and the whole line's as a way's."""
     wrap = costs.shape[0] - 1
     length = math.sqrt(dx * dx + dy * dy)
@@ -437,7 +437,7 @@ class PathKeeper:
 
 
 @compiled
-def _is_still_best(costs, planned, changed, cells, goal):  # type: ignore[no-untyped-def]
+def _is_still_best(costs, planned, changed, cells, goal):
     """Tell whether a way is still the best one, given the cells whose cost is another than when it was found."""
     left, target = goal
     n = costs.shape[0]

@@ -121,7 +121,7 @@ class Camera(NamedTuple):
 
 
 @compiled
-def add_points(voxels, depth, segmentation, camera, special, limits):  # type: ignore[no-untyped-def]
+def add_points(voxels, depth, segmentation, camera, special, limits):
     """Enter every `limits[0]`-th pixel's point up to `limits[1]` metres off; what moves until `limits[2]`.
 
     Where the ground is unknown, what lies above `limits[3]`, the eye, is left out: nobody sees a floor from below.
@@ -153,7 +153,7 @@ def add_points(voxels, depth, segmentation, camera, special, limits):  # type: i
 
 
 @compiled(inline="always")
-def _kind_of(entity, special):  # type: ignore[no-untyped-def]
+def _kind_of(entity, special):
     for k in range(len(special)):
         if special[k, 0] == entity:
             return special[k, 1]
@@ -161,7 +161,7 @@ def _kind_of(entity, special):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _enter_column(voxels, i, j, heights, moves, until):  # type: ignore[no-untyped-def]
+def _enter_column(voxels, i, j, heights, moves, until):
     a, b = (i >> 5) & (CHUNKS - 1), (j >> 5) & (CHUNKS - 1)
     if not voxels.flags[b, a, THERE] or voxels.key[b, a, 0] != i >> 5 or voxels.key[b, a, 1] != j >> 5:
         return
@@ -185,7 +185,7 @@ def _enter_column(voxels, i, j, heights, moves, until):  # type: ignore[no-untyp
 
 
 @compiled
-def clear_seen_through(voxels, depth, camera, eye, limits):  # type: ignore[no-untyped-def]
+def clear_seen_through(voxels, depth, camera, eye, limits):
     """Clear voxels through which a picture shows what lies behind; and what moved on, up to `limits[1]` metres off.
 
     `limits[2]`: the second up to which what was seen now counts; what is to last longer (bumps) stays.
@@ -212,7 +212,7 @@ def clear_seen_through(voxels, depth, camera, eye, limits):  # type: ignore[no-u
 
 
 @compiled(inline="always")
-def _clear_column(voxels, place, point, depth, camera, reach, until):  # type: ignore[no-untyped-def]
+def _clear_column(voxels, place, point, depth, camera, reach, until):
     j, i, b, a = place
     rotation, shift = camera.rotation, camera.shift
     ground = voxels.ground[j, i]
@@ -247,7 +247,7 @@ def _clear_column(voxels, place, point, depth, camera, reach, until):  # type: i
 
 
 @compiled(inline="always")
-def _is_seen_through(x, y, z, depth, lens):  # type: ignore[no-untyped-def]
+def _is_seen_through(x, y, z, depth, lens):
     """Tell whether all of a voxel, given in the camera's frame, lies before what a picture shows there."""
     if z < _NEAREST:
         return False
@@ -267,7 +267,7 @@ def _is_seen_through(x, y, z, depth, lens):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def count_changes(voxels, now, least):  # type: ignore[no-untyped-def]
+def count_changes(voxels, now, least):
     """Count anew around the columns that came to be in the way, or ceased to be; `least`: voxels that make it so."""
     for b in range(CHUNKS):
         for a in range(CHUNKS):
@@ -292,7 +292,7 @@ def count_changes(voxels, now, least):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def assign_chunk(voxels, place, key, base, ground):  # type: ignore[no-untyped-def]
+def assign_chunk(voxels, place, key, base, ground):
     """Give a place, row and column of a chunk, to another chunk, of which nothing is known but its floor."""
     b, a = place
     for jj in range(CHUNK):
@@ -313,7 +313,7 @@ def assign_chunk(voxels, place, key, base, ground):  # type: ignore[no-untyped-d
 
 
 @compiled(inline="always")
-def _is_solid(mask, ground, least):  # type: ignore[no-untyped-def]
+def _is_solid(mask, ground, least):
     """Tell whether a column holds at least so many voxels between ankle and head above its floor."""
     if mask == 0:
         return False
@@ -330,7 +330,7 @@ def _is_solid(mask, ground, least):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def lowest_level(mask):  # type: ignore[no-untyped-def]
+def lowest_level(mask):
     """Return the lowest level that holds something; of a mask that is not 0."""
     level = 0
     while not mask & (np.uint64(1) << np.uint64(level)):
@@ -339,7 +339,7 @@ def lowest_level(mask):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _count_around(voxels, j, i, change):  # type: ignore[no-untyped-def]
+def _count_around(voxels, j, i, change):
     for dy in range(-_REACH, _REACH + 1):
         for dx in range(-_REACH, _REACH + 1):
             square = dx * dx + dy * dy
@@ -355,7 +355,7 @@ def _count_around(voxels, j, i, change):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _cost_of(voxels, y, x):  # type: ignore[no-untyped-def]
+def _cost_of(voxels, y, x):
     if voxels.counts[y, x, 0] > 0:
         return np.uint8(0)
     if voxels.counts[y, x, 1] > 0:

@@ -110,7 +110,9 @@ class Lexicon:
         If an appeal hangs on a trait, or a value is opposed to one, that nobody knows.
     """
 
-    def __init__(self, files: Sequence[LexiconFile], *, hobbies: Iterable[str] = (), groups: Iterable[str] = ()):
+    def __init__(
+        self, files: Sequence[LexiconFile], *, hobbies: Iterable[str] = (), groups: Iterable[str] = ()
+    ) -> None:
         values = [one for file in files for one in file.value]
         self.opposed = {value.name: frozenset(value.opposed) for value in values}
         self.appeals = {appeal.name: appeal for file in files for appeal in file.appeal}

@@ -76,7 +76,7 @@ _SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
 
 
 @compiled
-def stride_of(clip, speed, height):  # type: ignore[no-untyped-def]
+def stride_of(clip, speed, height):
     """Return the metres one cycle of one motion covers; see `stride_length`."""
     if clip in (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT):
         return _STRIDE * height * max(speed, _SLOWEST) ** _POWER
@@ -86,7 +86,7 @@ def stride_of(clip, speed, height):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def pace_of_step(step, height):  # type: ignore[no-untyped-def]
+def pace_of_step(step, height):
     """Return the speed at which somebody's steps are so long on level ground, m/s."""
     return max((2.0 * step / (_STRIDE * height)) ** (1.0 / _POWER), _SLOWEST)
 
@@ -129,7 +129,7 @@ def stride_length(
 
 
 @compiled
-def _strides(clip, speed, height, found):  # type: ignore[no-untyped-def]
+def _strides(clip, speed, height, found):
     for k in range(len(found)):
         found[k] = stride_of(clip[k], speed[k], height[k])
 

@@ -211,7 +211,7 @@ class Avatars:
 
 
 @compiled
-def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
+def _clip_of(motion, k, speed):
     """Return the clip that shows what somebody does, at a speed over the ground in m/s."""
     if motion.vehicle[k] == _ON_BIKE:
         return _RIDE_BIKE
@@ -235,7 +235,7 @@ def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _begin_clip(clips, k, now, pace):  # type: ignore[no-untyped-def]
+def _begin_clip(clips, k, now, pace):
     """Begin another clip: gaits go on from the feet, the others from their start."""
     was = clips.clip[k]
     clips.clip_before[k], clips.phase_before[k], clips.pace_before[k] = was, clips.phase[k], clips.pace[k]
@@ -255,7 +255,7 @@ def _begin_clip(clips, k, now, pace):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _advance_clips(motion, clips, dt):  # type: ignore[no-untyped-def]
+def _advance_clips(motion, clips, dt):
     """Choose everybody's clip and go on in it by `dt` seconds; `clips` are changed in place."""
     for k in range(len(clips.clip)):
         vx, vy = motion.velocity[k, 0], motion.velocity[k, 1]

@@ -84,7 +84,7 @@ def _plain(column: NDArray[Any]) -> NDArray[np.float64]:
 
 
 @compiled
-def _fill(found, position, yaw, half, rounding, extent, velocity):  # type: ignore[no-untyped-def]
+def _fill(found, position, yaw, half, rounding, extent, velocity):
     # Compiled, for it is quicker, and NumPy's own cosine differs between processors in its last digit.
     for k in range(len(found)):
         one = found[k]
@@ -100,14 +100,14 @@ def _fill(found, position, yaw, half, rounding, extent, velocity):  # type: igno
 
 
 @compiled
-def core_of(body):  # type: ignore[no-untyped-def]
+def core_of(body):
     """Return the core of a body's footprint."""
     r = body.rounding
     return Rectangle(body.x, body.y, body.cos, body.sin, body.half_length - r, body.half_width - r)
 
 
 @compiled
-def point_gap(px, py, r):  # type: ignore[no-untyped-def]
+def point_gap(px, py, r):
     """Return the signed distance from a point to a rectangle, metres; negative inside."""
     dx, dy = px - r.x, py - r.y
     u = abs(dx * r.cos + dy * r.sin) - r.half_length
@@ -118,7 +118,7 @@ def point_gap(px, py, r):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def separation(a, b):  # type: ignore[no-untyped-def]
+def separation(a, b):
     """Return the widest gap between two rectangles along any of their sides (separating axis theorem), metres.
 
     Negative where they overlap: then it is how deep they do. Otherwise they are at least so far apart.
@@ -134,7 +134,7 @@ def separation(a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _corner_gap(a, b):  # type: ignore[no-untyped-def]
+def _corner_gap(a, b):
     """Return the distance from the nearest corner of rectangle `a` to rectangle `b`."""
     best = 1e18
     for i in (-1.0, 1.0):
@@ -145,7 +145,7 @@ def _corner_gap(a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rectangle_gap(a, b):  # type: ignore[no-untyped-def]
+def rectangle_gap(a, b):
     """Return the signed distance between two rectangles, metres: negative is how deep they overlap."""
     if a.half_length == 0.0 and a.half_width == 0.0:
         return point_gap(a.x, a.y, b)
@@ -159,13 +159,13 @@ def rectangle_gap(a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def body_gap(a, b):  # type: ignore[no-untyped-def]
+def body_gap(a, b):
     """Return the signed distance between the footprints of two bodies, dtype `BODY`, metres."""
     return rectangle_gap(core_of(a), core_of(b)) - a.rounding - b.rounding
 
 
 @compiled
-def gaps(core, bodies):  # type: ignore[no-untyped-def]
+def gaps(core, bodies):
     """Return the distance from a core to the footprint of each body, dtype `BODY`, metres; shape ``(n,)``."""
     found = np.empty(len(bodies))
     for k in range(len(bodies)):
@@ -174,7 +174,7 @@ def gaps(core, bodies):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def can_touch(a, b):  # type: ignore[no-untyped-def]
+def can_touch(a, b):
     """Return whether two bodies, dtype `BODY`, can touch: in one space, not in a bus, and on one level."""
     return a.space == b.space and a.space != IN_BUS and a.bottom < b.top and b.bottom < a.top
 
@@ -207,13 +207,13 @@ class NeighbourGrid(NamedTuple):
 
 
 @compiled
-def _bucket(column, row, buckets):  # type: ignore[no-untyped-def]
+def _bucket(column, row, buckets):
     # The primes of Teschner et al.: Optimized spatial hashing for collision detection of deformable objects (2003).
     return ((column * 73856093) ^ (row * 19349663)) & (buckets - 1)
 
 
 @compiled
-def neighbour_grid(x, y, cell, spread):  # type: ignore[no-untyped-def]
+def neighbour_grid(x, y, cell, spread):
     """Return a grid of the points x, y, shape ``(n,)`` each; `cell` and `spread` as in `NeighbourGrid`."""
     n = len(x)
     buckets = 64
@@ -236,7 +236,7 @@ def neighbour_grid(x, y, cell, spread):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def search(grid, x, y, reach, buffer):  # type: ignore[no-untyped-def]
+def search(grid, x, y, reach, buffer):
     """Write the points that may be within `reach` metres of (x, y) into `buffer`, in ascending order.
 
     Returns

@@ -419,7 +419,7 @@ class Indoor:
 
 
 @compiled
-def _free_room(points, box, furniture):  # type: ignore[no-untyped-def]
+def _free_room(points, box, furniture):
     """Distance from points of a room to the nearest wall or piece of furniture, metres; negative in one."""
     out = np.empty(len(points))
     for k in range(len(points)):

@@ -224,7 +224,7 @@ def _on_slopes(bodies: Bodies, ground: HeightField) -> NDArray[np.void]:
 
 
 @compiled
-def pairs(bodies, tolerance):  # type: ignore[no-untyped-def]
+def pairs(bodies, tolerance):
     """Return the pairs among some bodies, dtype `BODY`, that are deeper in each other than `tolerance` metres.
 
     Returns
@@ -257,7 +257,7 @@ def pairs(bodies, tolerance):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def persons_in_solids(people, solids, tolerance):  # type: ignore[no-untyped-def]
+def persons_in_solids(people, solids, tolerance):
     """Return who of some people, dtype `BODY`, is inside a wall or furniture: index, whether furniture, depth."""
     found = [(0, False, 0.0) for _ in range(0)]
     for i in range(len(people)):

@@ -38,7 +38,7 @@ _ROUNDING = 1e-3
 
 
 @compiled
-def _measure(cells, corner, outlines, directions, reach):  # type: ignore[no-untyped-def]
+def _measure(cells, corner, outlines, directions, reach):
     """Write how far each cell's middle is from the nearest outline, and how high the highest within `reach` goes.
 
     The first cell begins at `corner`. Outlines are given by how far they go in each direction, and their tops.
@@ -77,7 +77,7 @@ class CellArrays(NamedTuple):
 
 
 @compiled
-def is_clear(cells, point, radius):  # type: ignore[no-untyped-def]
+def is_clear(cells, point, radius):
     """Return whether nothing solid is within some metres of a point, `radius` no more than the cells are made for.
 
     Of points that no square holds it is not known: False.
@@ -96,7 +96,7 @@ def is_clear(cells, point, radius):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def find_near(cells, reach, seconds, state, near):  # type: ignore[no-untyped-def]
+def find_near(cells, reach, seconds, state, near):
     """Say of each robot whether it could touch something solid within some seconds.
 
     Parameters
@@ -206,7 +206,7 @@ _FIELDS = ("entity", "start", "end", "half", "time", "left_out")
 
 
 @compiled
-def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untyped-def]
+def _gaps(position, half_length, half_width, centres):
     """Distance of every body's outline (at least) from the nearest of `centres`, metres."""
     out = np.empty(len(position))
     for k in range(len(position)):
@@ -218,7 +218,7 @@ def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untype
 
 
 @compiled
-def moved_poses(start, end, time):  # type: ignore[no-untyped-def]
+def moved_poses(start, end, time):
     """Return middle and yaw of everybody on the way, the shorter way round; arguments as in `KinematicBodies`."""
     share = 1.0 if time[1] <= 0.0 else min(1.0, time[0] / time[1])
     out = np.empty(start.shape)

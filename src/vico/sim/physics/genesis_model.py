@@ -85,7 +85,7 @@ POSITION, VELOCITY, FORCE = range(3)
 
 
 @compiled
-def _write_targets(joints, transmission, targets, controls):  # type: ignore[no-untyped-def]
+def _write_targets(joints, transmission, targets, controls):
     """Write what joints follow for the motors that drive them to follow `targets`.
 
     Parameters

@@ -42,7 +42,7 @@ STEPS = {FINE: 2, COARSE: 2}
 
 
 @compiled
-def _rotate_vector(q, v):  # type: ignore[no-untyped-def]
+def _rotate_vector(q, v):
     """Return a vector turned by a quaternion w, x, y, z."""
     w, x, y, z = q
     tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
@@ -56,7 +56,7 @@ def _rotate_vector(q, v):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _add_wrench(link, arm, force, torque, pushed, turned):  # type: ignore[no-untyped-def]
+def _add_wrench(link, arm, force, torque, pushed, turned):
     """Add a force and a torque to what pushes a link; `arm`: from its robot's centre of mass to where they act."""
     for axis in range(3):
         a, b = (axis + 1) % 3, (axis + 2) % 3
@@ -65,7 +65,7 @@ def _add_wrench(link, arm, force, torque, pushed, turned):  # type: ignore[no-un
 
 
 @compiled
-def _push_sites(sites, wrench, poses, pushed, turned):  # type: ignore[no-untyped-def]
+def _push_sites(sites, wrench, poses, pushed, turned):
     """Push links with forces and torques in the frames of sites, shape ``(n, 6)``."""
     links, place, turn = sites
     position, quaternion, centre = poses
@@ -84,14 +84,14 @@ def _push_sites(sites, wrench, poses, pushed, turned):  # type: ignore[no-untype
 
 
 @compiled
-def _carry(links, lift, middle, pushed, turned):  # type: ignore[no-untyped-def]
+def _carry(links, lift, middle, pushed, turned):
     """Carry the weight of links at their own centres of mass (`middle`: from their robot's)."""
     for k in range(len(links)):
         _add_wrench(links[k], middle[links[k]], lift[k], np.zeros(3), pushed, turned)
 
 
 @compiled
-def _fit_boxes(geoms, corners, poses, boxes):  # type: ignore[no-untyped-def]
+def _fit_boxes(geoms, corners, poses, boxes):
     """Fit the boxes around shapes, which the solver does of those alone that can move."""
     position, quaternion = poses
     low, high = boxes

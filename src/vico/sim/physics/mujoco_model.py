@@ -276,7 +276,7 @@ def parked_object(slot: int) -> list[float]:
 
 
 @compiled
-def base_motion(positions, speeds, first):  # type: ignore[no-untyped-def]
+def base_motion(positions, speeds, first):
     """Return the motion of bases.
 
     Parameters
@@ -310,7 +310,7 @@ def base_motion(positions, speeds, first):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def motion_of(positions, speeds, first, angle, rate):  # type: ignore[no-untyped-def]
+def motion_of(positions, speeds, first, angle, rate):
     """Return what `Motion` holds of robots of one kind, in its order.
 
     Parameters
@@ -327,7 +327,7 @@ def motion_of(positions, speeds, first, angle, rate):  # type: ignore[no-untyped
 
 
 @compiled
-def place_bodies(poses, entity, where, positions, quaternions):  # type: ignore[no-untyped-def]
+def place_bodies(poses, entity, where, positions, quaternions):
     """Put kinematic bodies at their poses (middle and yaw), and those that are nobody (entity 0) out of the way."""
     for k in range(len(poses)):
         body = where[k]
@@ -364,7 +364,7 @@ class LinkState(NamedTuple):
 
 
 @compiled
-def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ignore[no-untyped-def]
+def begin_frame(frame, known, state, solids, links, movers, mocap):
     """Say which links could touch something solid in a frame, and move people and vehicles on to its end.
 
     Parameters

@@ -79,13 +79,13 @@ class StepSettings(NamedTuple):
 
 
 @compiled
-def is_mirrored(memory):  # type: ignore[no-untyped-def]
+def is_mirrored(memory):
     """Whether the right leg's swing is next, or under way."""
     return memory[PHASE] >= 0.5 - 1e-9
 
 
 @compiled
-def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-def]
+def advance_clock(settings, planar, tilt, memory):
     """Let the stride of a robot go on, begin or end.
 
     Parameters
@@ -121,7 +121,7 @@ def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _put_legs(out, first, values, rest, swap, scale):  # type: ignore[no-untyped-def]
+def _put_legs(out, first, values, rest, swap, scale):
     """Write the numbers of both legs, less those at rest, the leg that swings first."""
     for k in range(LEGS):
         j = (k + LEG) % LEGS if swap else k
@@ -130,7 +130,7 @@ def _put_legs(out, first, values, rest, swap, scale):  # type: ignore[no-untyped
 
 
 @compiled
-def observe(settings, moving, joints, memory, out):  # type: ignore[no-untyped-def]
+def observe(settings, moving, joints, memory, out):
     """Write what the network sees of a robot.
 
     Parameters
@@ -160,7 +160,7 @@ def observe(settings, moving, joints, memory, out):  # type: ignore[no-untyped-d
 
 
 @compiled
-def leg_targets(settings, action, memory, out):  # type: ignore[no-untyped-def]
+def leg_targets(settings, action, memory, out):
     """Write the joints' targets, of plain steps and the network's answer to them; that becomes the last action."""
     swap = is_mirrored(memory)
     s = 2.0 * (memory[PHASE] - (0.5 if swap else 0.0))
@@ -223,7 +223,7 @@ class StanceSettings(NamedTuple):
 
 
 @compiled
-def sole_slope(places, rotation, angles, side):  # type: ignore[no-untyped-def]
+def sole_slope(places, rotation, angles, side):
     """Return how far a sole slopes down ahead, rad, and its height above the origin of the base, metres.
 
     Parameters
@@ -247,7 +247,7 @@ def sole_slope(places, rotation, angles, side):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fit_stance(stance, rotation, angles, memory):  # type: ignore[no-untyped-def]
+def fit_stance(stance, rotation, angles, memory):
     """Fit the stance of a robot that stands to the ground below its soles; let that go of one that steps."""
     stands = memory[STEPPING] == 0.0
     if stands and memory[CALM] > _FELT:
@@ -270,7 +270,7 @@ def fit_stance(stance, rotation, angles, memory):  # type: ignore[no-untyped-def
 
 
 @compiled
-def fit_to_ground(memory, angles, sign):  # type: ignore[no-untyped-def]
+def fit_to_ground(memory, angles, sign):
     """Add what the ground asks for to angles of the joints (`sign` 1), or take it from them (-1)."""
     for leg in range(2):
         ankle, knee = sign * memory[GROUND + leg], sign * memory[GROUND + 2 + leg]
@@ -281,7 +281,7 @@ def fit_to_ground(memory, angles, sign):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def target_velocity(period, command, position, rotation, memory, out):  # type: ignore[no-untyped-def]
+def target_velocity(period, command, position, rotation, memory, out):
     """Write the velocity to go over to: the command; without one, that by which a robot gets back to where it stopped.
 
     Only one that steps is steered back: one that stands does not begin to step for it, and one that is calm stands
@@ -344,7 +344,7 @@ class _WalkerMotion(NamedTuple):
 
 
 @compiled
-def _walk(layers, settings, motion, command, memory):  # type: ignore[no-untyped-def]
+def _walk(layers, settings, motion, command, memory):
     """Return the joints' targets of all robots, shape ``(k, 10)``."""
     steps, stance, slew = settings
     count = len(command)

@@ -144,14 +144,14 @@ _SMOOTHED, _CORRECTION = 0, 3
 
 
 @compiled
-def approach(values, goal, step):  # type: ignore[no-untyped-def]
+def approach(values, goal, step):
     """Bring `values` nearer to `goal`, each by at most its `step`."""
     for k in range(len(values)):
         values[k] += min(max(goal[k] - values[k], -step[k]), step[k])
 
 
 @compiled
-def planar_motion(rotation, velocity, angular_velocity_body):  # type: ignore[no-untyped-def]
+def planar_motion(rotation, velocity, angular_velocity_body):
     """Return vx, vy, wz in the base's frame."""
     out = np.empty(3)
     for k in range(2):
@@ -161,7 +161,7 @@ def planar_motion(rotation, velocity, angular_velocity_body):  # type: ignore[no
 
 
 @compiled
-def trim_command(trim, motion, command, memory):  # type: ignore[no-untyped-def]
+def trim_command(trim, motion, command, memory):
     """Return a command corrected by the integral of what is missing of it."""
     out = np.empty(3)
     share = trim.period / (trim.smoothing + trim.period)
@@ -193,7 +193,7 @@ _BACK, _BACK_SPEED = 4.0, 0.2
 
 
 @compiled
-def _wheel_speeds(settings, rotation, velocity, angular_velocity_body, command, memory):  # type: ignore[no-untyped-def]
+def _wheel_speeds(settings, rotation, velocity, angular_velocity_body, command, memory):
     """Return wheel speeds of all robots, rad/s, left and right in turn, shape ``(k, wheels)``."""
     trim, slew, top, wheels = settings
     out = np.empty((len(command), len(top)))

@@ -45,7 +45,7 @@ _BRAKES = 0.5
 
 
 @compiled
-def _arm_and_base_targets(rest, fastest, slew, period, moved, command, memory):  # type: ignore[no-untyped-def]
+def _arm_and_base_targets(rest, fastest, slew, period, moved, command, memory):
     out = np.empty((len(command), len(rest) + 2))
     n = len(rest)
     for k in range(len(command)):
@@ -70,7 +70,7 @@ def _arm_and_base_targets(rest, fastest, slew, period, moved, command, memory): 
 
 
 @compiled
-def _commanded_targets(moved, period, command, memory):  # type: ignore[no-untyped-def]
+def _commanded_targets(moved, period, command, memory):
     out = command.copy()
     n = command.shape[1] - 2
     for k in range(len(command)):
@@ -87,7 +87,7 @@ def _commanded_targets(moved, period, command, memory):  # type: ignore[no-untyp
 
 
 @compiled
-def _base_motion(rotation, velocity, angular_velocity_body):  # type: ignore[no-untyped-def]
+def _base_motion(rotation, velocity, angular_velocity_body):
     """Return how fast bases go ahead and turn, m/s and rad/s, shape ``(k, 2)``."""
     out = np.empty((len(rotation), 2))
     for k in range(len(rotation)):

@@ -85,7 +85,7 @@ class _OwnOutline(NamedTuple):
 
 
 @compiled
-def _write_neighbours(found, count, bodies, own, reach):  # type: ignore[no-untyped-def]
+def _write_neighbours(found, count, bodies, own, reach):
     """Write those near a robot into `found`, after the first `count`, and return how many there are then.
 
     What lies on it, with its middle within its outline, is not near but part of it.
@@ -143,7 +143,7 @@ class NearbyBodies:
 
 
 @compiled
-def progress(path, start, x, y):  # type: ignore[no-untyped-def]
+def progress(path, start, x, y):
     """Metres along `path` of the point nearest to x, y, not before `start` and at most 3 m after it."""
     best, best_gap, at = start, 1e18, 0.0
     for k in range(len(path) - 1):
@@ -164,7 +164,7 @@ def progress(path, start, x, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def point_at(path, s):  # type: ignore[no-untyped-def]
+def point_at(path, s):
     """Point `s` metres along a path (its end beyond that)."""
     at = 0.0
     for k in range(len(path) - 1):
@@ -178,7 +178,7 @@ def point_at(path, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def path_length(path):  # type: ignore[no-untyped-def]
+def path_length(path):
     """Metres from the first to the last point."""
     total = 0.0
     for k in range(len(path) - 1):
@@ -187,14 +187,14 @@ def path_length(path):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _gap(x, y, ox, oy, other):  # type: ignore[no-untyped-def]
+def _gap(x, y, ox, oy, other):
     """Return the distance from a point to a neighbour that is at (ox, oy); negative inside a rectangle."""
     core = Rectangle(ox, oy, math.cos(other.yaw), math.sin(other.yaw), other.half_length, other.half_width)
     return point_gap(x, y, core) - other.rounding
 
 
 @compiled
-def _least_gap(x, y, other, seconds):  # type: ignore[no-untyped-def]
+def _least_gap(x, y, other, seconds):
     """Return how near a neighbour that goes straight on comes to a point within some seconds, metres."""
     gap = 1e9
     for wait in range(int(seconds / 0.5) + 1):
@@ -204,7 +204,7 @@ def _least_gap(x, y, other, seconds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[no-untyped-def]
+def free_ahead(x, y, yaw, speed, outline, path, along, others):
     """Return the metres the nose can go along the way before it comes too near anybody, and who that is (-1: nobody).
 
     The robot is followed along its path at `speed`, everybody else along a straight line at their velocity for
@@ -245,7 +245,7 @@ def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[
 
 
 @compiled
-def room_to_turn(x, y, radius, others):  # type: ignore[no-untyped-def]
+def room_to_turn(x, y, radius, others):
     """Return whether nobody stands within `radius` of x, y."""
     is_free = True
     for other in others:

@@ -331,7 +331,7 @@ _SPEEDS = (6.0, 3.0, 1.5)
 
 
 @compiled
-def _raise_triangles(tops, half, corners):  # type: ignore[no-untyped-def]
+def _raise_triangles(tops, half, corners):
     """Raise all cells that triangles may cover to their heights there."""
     n = len(tops)
     for t in range(len(corners)):

@@ -79,7 +79,7 @@ def gusts_of(seed: int) -> Gusts:
 
 
 @compiled
-def air_at(gusts, mean, position, above, seconds, out):  # type: ignore[no-untyped-def]
+def air_at(gusts, mean, position, above, seconds, out):
     """Write how the air moves, m/s, ENU.
 
     Parameters
@@ -279,7 +279,7 @@ class _RotorSettings(NamedTuple):
 
 
 @compiled
-def _turn_rotors(settings, row, rotors, step):  # type: ignore[no-untyped-def]
+def _turn_rotors(settings, row, rotors, step):
     """Let the rotors of a robot follow their commands for a step; return the mean square of each one's speed."""
     speed, wanted, turned, charge = rotors
     squares = np.empty(speed.shape[1])
@@ -295,7 +295,7 @@ def _turn_rotors(settings, row, rotors, step):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _push(settings, body, squares, out):  # type: ignore[no-untyped-def]
+def _push(settings, body, squares, out):
     """Write force and torque on a robot, in its frame; return the sum of its rotors' thrusts to the power of 1.5.
 
     `body` is how the air moves past it, in its frame, m/s.
@@ -322,7 +322,7 @@ def _push(settings, body, squares, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _push_all(settings, gusts, motion, rotors, wind, step, seconds):  # type: ignore[no-untyped-def]
+def _push_all(settings, gusts, motion, rotors, wind, step, seconds):
     """Let rotors turn and batteries drain for a step; return forces and torques on all robots, shape ``(k, 6)``."""
     position, velocity, rotation, above = motion
     charge = rotors[3]
@@ -384,7 +384,7 @@ class Airframe(NamedTuple):
 
 
 @compiled
-def _follow(frame, seconds, motion, setpoint, integral, wanted):  # type: ignore[no-untyped-def]
+def _follow(frame, seconds, motion, setpoint, integral, wanted):
     """Move what is followed on by some seconds, and write the acceleration that follows it."""
     position, velocity = motion
     for k in range(3):
@@ -401,7 +401,7 @@ def _follow(frame, seconds, motion, setpoint, integral, wanted):  # type: ignore
 
 
 @compiled
-def _attitude(frame, acceleration, heading, out):  # type: ignore[no-untyped-def]
+def _attitude(frame, acceleration, heading, out):
     """Write the rotation that pushes along an acceleration beside gravity's; return the thrust, newtons."""
     up = acceleration[2] + _GRAVITY
     up = max(up, 0.3 * _GRAVITY)
@@ -424,7 +424,7 @@ def _attitude(frame, acceleration, heading, out):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _torque(frame, rotation, rates, wanted, turning, out):  # type: ignore[no-untyped-def]
+def _torque(frame, rotation, rates, wanted, turning, out):
     """Write the torque, Nm in the robot's frame, that turns it towards an attitude."""
     error = np.zeros(3)
     for i in range(3):
@@ -445,7 +445,7 @@ def _torque(frame, rotation, rates, wanted, turning, out):  # type: ignore[no-un
 
 
 @compiled
-def _room(base, change, low, high):  # type: ignore[no-untyped-def]
+def _room(base, change, low, high):
     """Return the largest share, 0..1, of a change that keeps all of `base` plus it within bounds."""
     share = 1.0
     for k in range(len(base)):
@@ -457,7 +457,7 @@ def _room(base, change, low, high):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _mix(frame, thrust, torque, out):  # type: ignore[no-untyped-def]
+def _mix(frame, thrust, torque, out):
     """Write the rotor speeds, rad/s, that give a torque that tilts (Nm), a thrust (N) and a torque that turns.
 
     As much of each as there is room for beside the one before.
@@ -487,7 +487,7 @@ def _mix(frame, thrust, torque, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fly_all(frame, seconds, motion, setpoints, memory):  # type: ignore[no-untyped-def]
+def _fly_all(frame, seconds, motion, setpoints, memory):
     """Return rotor speeds of all robots, rad/s, shape ``(k, rotors)``."""
     position, velocity, rotation, rates = motion
     out = np.empty((len(setpoints), len(frame.turns)))

@@ -52,7 +52,7 @@ class LegGeometry(NamedTuple):
 
 
 @compiled
-def leg_angles(x, y, z, side, legs):  # type: ignore[no-untyped-def]
+def leg_angles(x, y, z, side, legs):
     """Return the angles (hip, thigh, calf) that bring a foot to x, y, z in the frame of its hip.
 
     `side` is 1 on the left, -1 on the right; `legs` is a `LegGeometry`. Points out of reach are brought to
@@ -83,7 +83,7 @@ _FOOT_X, _FOOT_Y, _LIFTED_X, _LIFTED_Y = range(4)
 
 
 @compiled
-def trot(memory, command, moving, tilt, legs, dt):  # type: ignore[no-untyped-def]
+def trot(memory, command, moving, tilt, legs, dt):
     """Advance the feet by `dt` and return the twelve joint angles.
 
     `memory` holds the phase, then for every leg the foot's x, y and where it left the ground (x, y). `command` and
@@ -125,7 +125,7 @@ def trot(memory, command, moving, tilt, legs, dt):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _trot_all(geometry, limits, motion, command, memory, dt):  # type: ignore[no-untyped-def]
+def _trot_all(geometry, limits, motion, command, memory, dt):
     """Advance the feet of all robots and return their joint angles, shape ``(k, 12)``."""
     rotation, velocity, angular_velocity_body = motion
     low, high = limits
@@ -170,7 +170,7 @@ _LIMIT = 100.0
 
 
 @compiled
-def _elu(values):  # type: ignore[no-untyped-def]
+def _elu(values):
     """Replace what is negative by exp(x) - 1, to 3e-7 of it.
 
     A polynomial for x / 64, doubled six times: without a branch or a call, so that all of it is vectorised.
@@ -190,7 +190,7 @@ def _elu(values):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def dense_layer(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
+def dense_layer(inputs, weights, bias, last):
     """One layer of all robots, shape ``(k, outputs)``.
 
     Summed input by input: vectorised over outputs, in one order whatever the machine's BLAS and however many robots.
@@ -224,7 +224,7 @@ _OBSERVED = 45
 
 
 @compiled
-def _evaluate(layers, motion, command, memory, pose):  # type: ignore[no-untyped-def]
+def _evaluate(layers, motion, command, memory, pose):
     """Return joint targets in the model's order, shape ``(k, 12)``; `memory` becomes the actions."""
     order, rest, scale = pose
     rotation, angular_velocity_body, angles, speeds = motion
@@ -334,7 +334,7 @@ class LegSettings(NamedTuple):
 
 
 @compiled
-def _stand_or_walk(settings, motion, angles, command, memory, wanted):  # type: ignore[no-untyped-def]
+def _stand_or_walk(settings, motion, angles, command, memory, wanted):
     """Decide whether each robot walks; move those that stand towards rest, and set `wanted` of those that walk.
 
     Parameters

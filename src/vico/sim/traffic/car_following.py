@@ -87,7 +87,7 @@ class VehicleView(NamedTuple):
 
 
 @compiled
-def bodies_around(v, x, y, reach, surroundings):  # type: ignore[no-untyped-def]
+def bodies_around(v, x, y, reach, surroundings):
     """Return the bodies within `reach` metres of a point on body v's level, but v, dtype `NEARBY_BODY`.
 
     They are valid until this is called again with the same surroundings.
@@ -97,7 +97,7 @@ def bodies_around(v, x, y, reach, surroundings):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[no-untyped-def]
+def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):
     """Write those of the candidates within `reach` metres of a point, on body v's level, into `buffer`; return them.
 
     `candidates` are indices of bodies, in ascending order, as from `vico.sim.bodies.footprints.search`; v is left out.
@@ -126,7 +126,7 @@ def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[n
 
 
 @compiled
-def touches(rectangle, one):  # type: ignore[no-untyped-def]
+def touches(rectangle, one):
     """Return whether a rectangle touches a nearby body."""
     if one.half_length == 0.0 and one.half_width == 0.0:
         return point_gap(one.x, one.y, rectangle) <= one.rounding
@@ -137,7 +137,7 @@ def touches(rectangle, one):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_BODY):  # type: ignore[no-untyped-def]
+def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_BODY):
     """Return the row of the first of `bodies` that a vehicle with its front at s = `front` would touch, or `NONE`.
 
     Sideways it keeps the given gaps from vehicles and people, metres. Bodies from index `below` on do not count, but
@@ -147,7 +147,7 @@ def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_
 
 
 @compiled
-def _touched_from(pose, outline, bodies, vehicle_gap, person_gap, below):  # type: ignore[no-untyped-def]
+def _touched_from(pose, outline, bodies, vehicle_gap, person_gap, below):
     """As `touched_at`, of a vehicle that is where `footprint` says."""
     cx, cy, c, s = pose
     length, width = outline.length / 2, outline.half_width
@@ -167,7 +167,7 @@ def _touched_from(pose, outline, bodies, vehicle_gap, person_gap, below):  # typ
 
 
 @compiled
-def _path_box(path, front, reach):  # type: ignore[no-untyped-def]
+def _path_box(path, front, reach):
     """Return the least and greatest x and y of the path from the front to a little beyond `reach` metres ahead."""
     left, low, right, high = 1e18, 1e18, -1e18, -1e18
     for p in range(len(path)):
@@ -184,7 +184,7 @@ def _path_box(path, front, reach):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _near_path(path, outline, front, reach, one):  # type: ignore[no-untyped-def]
+def _near_path(path, outline, front, reach, one):
     """Return whether a body is near the path ahead, and the front's s from which on it may be met."""
     close = outline.half_width + one.radius + _NEAR_PATH
     for p in range(len(path) - 1):
@@ -210,7 +210,7 @@ def _near_path(path, outline, front, reach, one):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _sort_by_contact(path, outline, front, bodies):  # type: ignore[no-untyped-def]
+def _sort_by_contact(path, outline, front, bodies):
     """Put the bodies whose gap the vehicle keeps already before those it is beside; return the former's number."""
     cx, cy, c, s = footprint(path, outline, front)
     apart = 0
@@ -227,7 +227,7 @@ def _sort_by_contact(path, outline, front, bodies):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # type: ignore[no-untyped-def]
+def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):
     """Return the metres the front can go before it touches the one body, known to be between `low` and `high`."""
     for _ in range(4):
         middle = (low + high) / 2
@@ -239,7 +239,7 @@ def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # t
 
 
 @inlined
-def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
+def find_leader(view, front, reach, buffer):
     """Return the gap to the first body on the path and its index; `NO_GAP` and `NONE` without one within `reach`."""
     path, outline, nearby = view.path, view.outline, view.nearby
     m = 0
@@ -289,19 +289,19 @@ _LEAST_SPEED = 0.02  # slower is standing, m/s
 
 
 @compiled
-def look_ahead(vehicle):  # type: ignore[no-untyped-def]
+def look_ahead(vehicle):
     """Return how far ahead a vehicle minds what is there: braking distance, time gap and a little more, metres."""
     return vehicle.speed * vehicle.speed / (2 * vehicle.braking) + vehicle.speed * vehicle.time_gap + 8.0
 
 
 @compiled
-def braking_distance(vehicle):  # type: ignore[no-untyped-def]
+def braking_distance(vehicle):
     """Return the metres a vehicle needs to stop comfortably, and a little more."""
     return vehicle.speed * vehicle.speed / (2 * vehicle.braking) + 8.0
 
 
 @compiled
-def leader_speed(shapes, leader, view, front):  # type: ignore[no-untyped-def]
+def leader_speed(shapes, leader, view, front):
     """Return how fast the leader moves along the path where the vehicle would meet it, m/s; at least 0."""
     if leader < 0:
         return 0.0
@@ -310,7 +310,7 @@ def leader_speed(shapes, leader, view, front):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def idm_acceleration(vehicle, desired, gap, leading):  # type: ignore[no-untyped-def]
+def idm_acceleration(vehicle, desired, gap, leading):
     """Return the Intelligent Driver Model's acceleration, m/s^2.
 
     Parameters
@@ -329,7 +329,7 @@ def idm_acceleration(vehicle, desired, gap, leading):  # type: ignore[no-untyped
 
 
 @compiled
-def next_speed(vehicle, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-def]
+def next_speed(vehicle, rate, limit, gap, stop, dt):
     """Return the speed after `dt` seconds: the model's, within the limit, short of the leader and of the stop.
 
     The last two hold even where no tyre brakes so hard: vehicles never touch.
@@ -346,7 +346,7 @@ def next_speed(vehicle, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-
 
 
 @compiled
-def clip_leader_before_stop(stop, gap, leader):  # type: ignore[no-untyped-def]
+def clip_leader_before_stop(stop, gap, leader):
     """Return gap and leader; none if it is well beyond where the vehicle stops anyway."""
     if gap > stop + _BEYOND_STOP:
         return NO_GAP, NONE

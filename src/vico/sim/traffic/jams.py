@@ -115,7 +115,7 @@ _GIVES_WAY_FOR = 25.0  # s after which a vehicle that lets another one pass does
 
 
 @compiled
-def _block_each_other(vehicle, other):  # type: ignore[no-untyped-def]
+def _block_each_other(vehicle, other):
     """Return whether both, one behind the other, have stood for a while, and not at a stop."""
     if other.gives_way_to == vehicle.index:
         return True
@@ -123,7 +123,7 @@ def _block_each_other(vehicle, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _plans_over(vehicle, lane):  # type: ignore[no-untyped-def]
+def _plans_over(vehicle, lane):
     """Return whether a vehicle is going to take a lane."""
     takes = False
     for k in range(vehicle.planned_count):
@@ -132,7 +132,7 @@ def _plans_over(vehicle, lane):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
+def _gives_way_head_on(net, vehicle, other):
     """Return whether `other`, of two in each other's way, backs up.
 
     Who already does; else the one that follows the other's way; the one outside the junction; a car rather than a bus;
@@ -149,7 +149,7 @@ def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _drives_before(shapes, other, vehicle):  # type: ignore[no-untyped-def]
+def _drives_before(shapes, other, vehicle):
     """Return whether `other` is ahead of a vehicle and headed as it is, as in a queue; beside it, it is in its way."""
     v, o = vehicle.index, other.index
     if other.lane == vehicle.lane and other.lateral_offset == 0.0:
@@ -160,13 +160,13 @@ def _drives_before(shapes, other, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _waits_beside_way(net, vehicle, other):  # type: ignore[no-untyped-def]
+def _waits_beside_way(net, vehicle, other):
     """Return whether `other` waits for a junction on another street than those that a vehicle takes: no queue."""
     return waits_outside(net, other) and other.lane != vehicle.lane and not _plans_over(vehicle, other.lane)
 
 
 @compiled
-def _have_passed(shapes, vehicle, other):  # type: ignore[no-untyped-def]
+def _have_passed(shapes, vehicle, other):
     """Return whether a vehicle that lets another one pass need not wait for it any more."""
     v, o = vehicle.index, other.index
     if other.blocker == v:
@@ -178,14 +178,14 @@ def _have_passed(shapes, vehicle, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _leaves_no_way(net, vehicle, shapes, b):  # type: ignore[no-untyped-def]
+def _leaves_no_way(net, vehicle, shapes, b):
     """Return whether a vehicle in a junction stands in the way of a person who looks for one round it, body b."""
     moves = shapes.vx[b] ** 2 + shapes.vy[b] ** 2 > _LOOKS_FOR_WAY**2
     return net.lanes[vehicle.lane].junction >= 0 and vehicle.stopped_time > _BACK_UP_FOR_PERSON and moves
 
 
 @compiled
-def vehicles_backing_up(net, fleet, shapes, dt):  # type: ignore[no-untyped-def]
+def vehicles_backing_up(net, fleet, shapes, dt):
     """Return for each vehicle whether it backs up in this step, bool, shape ``(vehicles,)``; note whom it lets pass."""
     for vehicle in fleet:
         o = vehicle.gives_way_to
@@ -218,7 +218,7 @@ def vehicles_backing_up(net, fleet, shapes, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def leaves_room_for(fleet, v, gap, leader):  # type: ignore[no-untyped-def]
+def leaves_room_for(fleet, v, gap, leader):
     """Return whether vehicle v, `gap` metres behind its leader, stays there because that one lets another one pass."""
     if not 0 <= leader < len(fleet) or gap > _ROOM:
         return False

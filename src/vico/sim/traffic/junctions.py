@@ -33,7 +33,7 @@ _QUEUE_LEAD, _QUEUE_LEAST = 5.0, 10.0  # s that somebody has to have waited long
 
 
 @compiled
-def holds(vehicle, junction):  # type: ignore[no-untyped-def]
+def holds(vehicle, junction):
     """Return whether a vehicle has been let into a junction cluster and has not left it."""
     found = False
     for h in range(HELD_JUNCTIONS):
@@ -42,7 +42,7 @@ def holds(vehicle, junction):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def holds_junction(vehicle):  # type: ignore[no-untyped-def]
+def holds_junction(vehicle):
     """Return whether a vehicle holds any junction."""
     found = False
     for h in range(HELD_JUNCTIONS):
@@ -51,13 +51,13 @@ def holds_junction(vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _cannot_leave_before(other, vehicle):  # type: ignore[no-untyped-def]
+def _cannot_leave_before(other, vehicle):
     """Return whether vehicle `other` cannot leave its junction before this one, in its way, has gone."""
     return other.blocker == vehicle.index and other.stopped_time > _LET_OUT_AFTER
 
 
 @compiled
-def _keeps_somebody_inside(fleet, vehicle, junction):  # type: ignore[no-untyped-def]
+def _keeps_somebody_inside(fleet, vehicle, junction):
     """Return whether somebody cannot leave a junction before this vehicle, in its way, has gone."""
     found = False
     for other in fleet:
@@ -66,20 +66,20 @@ def _keeps_somebody_inside(fleet, vehicle, junction):  # type: ignore[no-untyped
 
 
 @compiled
-def is_overtaken(longest_wait, wait):  # type: ignore[no-untyped-def]
+def is_overtaken(longest_wait, wait):
     """Return whether it is the turn of another vehicle, that has waited so long, s."""
     return longest_wait > max(wait + _QUEUE_LEAD, _QUEUE_LEAST)
 
 
 @compiled
-def counted_wait(junctions, vehicle):  # type: ignore[no-untyped-def]
+def counted_wait(junctions, vehicle):
     """Return how long a vehicle has waited for a junction, as it counts in queues, s."""
     is_patient = junctions.claims.any_shared and vehicle.length > _LONG
     return vehicle.junction_wait * (_LONG_COUNTS if is_patient else 1.0)
 
 
 @compiled
-def _is_taken(net, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
+def _is_taken(net, junctions, vehicle, lane):
     """Return whether others in the shared junction that a lane is in are in a vehicle's way there."""
     junction, me, claims = net.lanes[lane].junction, vehicle.index, junctions.claims
     holder, alone = junctions.holder[junction], claims.alone[junction]
@@ -96,7 +96,7 @@ def _is_taken(net, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_others_turn(net, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
+def _is_others_turn(net, junctions, vehicle, lane):
     """Return whether others, whom a vehicle would be in the way of on a lane in a junction, have waited longer."""
     wait = counted_wait(junctions, vehicle)
     if is_overtaken(junctions.longest_wait[net.lanes[lane].junction], wait):
@@ -108,7 +108,7 @@ def _is_others_turn(net, junctions, vehicle, lane):  # type: ignore[no-untyped-d
 
 
 @compiled
-def entry_conflict(net, fleet, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
+def entry_conflict(net, fleet, junctions, vehicle, lane):
     """Return what stands against a vehicle's entering a lane in a junction: `FREE`, `LETS_OUT` or `TAKEN`."""
     junction = net.lanes[lane].junction
     if not junctions.claims.exclusive[junction]:
@@ -126,13 +126,13 @@ def entry_conflict(net, fleet, junctions, vehicle, lane):  # type: ignore[no-unt
 
 
 @compiled
-def _shared_holder(holder, vehicle):  # type: ignore[no-untyped-def]
+def _shared_holder(holder, vehicle):
     """Return who has what `holder` has when a vehicle has it, too."""
     return vehicle.index if holder == NONE or holder == vehicle.index else SEVERAL
 
 
 @compiled
-def _note_taken(net, junctions, vehicle):  # type: ignore[no-untyped-def]
+def _note_taken(net, junctions, vehicle):
     """Note on which lanes a vehicle in a junction is, from its rear on, or has been let over."""
     claims, is_inside = junctions.claims, False
     for h in range(HELD_JUNCTIONS):
@@ -158,7 +158,7 @@ def _note_taken(net, junctions, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take_junctions(net, junctions, vehicle, first, last):  # type: ignore[no-untyped-def]
+def take_junctions(net, junctions, vehicle, first, last):
     """Let a vehicle into the junctions of its planned lanes from `first` to before `last`; False if it holds too many.
 
     Whoever holds a junction that had another occupant before is its occupant now.
@@ -185,7 +185,7 @@ def take_junctions(net, junctions, vehicle, first, last):  # type: ignore[no-unt
 
 
 @compiled
-def _is_inside(net, vehicle, junction):  # type: ignore[no-untyped-def]
+def _is_inside(net, vehicle, junction):
     """Return whether a vehicle's body is in a junction or may still drive into it."""
     inside = net.lanes[vehicle.lane].junction == junction
     for k in range(vehicle.granted_count):
@@ -201,7 +201,7 @@ def _is_inside(net, vehicle, junction):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def release_junctions(net, junctions, vehicle):  # type: ignore[no-untyped-def]
+def release_junctions(net, junctions, vehicle):
     """Give back the junctions that the vehicle's body has left and that are not granted ahead."""
     for h in range(HELD_JUNCTIONS):
         junction = vehicle.held_junctions[h]
@@ -216,7 +216,7 @@ def release_junctions(net, junctions, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
+def release_all_junctions(junctions, vehicle):
     """Give back every junction a vehicle holds."""
     for h in range(HELD_JUNCTIONS):
         if vehicle.held_junctions[h] >= 0:
@@ -227,7 +227,7 @@ def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def note_claims(net, fleet, junctions):  # type: ignore[no-untyped-def]
+def note_claims(net, fleet, junctions):
     """Note who is where in shared junctions, and how long the first in each queue has waited.
 
     There are queues for junctions, for lanes through shared ones, and for room on the lanes beyond.
@@ -288,7 +288,7 @@ class TrackAhead(NamedTuple):
 
 
 @compiled
-def track_ahead(net, vehicle, look):  # type: ignore[no-untyped-def]
+def track_ahead(net, vehicle, look):
     """Return the first tracks ahead of a vehicle, within `look` metres, that it is not on and may have to wait for."""
     found = TrackAhead(NEVER, NEVER, NEVER, False)
     if len(net.tracks) == 0 or vehicle.stopping != DRIVING or holds_junction(vehicle):
@@ -311,7 +311,7 @@ def track_ahead(net, vehicle, look):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def asks_with_track(track, braking):  # type: ignore[no-untyped-def]
+def asks_with_track(track, braking):
     """Return from how many metres before a junction a vehicle asks for it, its braking distance without tracks.
 
     Where there is no room between tracks and the junction behind them it takes both at once.
@@ -321,7 +321,7 @@ def asks_with_track(track, braking):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def distance_to_track(track, vehicle, stop_distance, gap, leading):  # type: ignore[no-untyped-def]
+def distance_to_track(track, vehicle, stop_distance, gap, leading):
     """Return the metres to where a vehicle stops before tracks; `NEVER` where it may drive on over them.
 
     Parameters
@@ -338,7 +338,7 @@ def distance_to_track(track, vehicle, stop_distance, gap, leading):  # type: ign
 
 
 @compiled
-def crosses_called_track(net, vehicle, first, last, end, s, start):  # type: ignore[no-untyped-def]
+def crosses_called_track(net, vehicle, first, last, end, s, start):
     """Return whether a tram comes where a vehicle would drive, on its planned lanes from `first` to before `end`.
 
     Parameters
@@ -358,7 +358,7 @@ def crosses_called_track(net, vehicle, first, last, end, s, start):  # type: ign
 
 
 @compiled
-def _note_behind(net, vehicle, taken):  # type: ignore[no-untyped-def]
+def _note_behind(net, vehicle, taken):
     """Note the tracks that a vehicle's body is on behind the lane that its front is on."""
     rear, k = vehicle.offset - vehicle.length, 0
     while rear < 0.0 and k < PREVIOUS_LANES and vehicle.previous_lanes[k] != NONE:
@@ -370,7 +370,7 @@ def _note_behind(net, vehicle, taken):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _note_ahead(net, vehicle, taken):  # type: ignore[no-untyped-def]
+def _note_ahead(net, vehicle, taken):
     """Note the tracks that a vehicle is on with its front, has been let over, or cannot stop before."""
     reach, room = vehicle.speed * vehicle.speed / (2 * vehicle.braking), vehicle.length + STANDING_ROOM
     ahead, holds, rear = -vehicle.offset, holds_junction(vehicle), vehicle.offset - vehicle.length
@@ -388,7 +388,7 @@ def _note_ahead(net, vehicle, taken):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def crossed_tracks(net, fleet):  # type: ignore[no-untyped-def]
+def crossed_tracks(net, fleet):
     """Return where vehicles are on tracks or will not stop before them, bool, shape ``(track crossings,)``."""
     taken = np.zeros(len(net.tracks), np.bool_)
     for vehicle in fleet:
@@ -448,7 +448,7 @@ class JunctionExit(NamedTuple):
 
 
 @inlined
-def next_junction_request(net, vehicle, stop_distance, braking_distance, path_ends):  # type: ignore[no-untyped-def]
+def next_junction_request(net, vehicle, stop_distance, braking_distance, path_ends):
     """Return the first junction within the braking distance, and before its stop, that a vehicle was not let into."""
     index = NONE
     distance = net.lanes[vehicle.lane].length - vehicle.offset
@@ -465,7 +465,7 @@ def next_junction_request(net, vehicle, stop_distance, braking_distance, path_en
 
 
 @compiled
-def _find_exit(net, junctions, vehicle, request):  # type: ignore[no-untyped-def]
+def _find_exit(net, junctions, vehicle, request):
     """Return where a vehicle can stand clear of junctions after those it asks for."""
     s = vehicle.offset + request.distance
     clear = 0.0
@@ -497,14 +497,14 @@ def _find_exit(net, junctions, vehicle, request):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _exit_is_long_enough(vehicle, request, leave):  # type: ignore[no-untyped-def]
+def _exit_is_long_enough(vehicle, request, leave):
     """Return whether a vehicle fits behind the junctions; where a car leaves the map it need not."""
     leaves_map = request.path_ends and leave.end == vehicle.planned_count and vehicle.route < 0
     return leave.clear >= leave.to_come + vehicle.length + STANDING_ROOM or leaves_map
 
 
 @compiled
-def _who_is_at_exit(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
+def _who_is_at_exit(vehicle, leave, view, vehicles):
     """Return the first vehicle that is where this one would stand, or `NONE`: whoever stands there may stay."""
     if leave.start < 0.0:
         return NONE
@@ -521,13 +521,13 @@ def _who_is_at_exit(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-
 
 
 @compiled
-def waits_outside(net, vehicle):  # type: ignore[no-untyped-def]
+def waits_outside(net, vehicle):
     """Return whether a vehicle waits for a junction before it: for ever, if who has waited longer cannot pass it."""
     return vehicle.junction_wait > 0.0 and vehicle.granted_count == 0 and net.lanes[vehicle.lane].junction < 0
 
 
 @compiled
-def _way_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
+def _way_is_free(vehicle, leave, view, vehicles):
     """Return whether no vehicle is on the whole way through the junctions."""
     there = vehicle.offset + 0.5
     x, y, _, _ = point_on_path(view.path, there)
@@ -540,7 +540,7 @@ def _way_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def
 
 
 @compiled
-def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  # type: ignore[no-untyped-def]
+def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):
     """Return whether a vehicle may enter the junctions from the requested one up to its exit.
 
     Nobody else may have them or have waited longer for them, pedestrians go first, and the exit must have room. One
@@ -580,7 +580,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
 
 
 @inlined
-def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: ignore[no-untyped-def]
+def request_junctions(net, fleet, junctions, vehicle, request, view):
     """Ask for the junctions ahead; return whether the vehicle has them now."""
     leave = _find_exit(net, junctions, vehicle, request)
     if not may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):
@@ -589,7 +589,7 @@ def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: i
 
 
 @compiled
-def is_hesitating(net, vehicle):  # type: ignore[no-untyped-def]
+def is_hesitating(net, vehicle):
     """Return whether a vehicle was let into a junction but has not got going: then it is in everybody's way."""
     return vehicle.granted_count > 0 and vehicle.stopped_time > _HESITATION and net.lanes[vehicle.lane].junction < 0
 

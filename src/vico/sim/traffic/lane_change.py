@@ -36,7 +36,7 @@ _ON_IT, _WELL_ON_IT = 3.0, 6.0
 
 
 @compiled
-def route_lane_beside(net, vehicle):  # type: ignore[no-untyped-def]
+def route_lane_beside(net, vehicle):
     """Return the neighbour lane on which a bus's route goes on, -1 where it goes straight on; buses only."""
     beside = route_lane(net, vehicle, 1)
     lane = net.lanes[vehicle.lane]
@@ -44,7 +44,7 @@ def route_lane_beside(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
+def room_to_change(net, vehicle):
     """Return the metres before its lane's end at which a bus waits for room in the lane beside.
 
     So many that it ends this lane change, and those that follow it, before the junction; but not before it may change.
@@ -60,7 +60,7 @@ def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def earliest_lane_change(vehicle):  # type: ignore[no-untyped-def]
+def earliest_lane_change(vehicle):
     """Return the metres along its lane from which a vehicle may change to another: all of it is on the lane by then."""
     first = vehicle.length + _ON_IT
     if vehicle.lateral_offset != 0.0:
@@ -69,7 +69,7 @@ def earliest_lane_change(vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _behind_place(net, vehicle):  # type: ignore[no-untyped-def]
+def _behind_place(net, vehicle):
     """Return where others stop behind a car that backs into a place, has waited long to leave one, or delivers, m."""
     place = net.places[vehicle.place]
     if place.lot != NONE:
@@ -84,7 +84,7 @@ def _behind_place(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def places_to_let_in(net, fleet, shapes):  # type: ignore[no-untyped-def]
+def places_to_let_in(net, fleet, shapes):
     """Return for each lane where vehicles stop to let others in: metres along it, else `NEVER`.
 
     That is a bus that waits beside it, or who does not get past those who wait at its end.
@@ -110,7 +110,7 @@ def places_to_let_in(net, fleet, shapes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def distance_to_let_in(vehicle, places):  # type: ignore[no-untyped-def]
+def distance_to_let_in(vehicle, places):
     """Return the metres to where a vehicle stops to let a bus in on its lane; `NEVER` if it need not or cannot.
 
     Who has a junction ahead drives on: it would keep the bus and others from it.
@@ -135,7 +135,7 @@ _LEAST_LANE = 18.0  # m of lane that have to be left for a car to change
 
 
 @compiled
-def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-untyped-def]
+def wants_lane_change(net, vehicle, gap, leading, wanted):
     """Return whether a car is in a queue, has not changed lanes lately, and has the room to do it.
 
     Parameters
@@ -151,7 +151,7 @@ def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-un
 
 
 @compiled
-def _vehicles_on(net, fleet, lane):  # type: ignore[no-untyped-def]
+def _vehicles_on(net, fleet, lane):
     count = 0
     for vehicle in fleet:
         is_parked = vehicle.stopping > APPROACHING and not net.places[vehicle.place].delivery
@@ -160,12 +160,12 @@ def _vehicles_on(net, fleet, lane):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_open(net, lane):  # type: ignore[no-untyped-def]
+def _is_open(net, lane):
     return lane >= 0 and not net.lanes[lane].closed and not net.lanes[lane].shut
 
 
 @compiled
-def wants_to_overtake_cyclist(net, vehicle, view, ahead, wanted):  # type: ignore[no-untyped-def]
+def wants_to_overtake_cyclist(net, vehicle, view, ahead, wanted):
     """Return whether the one ahead rides a bicycle, resident or not, too slowly for a car that has not changed lately.
 
     Parameters
@@ -185,7 +185,7 @@ def wants_to_overtake_cyclist(net, vehicle, view, ahead, wanted):  # type: ignor
 
 
 @inlined
-def choose_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: ignore[no-untyped-def]
+def choose_lane(net, fleet, vehicle, view, stop_distance, ahead):
     """Change lanes as the route does, past a delivery, to the kerb, past a cyclist, or out of a queue.
 
     Parameters
@@ -223,7 +223,7 @@ def choose_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: ignor
 
 
 @compiled
-def _somebody_comes_up(vehicle, lateral_offset, view):  # type: ignore[no-untyped-def]
+def _somebody_comes_up(vehicle, lateral_offset, view):
     """Return whether somebody on the other lane would have to brake for a vehicle that changes onto it.
 
     That lane is `lateral_offset` metres to the right.
@@ -241,7 +241,7 @@ def _somebody_comes_up(vehicle, lateral_offset, view):  # type: ignore[no-untype
 
 
 @compiled
-def _can_swing_out(path, swerving, offset, places, view):  # type: ignore[no-untyped-def]
+def _can_swing_out(path, swerving, offset, places, view):
     """Return whether a vehicle touches nobody at the first so many places of its lane change."""
     for i in range(places):
         there = offset + _SWING_OUT * i / _PLACES
@@ -251,7 +251,7 @@ def _can_swing_out(path, swerving, offset, places, view):  # type: ignore[no-unt
 
 
 @compiled
-def is_gap_accepted(net, vehicle, target, offset, lateral_offset, view):  # type: ignore[no-untyped-def]
+def is_gap_accepted(net, vehicle, target, offset, lateral_offset, view):
     """Return whether nobody is in the way on lane `target`, from a gap behind to the end of the lane change.
 
     Parameters
@@ -276,7 +276,7 @@ def is_gap_accepted(net, vehicle, target, offset, lateral_offset, view):  # type
 
 
 @compiled
-def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
+def change_lane(net, vehicle, target, view):
     """Put a vehicle on a neighbour lane if there is a gap; True if it is there now.
 
     Its place on the ground changes gradually.

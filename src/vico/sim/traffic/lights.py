@@ -22,7 +22,7 @@ _BLINKS = 3.0  # times a second that indicators go on or off
 
 
 @compiled
-def shown_lights(net, vehicle, speed_before, dt):  # type: ignore[no-untyped-def]
+def shown_lights(net, vehicle, speed_before, dt):
     """Return the lights that a vehicle shows: whether it brakes or stands, and where it turns or changes lanes to."""
     if vehicle.is_bicycle:
         return 0

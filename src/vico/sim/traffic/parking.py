@@ -68,12 +68,12 @@ _SIDE = 1.0  # m: places nearer to the lane's middle are in the lane
 
 
 @compiled
-def _front_in_place(net, vehicle):  # type: ignore[no-untyped-def]
+def _front_in_place(net, vehicle):
     return net.places[vehicle.place].middle + vehicle.length / 2
 
 
 @compiled
-def is_car_park_busy(net, fleet, vehicle, lot, k=NONE):  # type: ignore[no-untyped-def]
+def is_car_park_busy(net, fleet, vehicle, lot, k=NONE):
     """Return whether another car is on its way in a car park, into it or out of it; or has place k.
 
     Nor does one come in (k given) while one waits to get out.
@@ -88,7 +88,7 @@ def is_car_park_busy(net, fleet, vehicle, lot, k=NONE):  # type: ignore[no-untyp
 
 
 @compiled
-def _is_free(net, fleet, vehicle, k):  # type: ignore[no-untyped-def]
+def _is_free(net, fleet, vehicle, k):
     """Return whether nobody has place k or one near it, its street has no delivery, and nobody is close behind."""
     place = net.places[k]
     if place.lot != NONE:
@@ -110,7 +110,7 @@ def _is_free(net, fleet, vehicle, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _place_to_stop_at(net, fleet, vehicle):  # type: ignore[no-untyped-def]
+def _place_to_stop_at(net, fleet, vehicle):
     """Return the place beside its lane where a car that has just come onto it is going to stop, `NONE` for none."""
     lane = net.lanes[vehicle.lane]
     count = lane.end_place - lane.first_place
@@ -140,7 +140,7 @@ def _place_to_stop_at(net, fleet, vehicle):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def choose_place(net, fleet, vehicle):  # type: ignore[no-untyped-def]
+def choose_place(net, fleet, vehicle):
     """Have a car that has just come onto a lane stop at a place beside it, or not."""
     k = _place_to_stop_at(net, fleet, vehicle)
     if k == NONE:
@@ -160,20 +160,20 @@ def choose_place(net, fleet, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _drive_on(vehicle):  # type: ignore[no-untyped-def]
+def _drive_on(vehicle):
     vehicle.stopping, vehicle.place, vehicle.at_stop = DRIVING, NONE, False
     vehicle.time_since_lane_change, vehicle.way_offset = 0.0, -1.0
 
 
 @compiled
-def distance_to_place(vehicle):  # type: ignore[no-untyped-def]
+def distance_to_place(vehicle):
     """Return the metres to where a car that comes to a place stops, `NEVER` for others: into car parks one turns."""
     stops = vehicle.stopping == APPROACHING and vehicle.way_offset < 0.0
     return max(vehicle.stop_offset - vehicle.offset, 0.0) if stops else NEVER
 
 
 @compiled
-def speed_into_place(vehicle, wanted):  # type: ignore[no-untyped-def]
+def speed_into_place(vehicle, wanted):
     """Return the desired speed of a car that comes to a place it drives into, m/s: slow where it leaves its lane."""
     if vehicle.stopping != APPROACHING or (vehicle.lane_change_length >= 0.0 and vehicle.way_offset < 0.0):
         return wanted
@@ -185,7 +185,7 @@ def speed_into_place(vehicle, wanted):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _turn_into_car_park(vehicle, beyond):  # type: ignore[no-untyped-def]
+def _turn_into_car_park(vehicle, beyond):
     """Leave the lane, `beyond` metres after the way into a car park does; drive on if that is too far, or not yet."""
     if beyond < 0.0 or beyond > _TOO_FAR:
         _drive_on(vehicle)
@@ -198,7 +198,7 @@ def _turn_into_car_park(vehicle, beyond):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def come_to_place(net, vehicle):  # type: ignore[no-untyped-def]
+def come_to_place(net, vehicle):
     """Note that a car has come to its place, or does not get there."""
     if vehicle.stopping != APPROACHING:
         return
@@ -223,7 +223,7 @@ def come_to_place(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _prepare_to_leave(net, vehicle):  # type: ignore[no-untyped-def]
+def _prepare_to_leave(net, vehicle):
     """Lay the way out of a place: who backs in follows it backwards."""
     place = net.places[vehicle.place]
     vehicle.lateral_offset, vehicle.lane_change_length = place.side, place.taper
@@ -231,7 +231,7 @@ def _prepare_to_leave(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def stand_at_place(vehicle, stay):  # type: ignore[no-untyped-def]
+def stand_at_place(vehicle, stay):
     """Have a car stand where it parks, for a time between two, s."""
     vehicle.stopping, vehicle.at_stop = STANDING, True
     vehicle.stay_left = stay[0] + (stay[1] - stay[0]) * next_random(vehicle)
@@ -241,7 +241,7 @@ def stand_at_place(vehicle, stay):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _holds_up(fleet, vehicle):  # type: ignore[no-untyped-def]
+def _holds_up(fleet, vehicle):
     """Return whether somebody has stood behind a vehicle for too long."""
     for other in fleet:
         behind = vehicle.offset - other.offset
@@ -251,7 +251,7 @@ def _holds_up(fleet, vehicle):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def is_behind_delivery(net, fleet, vehicle):  # type: ignore[no-untyped-def]
+def is_behind_delivery(net, fleet, vehicle):
     """Return whether a car has room to swing out behind a van that makes a delivery ahead on its lane."""
     lane = net.lanes[vehicle.lane]
     if lane.first_place == lane.end_place or vehicle.stopping != DRIVING or vehicle.time_since_lane_change < _PATIENT:
@@ -265,7 +265,7 @@ def is_behind_delivery(net, fleet, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _view_from_place(net, vehicle, reach, scratch, beyond):  # type: ignore[no-untyped-def]
+def _view_from_place(net, vehicle, reach, scratch, beyond):
     """Return what a vehicle beside the road sees within so many metres."""
     v, shapes, length = vehicle.index, beyond.shapes, vehicle.length
     path = path_polyline(net, vehicle, length + 3.0, vehicle.offset + reach, scratch[0])
@@ -275,7 +275,7 @@ def _view_from_place(net, vehicle, reach, scratch, beyond):  # type: ignore[no-u
 
 
 @compiled
-def _no_vehicle_comes(vehicle, vehicles, beyond):  # type: ignore[no-untyped-def]
+def _no_vehicle_comes(vehicle, vehicles, beyond):
     """Return whether no vehicle comes from behind that would have to brake for one that leaves its place."""
     v, shapes = vehicle.index, beyond.shapes
     c, s = np.cos(shapes.yaw[v]), np.sin(shapes.yaw[v])
@@ -293,7 +293,7 @@ def _no_vehicle_comes(vehicle, vehicles, beyond):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _can_leave(net, vehicle, vehicles, scratch, beyond):  # type: ignore[no-untyped-def]
+def _can_leave(net, vehicle, vehicles, scratch, beyond):
     """Return whether nobody is or comes in the way of a car that leaves its place."""
     if abs(vehicle.lateral_offset) < _SIDE:
         return True  # it is in its lane: it drives on behind who is before it
@@ -308,7 +308,7 @@ def _can_leave(net, vehicle, vehicles, scratch, beyond):  # type: ignore[no-unty
 
 
 @compiled
-def _back_in(net, vehicle, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def _back_in(net, vehicle, scratch, beyond, dt):
     """Move a car backwards into its place; it drives on if it does not get there."""
     shapes, v = beyond.shapes, vehicle.index
     left = vehicle.offset - _front_in_place(net, vehicle)
@@ -326,7 +326,7 @@ def _back_in(net, vehicle, scratch, beyond, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def stay_at_place(net, fleet, vehicle, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def stay_at_place(net, fleet, vehicle, scratch, beyond, dt):
     """Advance a car that backs into a place, stands there, or waits for a gap to leave it."""
     v, shapes, place = vehicle.index, beyond.shapes, net.places[vehicle.place]
     vehicle.speed = vehicle.stopped_time = 0.0
@@ -365,7 +365,7 @@ _NEAR_STREET, _LONGEST = 15.0, 60.0  # m of a way from its lane; s that standing
 
 
 @compiled
-def _view(vehicle, path, scratch, beyond):  # type: ignore[no-untyped-def]
+def _view(vehicle, path, scratch, beyond):
     v, shapes = vehicle.index, beyond.shapes
     reach = look_ahead(vehicle) + vehicle.length + 6.0
     near = search(beyond.grid, shapes.x[v], shapes.y[v], reach, beyond.candidates)
@@ -374,7 +374,7 @@ def _view(vehicle, path, scratch, beyond):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _distance_to_people(vehicle, view, begin, way):  # type: ignore[no-untyped-def]
+def _distance_to_people(vehicle, view, begin, way):
     """Return the metres from `begin` along a way (-1: back along it) to where somebody walks across; else `NEVER`."""
     if vehicle.stopped_time > _CAR_PARK_PATIENCE:
         return NEVER
@@ -394,7 +394,7 @@ def _distance_to_people(vehicle, view, begin, way):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _put(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
+def _put(vehicle, shapes, view, move, dt):
     """Move a car along its way, metres, and put its body there."""
     v = vehicle.index
     x, y, c, s = footprint(view.path, view.outline, vehicle.way_offset + move)
@@ -404,7 +404,7 @@ def _put(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _drive(vehicle, path, goal, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def _drive(vehicle, path, goal, scratch, beyond, dt):
     """Drive on along a way, to `goal` (metres along it) at most."""
     shapes, s, before = beyond.shapes, vehicle.way_offset, vehicle.speed
     view = _view(vehicle, path, scratch[0], beyond)
@@ -424,7 +424,7 @@ def _drive(vehicle, path, goal, scratch, beyond, dt):  # type: ignore[no-untyped
 
 
 @compiled
-def _back_out(vehicle, path, end, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def _back_out(vehicle, path, end, scratch, beyond, dt):
     """Back along a way until the front is so many metres along it; stand for who comes in the way."""
     shapes, s = beyond.shapes, vehicle.way_offset
     view = _view(vehicle, path, scratch[0], beyond)
@@ -441,7 +441,7 @@ def _back_out(vehicle, path, end, scratch, beyond, dt):  # type: ignore[no-untyp
 
 
 @compiled
-def _is_way_free(vehicle, path, first, last, scratch, beyond):  # type: ignore[no-untyped-def]
+def _is_way_free(vehicle, path, first, last, scratch, beyond):
     """Return whether nobody stands where a car comes from `first` to `last` metres along a way."""
     view = _view(vehicle, path, scratch[0], beyond)
     for k in range(int((last - first) / 0.5) + 1):
@@ -451,7 +451,7 @@ def _is_way_free(vehicle, path, first, last, scratch, beyond):  # type: ignore[n
 
 
 @compiled
-def _street_is_clear(net, fleet, vehicle, place):  # type: ignore[no-untyped-def]
+def _street_is_clear(net, fleet, vehicle, place):
     """Return whether nobody on the lane it comes to would have to brake for a car that leaves a car park."""
     takes = (place.out_joint - vehicle.way_offset + vehicle.length) / _CAR_PARK_SPEED + _TIME
     for other in fleet:
@@ -470,7 +470,7 @@ def _street_is_clear(net, fleet, vehicle, place):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _out_of_place(net, fleet, vehicle, place, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def _out_of_place(net, fleet, vehicle, place, scratch, beyond, dt):
     """Have a car whose time is over leave when nobody else moves in the car park."""
     vehicle.speed = vehicle.stopped_time = 0.0
     beyond.shapes.vx[vehicle.index] = beyond.shapes.vy[vehicle.index] = 0.0
@@ -493,7 +493,7 @@ def _out_of_place(net, fleet, vehicle, place, scratch, beyond, dt):  # type: ign
 
 
 @compiled
-def _drive_out(net, fleet, vehicle, place, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def _drive_out(net, fleet, vehicle, place, scratch, beyond, dt):
     """Drive from the aisle to the street, and on it when nobody comes."""
     path = net.way_points[place.first_out : place.end_out]
     vehicle.lights = LEFT if place.out_side > 0.0 else RIGHT
@@ -514,7 +514,7 @@ def _drive_out(net, fleet, vehicle, place, scratch, beyond, dt):  # type: ignore
 
 
 @compiled
-def stay_in_car_park(net, fleet, vehicle, scratch, beyond, dt):  # type: ignore[no-untyped-def]
+def stay_in_car_park(net, fleet, vehicle, scratch, beyond, dt):
     """Advance a car on its way into a car park, that stands there, or is on its way out of it."""
     place = net.places[vehicle.place]
     if vehicle.stopping == STANDING or vehicle.stopping == LEAVING:

@@ -51,7 +51,7 @@ class Outline(NamedTuple):
 
 
 @compiled
-def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
+def vehicle_outline(vehicle):
     """Return a vehicle's outline on its path."""
     return Outline(
         vehicle.length,
@@ -66,13 +66,13 @@ def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def end_of_lane_change(vehicle):  # type: ignore[no-untyped-def]
+def end_of_lane_change(vehicle):
     """Return the metres a vehicle drives from where it begins to change lanes until it may change again."""
     return vehicle.lane_change_length + STRAIGHT + vehicle.length
 
 
 @compiled
-def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-untyped-def]
+def changing_lane(outline, lateral_offset, change_done):
     """Return the outline of the same vehicle with another lane change (none: 0, 0)."""
     return Outline(
         outline.length, outline.half_width, outline.overhang, outline.wheelbase,
@@ -81,13 +81,13 @@ def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-unty
 
 
 @compiled
-def line_points(net, vehicle):  # type: ignore[no-untyped-def]
+def line_points(net, vehicle):
     """Return the points of the lines that a vehicle follows, shape ``(p, 2)``: the lanes' middles, or at the kerb."""
     return net.kerb_points if vehicle.is_bicycle else net.points
 
 
 @compiled
-def _append_lane(net, points, lane, base, path, count):  # type: ignore[no-untyped-def]
+def _append_lane(net, points, lane, base, path, count):
     """Add a lane that starts at s = `base` to the first `count` points of a path; return their number then."""
     last = path[count - 1].s if count > 0 else -1e18
     for p in range(net.lanes[lane].first_point, net.lanes[lane].end_point):
@@ -100,13 +100,13 @@ def _append_lane(net, points, lane, base, path, count):  # type: ignore[no-untyp
 
 
 @compiled
-def lane_polyline(net, points, lane, buffer):  # type: ignore[no-untyped-def]
+def lane_polyline(net, points, lane, buffer):
     """Lay the path along one lane's `line_points` into `buffer` and return the part of it that is used."""
     return buffer[: _append_lane(net, points, lane, 0.0, buffer, 0)]
 
 
 @inlined
-def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyped-def]
+def path_polyline(net, vehicle, behind, ahead, buffer):
     """Lay a vehicle's path, from `behind` metres before its lane's start to `ahead` metres after it, into `buffer`.
 
     Returns
@@ -137,13 +137,13 @@ def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyp
 
 
 @compiled
-def point_on_path(path, s):  # type: ignore[no-untyped-def]
+def point_on_path(path, s):
     """Return x, y and the direction (not of unit length) at `s` on a path; beyond its ends, straight on."""
     return _point_between(path, _stretch_at(path, s, 0), s)
 
 
 @compiled
-def _point_between(path, a, s):  # type: ignore[no-untyped-def]
+def _point_between(path, a, s):
     """As `point_on_path`, where the stretch from point a of the path to the next is that of `s`."""
     b = a + 1
     dx, dy, size = path[b].x - path[a].x, path[b].y - path[a].y, path[b].s - path[a].s
@@ -152,7 +152,7 @@ def _point_between(path, a, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stretch_at(path, s, a):  # type: ignore[no-untyped-def]
+def _stretch_at(path, s, a):
     """Return the stretch of a path on which `s` is, by its first point; it is no farther back than stretch a."""
     while a + 2 < len(path) and path[a + 1].s <= s:
         a += 1
@@ -160,27 +160,27 @@ def _stretch_at(path, s, a):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _lateral_offset(outline, s):  # type: ignore[no-untyped-def]
+def _lateral_offset(outline, s):
     """Return the metres to the left of its path that a vehicle's point at `s` is, during a lane change."""
     share = min(max((outline.change_done + s) / outline.change_length, 0.0), 1.0)
     return outline.lateral_offset * (1.0 - share * share * (3.0 - 2.0 * share))
 
 
 @compiled
-def footprint(path, outline, front):  # type: ignore[no-untyped-def]
+def footprint(path, outline, front):
     """Return centre x, y and heading cosine, sine of a vehicle whose front is at s = `front`: its axles follow."""
     return footprint_between(path, outline, front, axles_at(path, outline, front, (0, 0)))
 
 
 @compiled
-def axles_at(path, outline, front, before):  # type: ignore[no-untyped-def]
+def axles_at(path, outline, front, before):
     """Return on which stretches of the path its axles are, front then rear; where it was `before`, or farther on."""
     a = front - outline.overhang
     return _stretch_at(path, a, before[0]), _stretch_at(path, a - outline.wheelbase, before[1])
 
 
 @compiled
-def footprint_between(path, outline, front, at):  # type: ignore[no-untyped-def]
+def footprint_between(path, outline, front, at):
     """As `footprint`, with its axles on stretches that are known: see `axles_at`."""
     a = front - outline.overhang
     b = a - outline.wheelbase
@@ -204,7 +204,7 @@ def footprint_between(path, outline, front, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def project_on_polyline(points, along, begin, end, x, y):  # type: ignore[no-untyped-def]
+def project_on_polyline(points, along, begin, end, x, y):
     """Return where on the line ``points[begin:end]`` (x, y) is: metres along it, and metres to the left of it."""
     best, offset, side = 1e18, 0.0, 0.0
     for p in range(begin, end - 1):
@@ -223,7 +223,7 @@ def project_on_polyline(points, along, begin, end, x, y):  # type: ignore[no-unt
 
 
 @inlined
-def move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
+def move_vehicle(vehicle, shapes, view, move, dt):
     """Move a vehicle along its path, metres, in `dt` seconds, and put its body there."""
     x, y, c, s = footprint(view.path, view.outline, vehicle.offset + move)
     vehicle.offset += move

@@ -28,7 +28,7 @@ _BUSY_WHILE = 5.0  # s that a vehicle which stands before its junction still cou
 
 
 @compiled
-def yields_to_pedestrians(net, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
+def yields_to_pedestrians(net, junctions, vehicle, lane):
     """Return whether pedestrians on a crossing of `lane` go first; they are told how long the vehicle has waited."""
     yields = False
     for o in range(net.lanes[lane].first_crossing, net.lanes[lane].end_crossing):
@@ -42,7 +42,7 @@ def yields_to_pedestrians(net, junctions, vehicle, lane):  # type: ignore[no-unt
 
 
 @compiled
-def _mark_crossings(net, junctions, lane, rear):  # type: ignore[no-untyped-def]
+def _mark_crossings(net, junctions, lane, rear):
     """Mark the crossings of a lane that a vehicle with its rear at `rear` metres along it has not passed."""
     for o in range(net.lanes[lane].first_crossing, net.lanes[lane].end_crossing):
         if rear < net.crossings_cleared[o]:
@@ -50,7 +50,7 @@ def _mark_crossings(net, junctions, lane, rear):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def mark_busy_crossings(net, fleet, junctions):  # type: ignore[no-untyped-def]
+def mark_busy_crossings(net, fleet, junctions):
     """Mark the crossings that a vehicle is on or has been let over.
 
     One that stands before its junction does not count; one that stands in it does, so that it gets out of it.
@@ -89,7 +89,7 @@ class FollowPoint(NamedTuple):
 
 
 @compiled
-def room_at(paths, walkway, offset):  # type: ignore[no-untyped-def]
+def room_at(paths, walkway, offset):
     """Return how far to each side of a walkway a walker may be so many metres along it: a row of `room`."""
     a, b = paths.first[walkway], paths.first[walkway + 1] - 1
     while b - a > 1:
@@ -102,7 +102,7 @@ def room_at(paths, walkway, offset):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def follow_point(paths, walker):  # type: ignore[no-untyped-def]
+def follow_point(paths, walker):
     """Return the point a pedestrian follows."""
     walkway = walker.walkway
     offset = min(max(walker.offset, 0.0), paths.walkways[walkway].length)
@@ -121,14 +121,14 @@ _AT_END = 0.3  # m from the end of a crossing from which on one stands at the ke
 
 
 @compiled
-def project_on_walkway(paths, walkway, x, y):  # type: ignore[no-untyped-def]
+def project_on_walkway(paths, walkway, x, y):
     """Return the metres along a walkway of its point nearest to (x, y), and how far left of it that is."""
     begin, end = paths.first[walkway], paths.first[walkway + 1]
     return project_on_polyline(paths.points, paths.along, begin, end, x, y)
 
 
 @compiled
-def _is_off_crossing(paths, crossing, x, y):  # type: ignore[no-untyped-def]
+def _is_off_crossing(paths, crossing, x, y):
     """Return whether (x, y) is at an end of a crossing, or beside it."""
     along, aside = project_on_walkway(paths, crossing, x, y)
     way = paths.walkways[crossing]
@@ -138,7 +138,7 @@ def _is_off_crossing(paths, crossing, x, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _metres_beyond(paths, end, before, x, y):  # type: ignore[no-untyped-def]
+def _metres_beyond(paths, end, before, x, y):
     """Return how far (x, y) is beyond the line's point number `end`, as seen from the one `before`."""
     dx, dy = paths.points[end, 0] - paths.points[before, 0], paths.points[end, 1] - paths.points[before, 1]
     along = (x - paths.points[end, 0]) * dx + (y - paths.points[end, 1]) * dy
@@ -146,7 +146,7 @@ def _metres_beyond(paths, end, before, x, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_past_end(paths, crossing, x, y):  # type: ignore[no-untyped-def]
+def _is_past_end(paths, crossing, x, y):
     """Return whether who is at (x, y) is beyond an end of a crossing, clear of it."""
     first, last = paths.first[crossing], paths.first[crossing + 1] - 1
     return (
@@ -156,7 +156,7 @@ def _is_past_end(paths, crossing, x, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def leave_crossing(paths, walker, junctions, x, y):  # type: ignore[no-untyped-def]
+def leave_crossing(paths, walker, junctions, x, y):
     """Note who is off the crossing it was on: the metres alone do not tell, as one may walk to and fro there.
 
     Nor is who stands beyond its end on it: vehicles would wait for a companion who waits there for them.
@@ -210,7 +210,7 @@ def leave_group(walkers: Records, i: int) -> None:
 
 
 @compiled
-def _hops_to(paths, node, goal):  # type: ignore[no-untyped-def]
+def _hops_to(paths, node, goal):
     """Return how many walkways lie between a meeting point and a walkway: 0, 1, or 2 for more."""
     a, b = paths.walkways[goal].start, paths.walkways[goal].end
     if node in (a, b):
@@ -223,14 +223,14 @@ def _hops_to(paths, node, goal):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _away(paths, walkway, node, x, y):  # type: ignore[no-untyped-def]
+def _away(paths, walkway, node, x, y):
     """Return how far the end of a walkway at a meeting point is from (x, y), metres."""
     p = paths.first[walkway] if paths.walkways[walkway].start == node else paths.first[walkway + 1] - 1
     return np.sqrt((paths.points[p, 0] - x) ** 2 + (paths.points[p, 1] - y) ** 2)
 
 
 @compiled
-def walkway_to_leader(paths, walker, leader, node):  # type: ignore[no-untyped-def]
+def walkway_to_leader(paths, walker, leader, node):
     """Return the walkway at a meeting point that leads to who leads the walker, `NONE` while that one has yet to come.
 
     Whose way is more than two walkways long goes as the crow flies.
@@ -255,7 +255,7 @@ def walkway_to_leader(paths, walker, leader, node):  # type: ignore[no-untyped-d
 
 
 @compiled
-def goes_wrong_way(paths, walker, leader):  # type: ignore[no-untyped-def]
+def goes_wrong_way(paths, walker, leader):
     """Return whether a companion goes away from who leads it, or against that one's direction on the same walkway."""
     if walker.walkway == leader.walkway:
         return walker.direction != leader.direction
@@ -269,7 +269,7 @@ def goes_wrong_way(paths, walker, leader):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _somebody_comes(shapes, b, near, group, hx, hy):  # type: ignore[no-untyped-def]
+def _somebody_comes(shapes, b, near, group, hx, hy):
     """Return whether somebody who is not of the group (bodies from `group[0]` to before `group[1]`) is in the way."""
     for j in near:
         if group[0] <= j < group[1] or not is_disc(shapes, j):
@@ -283,7 +283,7 @@ def _somebody_comes(shapes, b, near, group, hx, hy):  # type: ignore[no-untyped-
 
 
 @compiled
-def keep_up(walker, leader, shapes, bodies, near, heading, half, dt):  # type: ignore[no-untyped-def]
+def keep_up(walker, leader, shapes, bodies, near, heading, half, dt):
     """Have a companion walk beside who leads it, or behind; return the share of its pace at which it stays with it.
 
     Parameters
@@ -320,7 +320,7 @@ def keep_up(walker, leader, shapes, bodies, near, heading, half, dt):  # type: i
 
 
 @compiled
-def _share_behind(walker, shapes, b, first, heading):  # type: ignore[no-untyped-def]
+def _share_behind(walker, shapes, b, first, heading):
     """Return the share of its pace at which a companion comes no nearer to one of its group who walks before it.
 
     Whatever their order: nobody pushes past the others.
@@ -337,7 +337,7 @@ def _share_behind(walker, shapes, b, first, heading):  # type: ignore[no-untyped
 
 
 @compiled
-def wait_for_companions(paths, walker, dt):  # type: ignore[no-untyped-def]
+def wait_for_companions(paths, walker, dt):
     """Return the share of its pace at which who leads a group goes on: off crossings it waits for those behind."""
     walker.parted_time = walker.parted_time + dt if walker.apart > _TOGETHER else 0.0
     is_on_crossing = paths.walkways[walker.walkway].kind == _CROSSING or walker.leaving_crossing != NONE
@@ -347,20 +347,20 @@ def wait_for_companions(paths, walker, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def waits_for_companions(walker):  # type: ignore[no-untyped-def]
+def waits_for_companions(walker):
     """Return whether who leads a group waits before a crossing until all are there."""
     return walker.leader == NONE and walker.apart > _TOGETHER and walker.parted_time < _PARTED_LONG
 
 
 @compiled
-def _is_ahead(walker, other):  # type: ignore[no-untyped-def]
+def _is_ahead(walker, other):
     """Return whether `other` is farther along the walkway on which a pedestrian walks the same way."""
     goes_along = other.walkway == walker.walkway and other.direction == walker.direction
     return goes_along and (other.offset - walker.offset) * walker.direction > 0.0
 
 
 @compiled
-def note_distance(pedestrians, i, shapes, first):  # type: ignore[no-untyped-def]
+def note_distance(pedestrians, i, shapes, first):
     """Note how far a pedestrian is from who leads it, or from the farthest of those whom it leads.
 
     Who is ahead of who leads does not count: both would wait for the other one.
@@ -386,7 +386,7 @@ _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
 
 
 @compiled
-def turn_round(paths, walker, x, y):  # type: ignore[no-untyped-def]
+def turn_round(paths, walker, x, y):
     """Go the other way from here on: the followed point comes back to where the walker is, or it would lead on."""
     walker.direction = -walker.direction
     walker.offset, _ = project_on_walkway(paths, walker.walkway, x, y)
@@ -394,7 +394,7 @@ def turn_round(paths, walker, x, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_crossing_at(paths, node):  # type: ignore[no-untyped-def]
+def _is_crossing_at(paths, node):
     """Return whether a crossing begins at a meeting point."""
     for m in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
         if paths.walkways[paths.meeting[m]].kind == _CROSSING:
@@ -403,7 +403,7 @@ def _is_crossing_at(paths, node):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
+def _choice_weight(paths, here, option, node):
     """Return how likely a walkway is taken at a meeting point: crossings less often, 0 for never."""
     is_corner = paths.walkways[option].kind == _CORNER
     if option == here or paths.walkways[option].shut or (is_corner and paths.walkways[here].kind == _CORNER):
@@ -413,7 +413,7 @@ def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _walkway_to_goal(paths, walker, node):  # type: ignore[no-untyped-def]
+def _walkway_to_goal(paths, walker, node):
     """Return the walkway at a meeting point that leads to a pedestrian's goal the shortest way, `NONE` for none."""
     best, least = NONE, np.inf
     for k in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
@@ -430,7 +430,7 @@ def _walkway_to_goal(paths, walker, node):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
+def choose_next_walkway(paths, walker, node):
     """Return where a pedestrian goes on at a meeting point, `NONE` for nowhere."""
     if walker.goal != NONE:
         return _walkway_to_goal(paths, walker, node)
@@ -451,7 +451,7 @@ def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignore[no-untyped-def]
+def must_wait_at_crossing(walker, junctions, crossing, is_asked):
     """Return whether a pedestrian lets vehicles go first: those on the crossing, and one that has waited long.
 
     Nobody waits for the vehicle that stands waiting for them: who is asked to go goes. Who has been left behind by
@@ -464,7 +464,7 @@ def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignor
 
 
 @compiled
-def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[no-untyped-def]
+def _enter_walkway(paths, walker, junctions, following, node):
     """Put the followed point at the start of the next walkway, from meeting point `node`."""
     walkway = walker.walkway
     walker.crossing_wait = 0.0
@@ -484,7 +484,7 @@ def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[n
 
 
 @compiled
-def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ignore[no-untyped-def]
+def _may_go_onto(paths, walker, junctions, is_asked, following, dt):
     """Return whether a walker may go onto a walkway now; who may not counts the time, and gives up after a while."""
     if paths.walkways[following].kind != _CROSSING or following == walker.leaving_crossing:
         return True  # Who turns round before it is off a crossing goes back: vehicles wait for it as it is.
@@ -498,7 +498,7 @@ def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ig
 
 
 @compiled
-def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
+def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt):
     """Move the followed point on until it is far enough ahead; return whether there is something to wait for.
 
     That is a crossing, or where the way forks who leads the walker (`leader`; the walker itself where nobody does).

@@ -43,7 +43,7 @@ _TOGETHER = 2.0  # m within which two stop together
 
 
 @compiled
-def _is_free(paths, pedestrians, k, shapes, i, first):  # type: ignore[no-untyped-def]
+def _is_free(paths, pedestrians, k, shapes, i, first):
     """Return whether nobody stands at spot k or is on the way there, but pedestrian i."""
     for other in range(len(pedestrians)):
         if pedestrians[other].spot == k:
@@ -56,7 +56,7 @@ def _is_free(paths, pedestrians, k, shapes, i, first):  # type: ignore[no-untype
 
 
 @compiled
-def _take_spot(paths, walker, k, seconds):  # type: ignore[no-untyped-def]
+def _take_spot(paths, walker, k, seconds):
     """Have somebody go to spot k, to stand there."""
     spot = paths.spots[k]
     walker.spot, walker.stand_kind, walker.stand_time = k, spot.kind, seconds
@@ -64,7 +64,7 @@ def _take_spot(paths, walker, k, seconds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[no-untyped-def]
+def stop_at_spot(paths, pedestrians, i, shapes, first, offset):
     """Have pedestrian i stop at one of the spots it has come past since its walkway's metre `offset`."""
     walker = pedestrians[i]
     way = walker.walkway
@@ -90,7 +90,7 @@ def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[
 
 
 @compiled
-def note_standing(paths, pedestrians, walker, is_there, is_asked, dt):  # type: ignore[no-untyped-def]
+def note_standing(paths, pedestrians, walker, is_there, is_asked, dt):
     """Count the time somebody stands; who has stood long enough walks on, or can't get there, or may not be there.
 
     So does, before long, who is asked to go: a bus that leaves its stop swings out over the kerb.
@@ -108,7 +108,7 @@ def note_standing(paths, pedestrians, walker, is_there, is_asked, dt):  # type: 
 
 
 @compiled
-def _turn_towards(shapes, b, yaw, rate, dt):  # type: ignore[no-untyped-def]
+def _turn_towards(shapes, b, yaw, rate, dt):
     """Turn body b towards a heading, by `rate` rad/s at most; return by how much its own differed, rad."""
     turn = (yaw - shapes.yaw[b] + np.pi) % (2 * np.pi) - np.pi
     shapes.yaw[b] += min(max(turn, -rate * dt), rate * dt)
@@ -166,7 +166,7 @@ _STANDS_WITHIN = 0.2  # m from where it is to stand
 
 
 @inlined
-def _nearby(shapes, grid, b, buffer):  # type: ignore[no-untyped-def]
+def _nearby(shapes, grid, b, buffer):
     """Return the indices of the bodies that body b, a walker, may meet."""
     x, y = shapes.x[b], shapes.y[b]
     n = 0
@@ -180,7 +180,7 @@ def _nearby(shapes, grid, b, buffer):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _leads_off(x, y, c, s, shapes, j):  # type: ignore[no-untyped-def]
+def _leads_off(x, y, c, s, shapes, j):
     """Return whether a first step along a heading comes no nearer to somebody than one may be, or away from them."""
     tx, ty = x + c * _FIRST_STEP, y + s * _FIRST_STEP
     if not disc_touches(tx, ty, PEDESTRIAN_RADIUS + _TOUCH, shapes, j):
@@ -189,7 +189,7 @@ def _leads_off(x, y, c, s, shapes, j):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-def]
+def _free_distance(x, y, c, s, shapes, near, gap):
     """Return the metres a walker can go along a heading before it touches somebody, at most `_SIGHT`."""
     free = _SIGHT
     for j in near:
@@ -215,7 +215,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
 
 
 @inlined
-def best_heading(x, y, point, shapes, near, is_jammed, facing):  # type: ignore[no-untyped-def]
+def best_heading(x, y, point, shapes, near, is_jammed, facing):
     """Return the heading (rad) that leads furthest towards the followed point, and the metres free along it.
 
     Of headings that are about as good it is the one nearest to where the walker looks (`facing`, rad): who goes round
@@ -247,7 +247,7 @@ def best_heading(x, y, point, shapes, near, is_jammed, facing):  # type: ignore[
 
 
 @compiled
-def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
+def may_step_to(tx, ty, x, y, shapes, near):
     """Return whether a walker at (x, y) may stand at (tx, ty); who is too near already may go away from the other."""
     for j in near:
         if disc_touches(tx, ty, PEDESTRIAN_RADIUS + _TOUCH, shapes, j):
@@ -258,7 +258,7 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-untyped-def]
+def _walk(walker, point, shapes, b, near, is_waiting, time):
     """Take a pedestrian, body b, a step towards a point; return the metres walked.
 
     `time` is the share of its pace at which it walks, and the seconds that pass. Who goes another way than it looks
@@ -290,7 +290,7 @@ def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-
 
 
 @compiled
-def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-untyped-def]
+def _note_progress(paths, walker, x, y, is_waiting, dt):
     """Turn round who gets nowhere, on the spot or to and fro."""
     ex, ey = x - walker.progress_xy[0], y - walker.progress_xy[1]
     if is_waiting or ex * ex + ey * ey > _PROGRESS:
@@ -305,7 +305,7 @@ def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-unty
 
 
 @compiled
-def _note_gait(walker, is_walking, dt):  # type: ignore[no-untyped-def]
+def _note_gait(walker, is_walking, dt):
     """Count the time since somebody set out, upward, or stopped, downward."""
     if is_walking and walker.gait_time < 0.0:
         walker.gait_time, walker.set_out, walker.tread_cycles = 0.0, walker.distance_walked, 0.0
@@ -315,7 +315,7 @@ def _note_gait(walker, is_walking, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _note_treads(walker, tread, dt):  # type: ignore[no-untyped-def]
+def _note_treads(walker, tread, dt):
     """Note that somebody comes to stairs, or from them, and how far in its gait it is."""
     walker.tread_time = min(walker.tread_time + dt, GAIT_TIME)
     if tread != walker.tread:
@@ -325,7 +325,7 @@ def _note_treads(walker, tread, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def asked_to_go(fleet, first, pedestrians):  # type: ignore[no-untyped-def]
+def asked_to_go(fleet, first, pedestrians):
     """Return which walkers, bodies from `first` on, a vehicle or a tram stands before, waiting for them to go.
 
     Those who lead them are among them: companions go where they do.
@@ -341,7 +341,7 @@ def asked_to_go(fleet, first, pedestrians):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore[no-untyped-def]
+def _group_pace(paths, pedestrians, i, shapes, near, first, dt):
     """Have one of a group stay with the others; return the share of its pace at which it walks for that."""
     walker = pedestrians[i]
     note_distance(pedestrians, i, shapes, first)
@@ -357,7 +357,7 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
 
 
 @inlined
-def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):  # type: ignore[no-untyped-def]
+def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):
     """Take who is to stand a step to where it stands, or turn it there; return the metres walked."""
     walker, dt = pedestrians[i], time[1]
     x, y = walker.stand_xy
@@ -379,7 +379,7 @@ def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):  # type
 
 
 @inlined
-def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):  # type: ignore[no-untyped-def]
+def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
     """Take a pedestrian, by its row and its body in `who`, a step along its walkway; return the metres walked."""
     (i, b), (pace, dt) = who, time
     walker = pedestrians[i]
@@ -409,7 +409,7 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
 
 
 @compiled
-def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, on, dt):  # type: ignore[no-untyped-def]
+def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, on, dt):
     """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`.
 
     They walk `on` what is below them: at so many times the speed each prefers, on treads so deep, metres, ``(n,)``.
@@ -442,7 +442,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, on, 
 
 
 @compiled
-def place_pedestrian(paths, pedestrians, i, walkway, offset, direction, shapes, b):  # type: ignore[no-untyped-def]
+def place_pedestrian(paths, pedestrians, i, walkway, offset, direction, shapes, b):
     """Put pedestrian i, body b, on a walkway if nobody is within half a metre; True if it now stands there."""
     walker = pedestrians[i]
     walker.walkway, walker.offset, walker.direction = walkway, offset, direction

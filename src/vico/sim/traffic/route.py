@@ -26,7 +26,7 @@ _LESS_PICKY = 5.0  # s of waiting that count like a vehicle on a street
 
 
 @compiled
-def count_per_street(net, fleet, street_load):  # type: ignore[no-untyped-def]
+def count_per_street(net, fleet, street_load):
     """Count the vehicles on each street (one direction) into `street_load`."""
     street_load[:] = 0
     for vehicle in fleet:
@@ -34,7 +34,7 @@ def count_per_street(net, fleet, street_load):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
+def _street_reached_by(net, lane):
     """Return the street lane that a lane through junctions leads to."""
     street = lane
     for _ in range(6):
@@ -46,7 +46,7 @@ def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-untyped-def]
+def _lane_cost(net, vehicle, option, street, street_load):
     """Return what speaks against taking lane `option` to `street`: vehicles there, and ways that lead nowhere new."""
     # The longer it has waited to go its way, the less it minds where another one leads.
     cost = street_load[net.lanes[street].edge] + next_random(vehicle) * (1.0 + vehicle.junction_wait / _LESS_PICKY)
@@ -70,7 +70,7 @@ def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-un
 
 
 @compiled
-def _goal_after(net, vehicle):  # type: ignore[no-untyped-def]
+def _goal_after(net, vehicle):
     """Return the goal that a car drives to after its planned lanes, `NONE` for none."""
     goal = vehicle.goal
     if goal == NONE:
@@ -83,7 +83,7 @@ def _goal_after(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untyped-def]
+def choose_next_lane(net, vehicle, lane, street_load):
     """Return the lane a car takes after `lane`: towards the street with fewer vehicles; `NONE` at the map's end."""
     best, best_cost = NONE, 1e18
     if net.lanes[lane].leaves:
@@ -105,7 +105,7 @@ def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untype
 
 
 @compiled
-def route_lane(net, vehicle, further):  # type: ignore[no-untyped-def]
+def route_lane(net, vehicle, further):
     """Return the lane of a bus's route that comes `further` lanes after its own."""
     route = vehicle.route
     size = net.route_first[route + 1] - net.route_first[route]
@@ -113,7 +113,7 @@ def route_lane(net, vehicle, further):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def is_lane_of_stop(net, vehicle, further):  # type: ignore[no-untyped-def]
+def is_lane_of_stop(net, vehicle, further):
     """Return whether it is a bus whose next stop is on the lane that comes `further` lanes after its own."""
     route = vehicle.route
     if route < 0:
@@ -123,7 +123,7 @@ def is_lane_of_stop(net, vehicle, further):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def clear_of_tracks(net, lane, clear, room):  # type: ignore[no-untyped-def]
+def clear_of_tracks(net, lane, clear, room):
     """Return from which metre of a street lane on a vehicle can stand that needs so much room and has `clear` before.
 
     It is 0 where no tracks are in the way.
@@ -137,7 +137,7 @@ def clear_of_tracks(net, lane, clear, room):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _clear_with(net, lane, clear, room):  # type: ignore[no-untyped-def]
+def _clear_with(net, lane, clear, room):
     """Return the metres without a junction or tracks at the end of a path that a planned lane makes longer."""
     if net.lanes[lane].junction >= 0:
         return 0.0
@@ -146,7 +146,7 @@ def _clear_with(net, lane, clear, room):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def]
+def plan_lanes(net, vehicle, street_load, reach):
     """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions and tracks.
 
     Returns
@@ -180,7 +180,7 @@ def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def
 
 
 @compiled
-def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
+def advance_lane(net, vehicle):
     """Step on to the planned lanes that a vehicle's front has reached."""
     while vehicle.offset > net.lanes[vehicle.lane].length and vehicle.planned_count > 0:
         vehicle.offset -= net.lanes[vehicle.lane].length
@@ -198,7 +198,7 @@ def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def can_step_back(net, vehicle):  # type: ignore[no-untyped-def]
+def can_step_back(net, vehicle):
     """Return whether a vehicle that backs up may do so onto the lane it came from: a car, and not into a junction.
 
     A junction that it holds it may back into.
@@ -214,7 +214,7 @@ def can_step_back(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def step_back_lane(net, vehicle):  # type: ignore[no-untyped-def]
+def step_back_lane(net, vehicle):
     """Step back to the lane before, onto which a vehicle has backed up."""
     for k in range(vehicle.planned_count, 0, -1):
         vehicle.planned_lanes[k] = vehicle.planned_lanes[k - 1]
@@ -228,7 +228,7 @@ def step_back_lane(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_on_route(net, vehicle):  # type: ignore[no-untyped-def]
+def advance_on_route(net, vehicle):
     """Note that a bus is on the next lane of its route; cars have none."""
     route = vehicle.route
     if route >= 0:
@@ -236,7 +236,7 @@ def advance_on_route(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def drop_shut_plans(net, fleet):  # type: ignore[no-untyped-def]
+def drop_shut_plans(net, fleet):
     """Have cars plan anew that meant to drive on lanes that are shut now, unless they were let in already."""
     for vehicle in fleet:
         if vehicle.route >= 0:
@@ -248,7 +248,7 @@ def drop_shut_plans(net, fleet):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def is_taken(net, fleet, lanes):  # type: ignore[no-untyped-def]
+def is_taken(net, fleet, lanes):
     """Return whether a car is on one of some lanes (a mask), may still be with its rear, or will drive there."""
     for vehicle in fleet:
         is_in_car_park = vehicle.way_offset > 0.0 and (vehicle.stopping == STANDING or vehicle.stopping == LEAVING)
@@ -271,7 +271,7 @@ def is_taken(net, fleet, lanes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def widen_shut(net, shut):  # type: ignore[no-untyped-def]
+def widen_shut(net, shut):
     """Shut, besides, the lanes from which every way leads onto shut ones; `shut` is a mask, and is changed.
 
     A car that drove in there would have to go through.

@@ -56,7 +56,7 @@ class Shapes(NamedTuple):
 
 
 @compiled
-def footprint_core(shapes, j):  # type: ignore[no-untyped-def]
+def footprint_core(shapes, j):
     """Return the core of body j's footprint."""
     r = shapes.rounding[j]
     return Rectangle(
@@ -66,26 +66,26 @@ def footprint_core(shapes, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def is_disc(shapes, j):  # type: ignore[no-untyped-def]
+def is_disc(shapes, j):
     """Return whether body j's footprint is a disc."""
     return shapes.half_length[j] == shapes.rounding[j] == shapes.half_width[j]
 
 
 @compiled
-def share_level(shapes, i, j):  # type: ignore[no-untyped-def]
+def share_level(shapes, i, j):
     """Return whether the extents in height of bodies i and j overlap."""
     return shapes.bottom[i] < shapes.top[j] and shapes.bottom[j] < shapes.top[i]
 
 
 @compiled
-def is_within_reach(a, b, reach):  # type: ignore[no-untyped-def]
+def is_within_reach(a, b, reach):
     """Return whether two rectangles come as near to each other as `reach` metres."""
     apart = separation(a, b)
     return apart <= 0.0 or (apart <= reach and rectangle_gap(a, b) <= reach)
 
 
 @compiled
-def distance_to(x, y, shapes, j):  # type: ignore[no-untyped-def]
+def distance_to(x, y, shapes, j):
     """Return the metres from a point to the core of body j's footprint: to a disc's middle; negative inside."""
     if is_disc(shapes, j):
         dx, dy = x - shapes.x[j], y - shapes.y[j]
@@ -94,7 +94,7 @@ def distance_to(x, y, shapes, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def disc_touches(x, y, radius, shapes, j):  # type: ignore[no-untyped-def]
+def disc_touches(x, y, radius, shapes, j):
     """Return whether a disc touches body j."""
     reach = radius + shapes.rounding[j]
     if is_disc(shapes, j):

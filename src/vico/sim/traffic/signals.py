@@ -213,7 +213,7 @@ def _let_clear(column: NDArray[np.uint8], length: float) -> None:
 
 
 @compiled
-def is_stopped_by_signal(net, vehicle, k):  # type: ignore[no-untyped-def]
+def is_stopped_by_signal(net, vehicle, k):
     """Return whether the first signal in the junction of a vehicle's k-th planned lane stops it.
 
     Who is in that junction already clears it.
@@ -231,7 +231,7 @@ def is_stopped_by_signal(net, vehicle, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def loses_its_green(net, vehicle):  # type: ignore[no-untyped-def]
+def loses_its_green(net, vehicle):
     """Return whether a vehicle that was let into a junction has not reached it, has no green any more, and can stop."""
     distance = net.lanes[vehicle.lane].length - vehicle.offset
     for k in range(vehicle.granted_count):

@@ -246,7 +246,7 @@ PEDESTRIAN_RECORD = np.dtype(
 
 
 @compiled
-def next_random(owner):  # type: ignore[no-untyped-def]
+def next_random(owner):
     """Return a number in 0..1 from the stream of a vehicle or pedestrian (splitmix64: one word of state, `random`)."""
     z = owner.random + np.uint64(0x9E3779B97F4A7C15)
     owner.random = z

@@ -88,7 +88,7 @@ _BEYOND_JUNCTION = 60.0  # m seen beyond a junction that is asked for
 
 
 @compiled
-def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # type: ignore[no-untyped-def]
+def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):
     """Advance all vehicles by `dt` seconds, one after the other, each seeing where the ones before it went.
 
     Parameters
@@ -203,7 +203,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
 
 
 @compiled
-def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
+def distance_to_stop(vehicle):
     """Return the metres to a bus's stop if that is on its lane, or to a car's place; `NEVER` otherwise."""
     is_here = vehicle.stop_route_index >= 0 and vehicle.route_index == vehicle.stop_route_index
     if vehicle.route >= 0 and is_here and vehicle.stop_offset > vehicle.offset - 1.0:
@@ -212,7 +212,7 @@ def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted):  # type: ignore[no-untyped-def]
+def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted):
     """Return where a vehicle has to stop and how fast it may be now.
 
     It stops at its bus stop, before a junction it may not enter, where it lets a bus in, and at its path's end; it
@@ -262,7 +262,7 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wan
 
 
 @compiled
-def _keeps_others_out(vehicle, junctions):  # type: ignore[no-untyped-def]
+def _keeps_others_out(vehicle, junctions):
     """Return whether those stay back, until a vehicle has gone, who would stand in its way at the end of their lane.
 
     Else whoever comes next would go before it again. Where junctions are shared they cannot wait for ever: on lanes of
@@ -273,7 +273,7 @@ def _keeps_others_out(vehicle, junctions):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _look_around(net, vehicle, look, request, scratch, beyond):  # type: ignore[no-untyped-def]
+def _look_around(net, vehicle, look, request, scratch, beyond):
     """Return what a vehicle sees: bodies near it, and its path, farther where it may have to see beyond a junction.
 
     Parameters
@@ -301,7 +301,7 @@ def _look_around(net, vehicle, look, request, scratch, beyond):  # type: ignore[
 
 
 @inlined
-def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignore[no-untyped-def]
+def _move_without_contact(net, vehicle, view, move, gap, leader):
     """Return the move, gap and leader; no move where it would touch a body or leave the planned path."""
     if vehicle.planned_count == 0:
         move = min(move, max(net.lanes[vehicle.lane].length - vehicle.offset, 0.0))
@@ -313,7 +313,7 @@ def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignor
 
 
 @compiled
-def _move_back(net, vehicle, view, dt):  # type: ignore[no-untyped-def]
+def _move_back(net, vehicle, view, dt):
     """Return the move of a vehicle that backs up, metres; 0 where it would touch a body."""
     move = -_REVERSE * dt
     if (
@@ -328,13 +328,13 @@ def _move_back(net, vehicle, view, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _gives_up_waiting(vehicle, dt):  # type: ignore[no-untyped-def]
+def _gives_up_waiting(vehicle, dt):
     """Return whether a car looks for another way now: a full exit is no reason to wait for ever."""
     return vehicle.junction_wait > _OTHER_WAY_AFTER and int(vehicle.junction_wait / dt) % 50 == 0
 
 
 @compiled
-def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-untyped-def]
+def place_vehicle(net, fleet, v, lane, offset, shapes, air):
     """Put vehicle v on a lane if no other body would be nearer than `air` metres; True if it now stands there."""
     vehicle = fleet[v]
     path = lane_polyline(net, line_points(net, vehicle), lane, np.empty(256, PATH_POINT))
@@ -361,7 +361,7 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
 
 
 @compiled
-def _bring_on(net, fleet, v, junctions, shapes):  # type: ignore[no-untyped-def]
+def _bring_on(net, fleet, v, junctions, shapes):
     """Put a bus at the stop it drives to, else where its route is free nearest before it; its riders come along."""
     vehicle = fleet[v]
     if vehicle.stop_route_index < 0:
@@ -384,7 +384,7 @@ def _bring_on(net, fleet, v, junctions, shapes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _can_stand_on(net, vehicle, lane, following):  # type: ignore[no-untyped-def]
+def _can_stand_on(net, vehicle, lane, following):
     """Return whether a bus fits on a lane, between junctions, that its route leaves at its end."""
     street = net.lanes[lane]
     fits = street.inside < 0 and street.junction < 0 and street.length > vehicle.length + _BEFORE_JUNCTION + 1.0
@@ -392,7 +392,7 @@ def _can_stand_on(net, vehicle, lane, following):  # type: ignore[no-untyped-def
 
 
 @compiled
-def take_away(net, fleet, v, junctions):  # type: ignore[no-untyped-def]
+def take_away(net, fleet, v, junctions):
     """Take a bus off the streets; it comes back at the stop that it drives to, or stands at."""
     vehicle = fleet[v]
     release_all_junctions(junctions, vehicle)
@@ -407,7 +407,7 @@ def take_away(net, fleet, v, junctions):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def come_back(net, fleet, v, shapes):  # type: ignore[no-untyped-def]
+def come_back(net, fleet, v, shapes):
     """Put a bus that was taken away at its stop, where nobody is so near that they would have to brake for it."""
     vehicle = fleet[v]
     if place_vehicle(net, fleet, v, vehicle.lane, vehicle.offset, shapes, _COMING_BACK):
@@ -415,7 +415,7 @@ def come_back(net, fleet, v, shapes):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  # type: ignore[no-untyped-def]
+def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):
     """Bring cars that left the map, or stood still for longer than `patience`, back in where the map begins.
 
     Buses that stood still for so long, not at a stop, go on from the stop they drove to, or before it where it is free.

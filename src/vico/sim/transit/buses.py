@@ -6,7 +6,7 @@ The timetable puts buses at the start. A bus leaves its line before a shut stree
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -380,10 +380,12 @@ def _graph(lanes: LaneGraph, shut: NDArray[np.bool_]) -> csr_matrix:
     return csr_matrix((cost[open_] + 0.01, (start[open_], end[open_])), shape=(len(lanes), len(lanes)))
 
 
-def _way_round(graph: csr_matrix, starts: list[int], ends: list[int]):  # type: ignore[no-untyped-def]
-    """Return the metres from each start to each end, and what tells the lanes between two of them."""
+def _way_round(
+    graph: csr_matrix, starts: list[int], ends: list[int]
+) -> tuple[NDArray[np.float64], Callable[[int, int], list[int]]]:
+    """Return the metres from each start to each end, and a function of the lanes between two of them."""
     if not starts or not ends:
-        return np.full((len(starts), len(ends)), np.inf), None
+        return np.full((len(starts), len(ends)), np.inf), lambda a, b: []
     metres, before = dijkstra(graph, indices=starts, return_predecessors=True)
 
     def lanes_between(a: int, b: int) -> list[int]:

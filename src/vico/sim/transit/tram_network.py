@@ -173,7 +173,7 @@ def _heading(track: Track) -> NDArray[np.float64]:
 
 
 @compiled
-def _look_across(one, one_half, other, other_half, boxes):  # type: ignore[no-untyped-def]
+def _look_across(one, one_half, other, other_half, boxes):
     """Return the nearest point of another track to each one of a track, its distance, and whether trams could touch.
 
     `boxes` are those of the other track. Of where trams could not touch the first two say nothing.
@@ -262,7 +262,7 @@ def absent_footprints(n: int) -> NDArray[np.float64]:
 
 
 @compiled
-def place_sections(poses, inside, half_length, half_width, speed, footprints):  # type: ignore[no-untyped-def]
+def place_sections(poses, inside, half_length, half_width, speed, footprints):
     """Write the footprints of a tram's sections, shape ``(n, 9)``; those out of the city are nowhere."""
     for k in range(len(poses)):
         c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
@@ -271,7 +271,7 @@ def place_sections(poses, inside, half_length, half_width, speed, footprints):  
 
 
 @compiled
-def inside_city(poses, half):  # type: ignore[no-untyped-def]
+def inside_city(poses, half):
     """Return which sections reach into a city `half` metres to each side, by x, y, yaw of middles."""
     found = np.zeros(len(poses), np.bool_)
     reach = TRAM_SECTION / 2
@@ -283,7 +283,7 @@ def inside_city(poses, half):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def section_outlines(poses, inside):  # type: ignore[no-untyped-def]
+def section_outlines(poses, inside):
     """Return points around each section that is in the city, shape ``(n, points, 2)``."""
     half, wide = TRAM_SECTION / 2, TRAM_WIDTH / 2
     found = np.empty((inside.sum(), 2 * (_ALONG + _ACROSS), 2))
@@ -315,7 +315,7 @@ def holds_somebody(poses: NDArray[np.float64], footprints: NDArray[np.float64]) 
 
 
 @compiled
-def first_obstructed(points, bodies, skip, skipped, within, soon):  # type: ignore[no-untyped-def]
+def first_obstructed(points, bodies, skip, skipped, within, soon):
     """Return the first row of `points`, shape ``(n, k, 2)``, near a footprint now or in `soon` seconds; n for none.
 
     Bodies from `skip` on, `skipped` of them, are left out.
@@ -352,7 +352,7 @@ def first_obstructed(points, bodies, skip, skipped, within, soon):  # type: igno
 
 
 @compiled
-def spots_near(line, points, reach):  # type: ignore[no-untyped-def]
+def spots_near(line, points, reach):
     """Return how many spots along a line, at every metre, are within reach of one of the points."""
     found, begins = 0, 0.0
     spot = 0.5

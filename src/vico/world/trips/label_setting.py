@@ -141,7 +141,7 @@ class Bounds(NamedTuple):
 
 
 @inlined
-def _way(ground, a, b, walk_speed):  # type: ignore[no-untyped-def]
+def _way(ground, a, b, walk_speed):
     """Return metres, seconds on foot and by bicycle from one node to another, at least."""
     n = len(ground.xy)
     row = np.int64(-1)
@@ -159,14 +159,14 @@ def _way(ground, a, b, walk_speed):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def straight_line(xy, off, a, b):  # type: ignore[no-untyped-def]
+def straight_line(xy, off, a, b):
     """Return metres that a way between two points has at least."""
     dx, dy = xy[a, 0] - xy[b, 0], xy[a, 1] - xy[b, 1]
     return max(math.sqrt(dx * dx + dy * dy) - off[a] - off[b] - _BELOW, 0.0)
 
 
 @compiled
-def straight_lines(xy, off, goal):  # type: ignore[no-untyped-def]
+def straight_lines(xy, off, goal):
     """Return metres that ways from each point to one of them have at least."""
     found = np.empty(len(xy))
     for k in range(len(xy)):
@@ -175,7 +175,7 @@ def straight_lines(xy, off, goal):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_before(labels, a, b):  # type: ignore[no-untyped-def]
+def _is_before(labels, a, b):
     """Return whether a label is settled before another: no two that differ are equal in what is compared."""
     one, other = labels[a], labels[b]
     if one.least != other.least:
@@ -205,7 +205,7 @@ def _is_before(labels, a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _push(queue, count, labels, label):  # type: ignore[no-untyped-def]
+def _push(queue, count, labels, label):
     """Put a label into a heap of `count` of them."""
     k = count
     while k > 0:
@@ -218,7 +218,7 @@ def _push(queue, count, labels, label):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _pop(queue, count, labels):  # type: ignore[no-untyped-def]
+def _pop(queue, count, labels):
     """Take the first label out of a heap of `count`."""
     first, label = queue[0], queue[count - 1]
     count -= 1
@@ -236,7 +236,7 @@ def _pop(queue, count, labels):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_beaten(labels, first, then, price, arrive, metres, strictly):  # type: ignore[no-untyped-def]
+def _is_beaten(labels, first, then, price, arrive, metres, strictly):
     """Return whether one of a list of labels is as good in everything, and better in something if `strictly`."""
     k = first
     while k >= 0:
@@ -281,7 +281,7 @@ class _LegOffer(NamedTuple):
 
 
 @compiled
-def _offer(labels, lists, queue, counts, leg, bounds, left):  # type: ignore[no-untyped-def]
+def _offer(labels, lists, queue, counts, leg, bounds, left):
     """Take a label in if it may come to be the best: `counts` are those of labels, of the heap, and the limit."""
     made, then_made, settled, then_settled = lists
     parent, arrive = leg.parent, leg.arrive
@@ -312,7 +312,7 @@ def _offer(labels, lists, queue, counts, leg, bounds, left):  # type: ignore[no-
 
 
 @inlined
-def _next_round(timetable, line, stop, second):  # type: ignore[no-untyped-def]
+def _next_round(timetable, line, stop, second):
     """Return the number of the first round of a line that leaves a stop at a time or after it."""
     begin, end = timetable.first_departure[line], timetable.first_departure[line + 1]
     if timetable.buses[line] > 0:
@@ -325,14 +325,14 @@ def _next_round(timetable, line, stop, second):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _begins(timetable, line, number):  # type: ignore[no-untyped-def]
+def _begins(timetable, line, number):
     """Return when a round of a line begins, seconds from the midnight before the first."""
     begin, n = timetable.first_departure[line], timetable.first_departure[line + 1] - timetable.first_departure[line]
     return timetable.departures[begin + number % n] + _DAY * (number // n)
 
 
 @compiled
-def ride_along(timetable, call, ready, rides):  # type: ignore[no-untyped-def]
+def ride_along(timetable, call, ready, rides):
     """Write where one may get off the next bus or tram that makes a call, for who is there at `ready`, and when.
 
     Parameters
@@ -371,7 +371,7 @@ def ride_along(timetable, call, ready, rides):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _most_rides(timetable):  # type: ignore[no-untyped-def]
+def _most_rides(timetable):
     """Return how many rides there are at most from one node."""
     most = 0
     for node in range(len(timetable.first_call) - 1):
@@ -384,7 +384,7 @@ def _most_rides(timetable):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _on_wheels(label, memory, counts, rules, rides):  # type: ignore[no-untyped-def]
+def _on_wheels(label, memory, counts, rules, rides):
     """Offer what may be ridden from where one has come on foot."""
     labels, lists, queue = memory
     timetable, ground, bounds = rules
@@ -411,7 +411,7 @@ def _on_wheels(label, memory, counts, rules, rides):  # type: ignore[no-untyped-
 
 
 @compiled
-def _walks(label, memory, counts, rules):  # type: ignore[no-untyped-def]
+def _walks(label, memory, counts, rules):
     """Offer the walks from where one has got off, or begins: to the goal, and to where a ride begins."""
     labels, lists, queue = memory
     timetable, ground, bounds = rules
@@ -435,7 +435,7 @@ def _walks(label, memory, counts, rules):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def settle(timetable, ground, bounds, depart):  # type: ignore[no-untyped-def]
+def settle(timetable, ground, bounds, depart):
     """Search for ways to the goal.
 
     Returns
@@ -484,7 +484,7 @@ def settle(timetable, ground, bounds, depart):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _longer(array, length):  # type: ignore[no-untyped-def]
+def _longer(array, length):
     longer = np.empty(length, array.dtype)
     longer[: len(array)] = array
     return longer

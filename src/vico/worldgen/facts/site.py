@@ -243,7 +243,7 @@ class WaterBody:
 
 
 @compiled
-def _soft_least(xy, shore, banks, out):  # type: ignore[no-untyped-def]
+def _soft_least(xy, shore, banks, out):
     """About the lowest bank near each point, smooth from point to point.
 
     What counts as near ends: a river falls, and far down it every bank is lower. On wide water it reaches further.

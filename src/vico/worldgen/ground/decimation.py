@@ -143,7 +143,7 @@ class _Ring(NamedTuple):
 
 
 @compiled
-def _collapse_corners(mesh, tolerance, turn):  # type: ignore[no-untyped-def]
+def _collapse_corners(mesh, tolerance, turn):
     """Collapse corners into neighbours where no triangle's height changes by more than its piece's tolerance."""
     ring = _Ring(
         np.empty(_MOST_ABOUT, np.int64),
@@ -170,7 +170,7 @@ def _collapse_corners(mesh, tolerance, turn):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _gather_star(mesh, ring, v):  # type: ignore[no-untyped-def]
+def _gather_star(mesh, ring, v):
     """Gather the triangles about a corner; returns how many, or -1 if there are too many."""
     first, owner, alive, triangles, chain = mesh.first, mesh.owner, mesh.alive, mesh.triangles, mesh.chain
     star = ring.star
@@ -188,12 +188,12 @@ def _gather_star(mesh, ring, v):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _has_corner(triangles, t, v):  # type: ignore[no-untyped-def]
+def _has_corner(triangles, t, v):
     return triangles[t, 0] == v or triangles[t, 1] == v or triangles[t, 2] == v
 
 
 @compiled(inline="always")
-def _gather_ring(mesh, ring, v, count):  # type: ignore[no-untyped-def]
+def _gather_ring(mesh, ring, v, count):
     """Gather a corner's neighbours, and the pieces on both sides of the edge to each; -1 if there are too many."""
     triangles, piece = mesh.triangles, mesh.piece
     star, near, sides = ring.star, ring.near, ring.sides
@@ -218,7 +218,7 @@ def _gather_ring(mesh, ring, v, count):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _index_of(values, count, wanted):  # type: ignore[no-untyped-def]
+def _index_of(values, count, wanted):
     for k in range(count):
         if values[k] == wanted:
             return k
@@ -226,7 +226,7 @@ def _index_of(values, count, wanted):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _border_through(mesh, ring, v, size):  # type: ignore[no-untyped-def]
+def _border_through(mesh, ring, v, size):
     """Tell whether a corner may go, and the two neighbours along the straight border it lies on (-1 for none)."""
     near, sides, left, right = ring.near, ring.sides, ring.one, ring.two
     borders, one, two = 0, -1, -1
@@ -249,7 +249,7 @@ def _border_through(mesh, ring, v, size):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _best_neighbour(mesh, tolerance, ring, v, counts, border):  # type: ignore[no-untyped-def]
+def _best_neighbour(mesh, tolerance, ring, v, counts, border):
     """Find the neighbour that a corner is drawn into with the least error, -1 for none; and that error.
 
     `counts` are of triangles and neighbours about it; of a corner on a `border` only the neighbours along it count.
@@ -272,7 +272,7 @@ def _best_neighbour(mesh, tolerance, ring, v, counts, border):  # type: ignore[n
 
 
 @compiled(inline="always")
-def _error_after(mesh, tolerance, star, count, move, before):  # type: ignore[no-untyped-def]
+def _error_after(mesh, tolerance, star, count, move, before):
     """Error of a corner's triangles once it lies in another (`move` has both), metres; -1 where that can't be."""
     v, u = move
     xy, z, triangles, piece, used = mesh.xy, mesh.z, mesh.triangles, mesh.piece, mesh.used
@@ -296,7 +296,7 @@ def _error_after(mesh, tolerance, star, count, move, before):  # type: ignore[no
 
 
 @compiled(inline="always")
-def _height_off(xy, z, kind, v, u, b, c):  # type: ignore[no-untyped-def]
+def _height_off(xy, z, kind, v, u, b, c):
     """How far `v` lies off the triangle ``u b c``, 0 beside it; -1 if the triangle is turned over, thin or long."""
     ux, uy = xy[u, 0], xy[u, 1]
     area = (xy[b, 0] - ux) * (xy[c, 1] - uy) - (xy[b, 1] - uy) * (xy[c, 0] - ux)
@@ -311,7 +311,7 @@ def _height_off(xy, z, kind, v, u, b, c):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _collapse(mesh, ring, v, u, count, error):  # type: ignore[no-untyped-def]
+def _collapse(mesh, ring, v, u, count, error):
     """Draw a corner into its neighbour `u`."""
     star, triangles, alive = ring.star, mesh.triangles, mesh.alive
     for k in range(count):

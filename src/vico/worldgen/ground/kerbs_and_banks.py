@@ -241,7 +241,7 @@ def _near(shape: BaseGeometry, n: int, half: float, cell: float, reach: float) -
 
 
 @compiled
-def _approach(grid, x0, y0, x1, y1, half, cell, reach):  # type: ignore[no-untyped-def]
+def _approach(grid, x0, y0, x1, y1, half, cell, reach):
     """Lower a grid's values to the distances of its nodes from segments."""
     n = grid.shape[0]
     for k in range(len(x0)):

@@ -70,7 +70,7 @@ def _pack_rectangles(cells: NDArray[np.int64], page: int) -> NDArray[np.int64]:
 
 
 @compiled(nogil=True)
-def _skyline(cells, order, page):  # type: ignore[no-untyped-def]
+def _skyline(cells, order, page):
     places = np.zeros((len(cells), 3), np.int64)
     tops = np.zeros((len(cells), page), np.int32)
     pages = 1
@@ -438,7 +438,7 @@ def _neighbours(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np
 
 
 @compiled(nogil=True)
-def _grow(points, normal, order, start, neighbours, charted):  # type: ignore[no-untyped-def]
+def _grow(points, normal, order, start, neighbours, charted):
     """Spread from each seed, the largest first, over faces near its plane."""
     label = np.full(len(points), -1, np.int64)
     seeds = np.zeros(len(points), np.int64)
@@ -504,7 +504,7 @@ def _corner_pixels(
 
 
 @compiled(nogil=True)
-def _rasterise(triangles, boxes, inside):  # type: ignore[no-untyped-def]
+def _rasterise(triangles, boxes, inside):
     """Mark every texel that a triangle touches, within its chart."""
     for t in range(len(triangles)):
         p = triangles[t]

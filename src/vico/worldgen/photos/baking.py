@@ -85,7 +85,7 @@ class PhotoColours:
 
 
 @compiled(nogil=True)
-def _fetch(texture, chosen, hits, rights, ups, skin, out):  # type: ignore[no-untyped-def]
+def _fetch(texture, chosen, hits, rights, ups, skin, out):
     """Write the texture's colours at chosen hits, each averaged over a texel of its chart."""
     triangle, u, v, chart = hits.triangle, hits.u, hits.v, hits.chart
     positions, triangles, uv, colour = skin.positions, skin.triangles, skin.uv, skin.colour
@@ -419,7 +419,7 @@ def _forget_leaning_texels(atlas: Atlas, loose: Sequence[NDArray[np.bool_]]) -> 
 
 
 @compiled(nogil=True)
-def _texels(chart, column, row, origin, right, up, normal, expected):  # type: ignore[no-untyped-def]
+def _texels(chart, column, row, origin, right, up, normal, expected):
     """Centres and normals of texels, and how far out of the plane the photographed surface is expected."""
     centre, out = np.empty((len(chart), 3)), np.empty((len(chart), 3))
     stand = np.empty(len(chart))
@@ -433,7 +433,7 @@ def _texels(chart, column, row, origin, right, up, normal, expected):  # type: i
 
 
 @compiled(nogil=True)
-def _agreement(triangle, normals, chart, normal):  # type: ignore[no-untyped-def]
+def _agreement(triangle, normals, chart, normal):
     """Cosine between the normals of what was hit and of the chart; -1 where nothing was."""
     cosine = np.full(len(triangle), -1.0)
     for n in range(len(triangle)):
@@ -465,7 +465,7 @@ def _oddities(
 
 
 @compiled(nogil=True)
-def _forget_near(mask, known):  # type: ignore[no-untyped-def]
+def _forget_near(mask, known):
     height, width = mask.shape
     for y in range(height):
         for x in range(width):

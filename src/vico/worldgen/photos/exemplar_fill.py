@@ -50,7 +50,7 @@ def pull_push(image: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.
 
 
 @compiled(nogil=True)
-def _halve(image, known):  # type: ignore[no-untyped-def]
+def _halve(image, known):
     height, width = image.shape[:2]
     h, w = (height + 1) // 2, (width + 1) // 2
     small, mask = np.zeros((h, w, 3), np.uint8), np.zeros((h, w), np.bool_)
@@ -74,7 +74,7 @@ def _halve(image, known):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True)
-def _push(image, known, coarse):  # type: ignore[no-untyped-def]
+def _push(image, known, coarse):
     out = image.copy()
     height, width = known.shape
     h, w = coarse.shape[:2]
@@ -171,7 +171,7 @@ class _Sources(NamedTuple):
 
 
 @compiled(nogil=True)
-def _cost(picture, y, x, sy, sx, drift, best):  # type: ignore[no-untyped-def]
+def _cost(picture, y, x, sy, sx, drift, best):
     """Mean squared difference of the patches about (y, x) and (sy, sx); gives up above `best`."""
     image, hole, good = picture.image, picture.hole, picture.good
     height, width = hole.shape
@@ -210,7 +210,7 @@ def _cost(picture, y, x, sy, sx, drift, best):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True, inline="always")
-def _next_random(state):  # type: ignore[no-untyped-def]
+def _next_random(state):
     """SplitMix64: the next state and its random bits."""
     state = state + np.uint64(0x9E3779B97F4A7C15)
     z = state
@@ -220,12 +220,12 @@ def _next_random(state):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True, inline="always")
-def _may_be_copied(good, y, x):  # type: ignore[no-untyped-def]
+def _may_be_copied(good, y, x):
     return 0 <= y < good.shape[0] and 0 <= x < good.shape[1] and good[y, x]
 
 
 @compiled(nogil=True)
-def _as_coarser(coarse, y, x):  # type: ignore[no-untyped-def]
+def _as_coarser(coarse, y, x):
     """Return the source that the coarser level found for a texel; (-1, -1) for none."""
     if coarse.shape[0]:
         cy, cx = min(y // 2, coarse.shape[0] - 1), min(x // 2, coarse.shape[1] - 1)
@@ -235,7 +235,7 @@ def _as_coarser(coarse, y, x):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True)
-def _first_sources(picture, sources, coarse, drift, state):  # type: ignore[no-untyped-def]
+def _first_sources(picture, sources, coarse, drift, state):
     """Return a source for every missing texel to begin with: the coarser level's, else one at random."""
     height, width = picture.hole.shape
     field = np.full((height, width, 2), -1, np.int32)
@@ -257,7 +257,7 @@ def _first_sources(picture, sources, coarse, drift, state):  # type: ignore[no-u
 
 
 @compiled(nogil=True)
-def _paint(picture, field):  # type: ignore[no-untyped-def]
+def _paint(picture, field):
     for y in range(picture.hole.shape[0]):
         for x in range(picture.hole.shape[1]):
             if picture.hole[y, x]:
@@ -265,7 +265,7 @@ def _paint(picture, field):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True, inline="always")
-def _match_beside_neighbour(picture, field, y, x, step, drift, found):  # type: ignore[no-untyped-def]
+def _match_beside_neighbour(picture, field, y, x, step, drift, found):
     """Return what `found` says, or a better source beside that of the neighbour above (below) or left (right)."""
     sy, sx, best = found
     height, width = picture.hole.shape
@@ -282,7 +282,7 @@ def _match_beside_neighbour(picture, field, y, x, step, drift, found):  # type: 
 
 
 @compiled(nogil=True, inline="always")
-def _random_match(picture, y, x, drift, state, found):  # type: ignore[no-untyped-def]
+def _random_match(picture, y, x, drift, state, found):
     """Return the next state, and `found` or a better source: along the row, where facades repeat; then about it."""
     sy, sx, best = found
     height, width = picture.hole.shape
@@ -306,7 +306,7 @@ def _random_match(picture, y, x, drift, state, found):  # type: ignore[no-untype
 
 
 @compiled(nogil=True)
-def _find_matches(picture, sources, coarse, drift, rounds, seed):  # type: ignore[no-untyped-def]
+def _find_matches(picture, sources, coarse, drift, rounds, seed):
     """Find a source for every missing texel: from the coarser level, from neighbours, and at random, nearer and nearer.
 
     The picture is painted along the way: what is found first is what the next is compared with.
@@ -334,7 +334,7 @@ def _find_matches(picture, sources, coarse, drift, rounds, seed):  # type: ignor
 
 
 @compiled(nogil=True)
-def _copy_matches(image, hole, field, start):  # type: ignore[no-untyped-def]
+def _copy_matches(image, hole, field, start):
     out = image.copy()
     for y in range(hole.shape[0]):
         for x in range(hole.shape[1]):

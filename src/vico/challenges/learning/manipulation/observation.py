@@ -158,7 +158,7 @@ class Readings(NamedTuple):
 
 
 @compiled
-def hand_poses(chain, angles, out):  # type: ignore[no-untyped-def]
+def hand_poses(chain, angles, out):
     """Write the poses of many hands in their bases' frames, shape ``(n, 3, 4)``."""
     n = angles.shape[1]
     origins, directions = np.empty((n, 3)), np.empty((n, 3))
@@ -167,7 +167,7 @@ def hand_poses(chain, angles, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rotations_of(quaternions, out):  # type: ignore[no-untyped-def]
+def rotations_of(quaternions, out):
     """Write the matrices of unit quaternions (w, x, y, z), shape ``(n, 3, 3)``."""
     for k in range(len(quaternions)):
         w, x, y, z = quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3]
