@@ -104,7 +104,7 @@ def hundred(helsinki: World) -> Community:
 def test_a_member_that_fails_is_told_in_its_place() -> None:
     class Failing:
         rests_until = walks_until = -np.inf
-        stride, known, greeted, encounters = None, (), {}, 0  # type: ignore[var-annotated]
+        stride, acquaintances, greeting_times, encounters = None, (), {}, 0  # type: ignore[var-annotated]
 
         def act(self, observation: Any, info: Any) -> dict[str, Any]:
             raise ValueError("no idea")

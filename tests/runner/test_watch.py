@@ -28,7 +28,7 @@ def check(name: str, folder: Path) -> AgentCheck:
     ("name", "promise", "says"),
     [
         ("Searcher", "fair", "searches the process's objects"),
-        ("Spy", "fair", "imports vico.sim.loop.simulation"),
+        ("Spy", "fair", "imports vico.sim.loop"),
         ("FrameWalker", "fair", "looks at the frames"),
         ("Inspector", "fair", "looks at the frames"),
         ("Thief", "fair", "reads the world's folder"),

@@ -165,7 +165,7 @@ class ScheduleFollower:
 
     @property
     def encounters(self) -> int:
-        """Changes whenever `greeted` does."""
+        """Changes whenever `greeting_times` does."""
         return self._conversation.encounters
 
     @property

@@ -9,6 +9,7 @@ a package, too.
 from __future__ import annotations
 
 import fnmatch
+import json
 import stat
 import subprocess
 import sys
@@ -98,8 +99,7 @@ def installed_folder(package: Package) -> Path | None:
         record = read_json(folder / _RECORD)
     except (FileNotFoundError, SchemaError):
         return None
-    wanted = package.record()
-    wanted["members"] = list(wanted["members"])  # as JSON has them
+    wanted = json.loads(json.dumps(package.record()))  # tuples are lists in the file
     same = isinstance(record, dict) and all(
         record.get(key) == wanted[key] for key in ("schema", "name", "version", "sha256", "members")
     )

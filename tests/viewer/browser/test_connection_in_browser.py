@@ -31,7 +31,7 @@ def test_the_page_finds_a_server_that_was_started_again(
 def test_without_the_library_there_is_the_map_and_what_to_type(
     browser: None, page_run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(vico.viewer.three, "installed", lambda package: None)
+    monkeypatch.setattr(vico.viewer.three, "installed_folder", lambda package: None)
     with served(page_run) as address, open_page() as page:
         page.resize(800, 560)
         page.go_to(address)
