@@ -42,7 +42,7 @@ from vico.world.mesh import Surface
 from vico.world.world import stage_seconds
 from vico.worldgen.facts.ray_casting import RayCaster
 from vico.worldgen.photos.atlas import Atlas, unwrap, with_atlas_pages
-from vico.worldgen.photos.baking import BakeResult, _Expected, _paint, _Photos, bake
+from vico.worldgen.photos.baking import BakeResult, PhotoColours, _Expected, _paint, bake
 from vico.worldgen.photos.enhancement import inpaint_atlas, pad_gutters, upscale_atlas
 from vico.worldgen.request import packaged_extract
 
@@ -86,7 +86,9 @@ def truth_of(atlas: Atlas, mesh: TileMesh) -> tuple[NDArray[np.uint8], ...]:
     pages = tuple(page.copy() for page in atlas.pages)
     known = tuple(np.zeros_like(mask) for mask in atlas.known)
     exact = replace(atlas, pages=pages, known=known)
-    _paint(exact, _Expected.nothing(len(atlas.charts)), RayCaster(mesh.positions, mesh.triangles), _Photos(mesh), 0.12)
+    _paint(
+        exact, _Expected.nothing(len(atlas.charts)), RayCaster(mesh.positions, mesh.triangles), PhotoColours(mesh), 0.12
+    )
     return pages
 
 

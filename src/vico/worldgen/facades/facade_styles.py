@@ -486,7 +486,7 @@ def facade_style_of(
 ) -> FacadeStyle:
     """Dress a building: by its material, architecture and colour tags, else by use, age, size and region, and a draw.
 
-    `region` is what `catalogue.region_of` says; an unknown one counts as northern.
+    `region` is what `region_of` says; an unknown one counts as northern.
     """
     known, place = styles(), styles().region(region)
     draws = _Draws(*map(float, random.random(8)))
