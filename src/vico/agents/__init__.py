@@ -1,1 +1,1 @@
-"""Who acts: schedule followers and planners. They see observations and public maps, never the simulation."""
+"""Agents: schedule followers and planners. They see observations and public maps, never the simulation."""

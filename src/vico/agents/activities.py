@@ -1,4 +1,4 @@
-"""What residents do at a place: queue and buy at a till, serve customers behind it, take a seat or a bed.
+"""Activities of residents at a place: queue and buy at a till, serve customers behind it, take a seat or a bed.
 
 `Buyer` stands in line by what ``info["till"]`` tells, moves up, and is done once served. `Clerk` stands behind the till
 of the room it works in, where ``info["counter"]`` says. `SeatSeeker` goes to a free seat or bed through rooms and along

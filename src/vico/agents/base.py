@@ -1,4 +1,4 @@
-"""What an agent is: its actions, its plan, its saved state, and adapters that make agents of other things.
+"""The contract of an agent: its actions, its plan, its saved state, and adapters that make agents of other things.
 
 - `Agent` and `GroupAgent` are the interfaces. `RandomAgent` is the simplest agent.
 - What an agent remembers is plain data (`AgentState`): nested dicts of JSON values and NumPy arrays, no objects.

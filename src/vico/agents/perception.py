@@ -1,4 +1,4 @@
-"""What pictures show: points from depth, things in view, and the memory of what was seen, where and when.
+"""Perception from pictures: points from depth, entities in view, and the memory of sightings.
 
 `DepthGrid` is a grid of obstacles with A* on it. `SightingMemory` also remembers which rooms were looked at, and
 forgets what is no longer where it was.

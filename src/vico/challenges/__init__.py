@@ -1,1 +1,1 @@
-"""What is asked and how it is judged: one folder a challenge, one runner, one results table."""
+"""Challenges: tasks and their evaluation; one folder a challenge, one runner, one results table."""

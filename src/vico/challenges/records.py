@@ -1,4 +1,4 @@
-"""What a challenge is, and the records of its episodes; which challenges there are, loaded by name when asked for."""
+"""Records of a challenge and of its episodes, and the registry of challenges, loaded by name when asked for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tasks of robots have in common: their files, the robots' bodies and reachable ground, and how they are drawn.
+"""Robot tasks: their files, the robots' bodies and reachable ground, and how they are drawn.
 
 Task files are read and checked the same way in all challenges of robots. A task is drawn only where its robots can
 go: somebody, free ground, a thing, each choice out of nine.

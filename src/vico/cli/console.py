@@ -1,4 +1,4 @@
-"""What the verbs share on the terminal: progress bars, results, and signals that ask a command to end.
+"""The terminal of all verbs: progress bars, results, and signals that ask a command to end.
 
 Progress goes to stderr, results to stdout. The signals are Ctrl-C, a batch system's SIGTERM, and SIGHUP of a terminal
 that is closed.

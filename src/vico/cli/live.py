@@ -1,4 +1,4 @@
-"""What the verbs that show a run have in common: the viewer's server, its address, and waiting for Ctrl+C."""
+"""The viewer's server for verbs that show a run: its address, and waiting for Ctrl+C."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fast one thread of this machine is, beside that of the machine the README's figures were measured on."""
+"""Speed of one thread of this machine, beside that of the machine of the README's figures."""
 
 from __future__ import annotations
 

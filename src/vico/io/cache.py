@@ -1,4 +1,4 @@
-"""Where downloads and what is made of them are kept between runs."""
+"""The cache folder: downloads, and products of them, kept between runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the machine code of a compiled function is made from, as one number.
+"""Digest of the content of a compiled function: all that its machine code is made from.
 
 A function's code holds what it says, what each function that it calls says, and what the constants of modules that any
 of them refer to were worth; it is made for arguments of some types, with the fields that records have. All that is

@@ -1,4 +1,4 @@
-"""How compiled functions that call each other become one piece of machine code, optimised once.
+"""Linking of compiled functions that call each other into one piece of machine code, optimised once.
 
 numba optimises each function by itself, with all that it calls linked in, and makes machine code of it, however deep it
 lies below what Python calls. Most of our functions are called by compiled ones alone; one five calls deep was optimised

@@ -1,4 +1,4 @@
-"""Which compiled functions need not count references to arrays: those that only borrow them.
+"""Compiled functions that need no reference counts for arrays: those that only borrow them.
 
 In every function numba counts who refers to each array, one atomic operation for each array of each tuple that is
 handed on, and takes out again what it can see through. In kernels that hand tuples of dozens of arrays from rule to

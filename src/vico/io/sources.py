@@ -1,4 +1,4 @@
-"""What a module was made from, as one number: its source and that of all it imports of its package."""
+"""Digest of a module's source and of all that it imports of its package."""
 
 from __future__ import annotations
 

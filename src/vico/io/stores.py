@@ -1,4 +1,4 @@
-"""Where several machines leave what they make: a folder they share, or an object store (the extra ``s3``).
+"""Stores of files for several machines: a folder they share, or an object store (the extra ``s3``).
 
 A store is named by a folder, or by a URL that fsspec knows (``s3://bucket/prefix``). What is in it has names with
 slashes. Files appear whole or not at all; who writes the same name last wins, so what is written must not depend on who

@@ -1,4 +1,4 @@
-"""What is handed out, what comes back, and who does it; and checks that machines share one store and one code.
+"""Services, tasks, answers and executors; checks that machines share one store and one code.
 
 A `Service` names a function that makes the worker; a `Task` is plain JSON; an `Answer` is what came of it. An
 `Executor` does tasks side by side.

@@ -1,4 +1,4 @@
-"""Who does tasks on this machine: this process, several, or one helper process; and which executor is opened.
+"""Executors of tasks on this machine: this process, several processes, or one helper process.
 
 `open_executor` chooses between this process, processes of this machine and a Ray cluster (`vico.jobs.cluster`). A
 process that dies is started again, once for the task it died of. A `Helper` is one more process that does tasks in

@@ -1,4 +1,4 @@
-"""What a language model may cost, and what it has cost."""
+"""Budget of a language model: its limits, and its cost so far."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How it looks: a scene in, RGB, depth and segmentation for many cameras out, on the CPU.
+"""Rendering: a scene in, RGB, depth and segmentation for many cameras out, on the CPU.
 
 A picture is made in two passes over the arrays of a `Scene` (`arrays`, `records`): `visibility` finds the nearest
 triangle of every pixel, `shading` gives it a colour. `shadows` holds the maps that shading looks the sun and the sky up

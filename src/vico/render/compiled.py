@@ -1,4 +1,4 @@
-"""How the renderer's kernels are compiled: cached, without the interpreter's lock, with C's rules for division.
+"""Compiler options of the renderer's kernels: cached, without the interpreter's lock, with C's rules for division.
 
 An `inlined` function costs nothing where it is called: the compiler puts its body there. Rules that one loop applies to
 every pixel, triangle or instance are such functions.

@@ -1,4 +1,4 @@
-"""What is placed in a scene: prototypes with their levels of detail, their instances, and posed avatars.
+"""Instances in a scene: prototypes with their levels of detail, their placements, and posed avatars.
 
 Instances are joined, ordered along a curve, and grouped so that whole groups are culled at once. Posed bodies have room
 in a scene's mesh behind all that never moves.

@@ -1,4 +1,4 @@
-"""What is there to see: static surfaces, placed prototypes, and what moves, replaced each frame."""
+"""A scene: static surfaces, placed prototypes, and moving parts that are replaced each frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the kernels read of a camera and of the light of a moment: one record each, and the light's tables."""
+"""Uniforms of the kernels: one record of a camera, one of the light of a moment, and the light's tables."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What happens: the clock, the loop, avatars, robots, traffic, transit, observations and recordings."""
+"""The simulation: loop, state, people, robots, physics, traffic, transit, observations, pictures and recordings."""

@@ -1,4 +1,4 @@
-"""Who is in view of whom, by sight lines: the same whether pictures are rendered or not.
+"""Perception by sight lines: entities in view of each other, the same with and without pictures.
 
 In view is what is near, before the eyes, and not behind a building or in another room. A grid tells how high buildings
 stand (`OpaqueGrid`).

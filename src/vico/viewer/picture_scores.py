@@ -1,4 +1,4 @@
-"""How much pictures look like photos: FID and KID by a user's feature network, of two folders of pictures."""
+"""Scores of pictures against photos: FID and KID by a user's feature network, of two folders of pictures."""
 
 from __future__ import annotations
 

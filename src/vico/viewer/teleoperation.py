@@ -1,4 +1,4 @@
-"""How robots are steered by hand: wheels and legs, a drone, and an arm whose hand is led by inverse kinematics.
+"""Teleoperation of robots: wheels and legs, a drone, and an arm whose hand is led by inverse kinematics.
 
 Keys move the hand of an arm on wheels; inverse kinematics finds the joints.
 """

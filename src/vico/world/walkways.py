@@ -1,4 +1,4 @@
-"""Where people walk along streets: sidewalks, crossings and the corners that join them, as a graph of arrays.
+"""Walkways along streets: sidewalks, crossings and the corners that join them, as a graph of arrays.
 
 `walkways_past` leads the walkways of a city past all that stands there, and keeps the result in the user's cache: in
 27 km² that takes a minute and a half, and all runs of a city ask for the same.

@@ -1,1 +1,1 @@
-"""How a world is made: one module a stage, and the pipeline that runs them."""
+"""World generation: one folder or module a stage, and the pipeline that runs them."""

@@ -1,4 +1,4 @@
-"""What planners reckon with: durations of ways, searches and hand-overs, chances of finds, and habits of people.
+"""Estimates of planners: durations of paths, searches and hand-overs, chances of finds, and habits of people.
 
 Times are guesses of ours from the public map and from what such things take on average; with `distance` off every way
 takes the same (the ablation of the paper's appendix on distance modelling). Habits say how often people are at the

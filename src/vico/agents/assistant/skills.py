@@ -1,4 +1,4 @@
-"""What every assistant can do: go somewhere, look around a region, walk up to a thing, leave a building.
+"""Skills of every assistant: go somewhere, look around a region, walk up to an object, leave a building.
 
 A skill is asked once a step for an action, and answers None when it is done. Skills see what the agent observes and
 the public map, nothing else. `LookAround` turns about at one spot after the other, indoors in one room after the other.

@@ -1,1 +1,1 @@
-"""Who takes part in the influence challenge: main agents that court members, and the members themselves."""
+"""Agents of the influence challenge: main agents that court members, and the members themselves."""

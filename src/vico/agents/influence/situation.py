@@ -1,4 +1,4 @@
-"""What a main agent knows when it decides: public profiles, everybody's day, its own conversations and visits.
+"""A main agent's knowledge when it decides: public profiles, everybody's day, its own conversations and visits.
 
 It knows nothing else. A day says where somebody is to be found, and when they are on the way. A visit says what became
 of going to somebody: talked, or why not.

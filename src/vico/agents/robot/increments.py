@@ -1,4 +1,4 @@
-"""What a learned policy of a mobile manipulator is given and gives: state, increments, its sizes and its clock.
+"""Interface of a learned policy of a mobile manipulator: state, increments, their sizes and its clock.
 
 A policy acts twenty times a second. Its action holds an increment for each degree of freedom: of the arm, rad, and the
 fingers, metres, from where the joint *is* to where its servo is told to be; of the base, how far it is to go ahead,

@@ -1,1 +1,1 @@
-"""What residents remember, what can be asked of them, how they answer, and how answers are understood."""
+"""Conversation of residents: their memory, questions to them, their answers, and the reading of answers."""

@@ -1,4 +1,4 @@
-"""What a resident can tell at a moment, answers to questions, and the talker that gives them.
+"""Answers of a resident: its knowledge at a moment, answers to questions, and the talker that gives them.
 
 A resident tells from sight, from acquaintance, from what it heard, and of its own day, in the sentences of
 ``vico/data/agents/talk/answers.toml``. `Talker` listens, decides whether a message is meant for it, and answers: from

@@ -1,4 +1,4 @@
-"""What residents say when they meet: short, friendly, and about their own lives."""
+"""Small talk of residents when they meet: short, friendly, and about their own lives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What residents remember of a day: whom they saw, where they were, and what they heard. All of it is bounded.
+"""A resident's memory of a day: people seen, places visited, messages heard. All of it is bounded.
 
 Looking about is remembered every ten seconds by the clock, so that it does not matter who is asked when. `CrowdMemory`
 takes down in arrays whom many residents see, and tells their memories when these are wanted.

@@ -1,4 +1,4 @@
-"""What robots of a team share: turning towards a point, finding somebody in view, messages, and a robot that waits.
+"""Skills that robots of a team share: turning to a point, finding a person in view, messages, and waiting.
 
 Messages are plain sentences that anybody could say.
 """

@@ -1,4 +1,4 @@
-"""What a file of models may hold: a strict schema, one entry a model, one labelled primitive a part.
+"""The schema of a file of models: strict, one entry a model, one labelled primitive a part.
 
 `docs/adding_a_model.md` says how to write one. Lengths are metres, angles degrees; the frame is that of `Model`.
 """

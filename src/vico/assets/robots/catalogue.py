@@ -1,4 +1,4 @@
-"""Which robots are known, by name, and the packages that richer models of them come from."""
+"""Known robots by name, and the packages that richer models of them come from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where tasks take place: regions that tasks speak of, and the things of a task on their surfaces.
+"""Regions of tasks, and the objects of a task on their surfaces.
 
 Regions are places and spots outdoors within a walk of the start that somebody knows. Things lie where they find room
 beside others: a chair holds one toolbox.

@@ -1,4 +1,4 @@
-"""What makes each registered task: ``gymnasium.make("vico/PointGoal-v0", world=...)``."""
+"""Makers of the registered tasks: ``gymnasium.make("vico/PointGoal-v0", world=...)``."""
 
 from __future__ import annotations
 

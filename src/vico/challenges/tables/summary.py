@@ -1,4 +1,4 @@
-"""What a method came to in a category: means of all metrics, causes of failure, faults, and what it cost.
+"""Summary of a method in a category: means of all metrics, causes of failure, faults, and cost.
 
 Means have 95 % confidence intervals, where episodes of one world are more alike than those of two.
 """

@@ -1,4 +1,4 @@
-"""What the categories of teaming are made of: how their tasks are drawn, and what the judge sees once a second."""
+"""Categories of teaming: how their tasks are drawn, and the judge's view once a second."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which formats there are. A new one is a module beside these, and an entry here."""
+"""Dataset formats by name. A new one is a module beside these, and an entry here."""
 
 from __future__ import annotations
 

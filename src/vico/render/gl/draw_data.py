@@ -1,4 +1,4 @@
-"""What shaders are given for a picture: uniforms of camera and light, lamps, shadow casters, and visible ranges."""
+"""Data of the shaders for a picture: uniforms of camera and light, lamps, shadow casters, and visible ranges."""
 
 from __future__ import annotations
 

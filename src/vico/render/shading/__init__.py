@@ -1,1 +1,1 @@
-"""Which colour a pixel gets: texture, sun, sky light, lamps, haze; and the sky itself."""
+"""Shading of pixels: texture, sun, sky light, lamps, haze; and the sky itself."""

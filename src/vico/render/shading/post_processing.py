@@ -1,4 +1,4 @@
-"""What is done to a finished picture: darker corners, smoother edges, and what weather adds to it.
+"""Post-processing of a finished picture: darker corners, smoother edges, and the weather.
 
 Weather adds what wet ground mirrors, and drops and flakes that fall before the picture. Wet ground mirrors what the
 picture itself shows: the ray off it is followed up its column until something stands in its way, which is exact for a

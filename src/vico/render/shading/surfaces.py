@@ -1,4 +1,4 @@
-"""What is worked out once for a triangle, and normals and past places of a picture's pixels.
+"""Per-triangle set-up, and normals and past places of a picture's pixels.
 
 Normals, and where each seen point was before, are read off the keys that the visibility pass left.
 """

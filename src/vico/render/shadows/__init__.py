@@ -1,1 +1,1 @@
-"""Where the light is blocked: maps of the static scene, and shadows of what moves."""
+"""Shadows: maps of the static scene, and shadows of moving bodies."""

@@ -1,4 +1,4 @@
-"""What moves, as it throws a shadow: where it is, which way the sun is from it, and which pixels it may darken.
+"""Moving shadow casters: their place, the direction of the sun, and the pixels that they may darken.
 
 Each limb of a person is a capsule. Seen from the sun a capsule is a line with a rim, wherever along the light it is: so
 a point's distance from that line says whether it is in shadow, and how far the capsule is ahead how soft the rim is.

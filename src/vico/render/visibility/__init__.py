@@ -1,1 +1,1 @@
-"""Which triangle is seen in which pixel: culling, rasterising, depth and entities."""
+"""Visibility of triangles in pixels: culling, rasterising, depth and entities."""

@@ -1,4 +1,4 @@
-"""What may be in view, nearest first: out go what is out of the frustum, too small, turned away, elsewhere or hidden.
+"""Culling, nearest first: drops parts out of the frustum, too small, turned away, elsewhere or hidden.
 
 Here and in `vico.render.visibility.draw`, functions that are called for every item take single arrays: passing all of a
 scene's costs half a microsecond.

@@ -1,4 +1,4 @@
-"""What agents may ask for: one table of actions, judged with codes and sentences, then performed."""
+"""Actions of agents: one table, judged with codes and sentences, then performed."""
 
 from vico.sim.actions.model import ActionType, Command, Refusal
 from vico.sim.actions.table import (

@@ -1,4 +1,4 @@
-"""What one kind of action is: its fields, who may do it in which situation, how it is checked and done.
+"""An action type: its fields, its actors and situations, its check and its effect.
 
 A field says what values it takes, and how anything at all is turned into one or refused.
 """

@@ -1,4 +1,4 @@
-"""What robots may do, and where their actions are refused."""
+"""Actions of robots, and their refusals."""
 
 from __future__ import annotations
 

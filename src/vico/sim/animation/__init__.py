@@ -1,4 +1,4 @@
-"""How people move: a library of procedural motions on the 55 joints, computed for everybody in one call.
+"""Animation of people: a library of procedural motions on the 55 joints, computed for everybody in one call.
 
 A motion is a function of a phase in 0..1 (one cycle; two steps when walking), so it can be stopped, resumed, replayed
 and stretched. Gaits are driven from the feet: a planted foot rolls over the ground where it stands, kerb or slope,

@@ -1,4 +1,4 @@
-"""Which motion somebody makes, and from one motion into the next, for everybody in one call. Compiled.
+"""Motion clips: each person's clip, and blending from one clip into the next, for everybody in one call. Compiled.
 
 Joints turn over, feet step from where they stand to where they are needed. A foot that bears weight does not slide: who
 stops brings the foot that is in the air down first and the other one after it, each lifted; who sets out goes on from

@@ -1,4 +1,4 @@
-"""What is the same for everybody: weather, ground, sun and moon, events of the city, and what they do."""
+"""The environment, the same for everybody: weather, ground, sun and moon, events of the city, and their effects."""
 
 from vico.sim.environment.agenda import Agenda
 from vico.sim.environment.city_events import CityEvent, EventKind, Occurrence, event_kinds

@@ -1,4 +1,4 @@
-"""What is the same for everybody outdoors: the weather, what lies on the ground, sun and lamps, and what they do.
+"""Outdoor conditions, the same for everybody: weather, the ground's state, sun and lamps, and their effects.
 
 `conditions` says how far people see, how well vehicles brake and how fast they go; each is one function of the weather
 and the dark, so that whoever moves or looks asks for the same figure. `Sky` says where sun and moon stand over a place

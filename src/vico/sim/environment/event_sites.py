@@ -1,4 +1,4 @@
-"""Where events can be, what stands there, and who comes: places, streets, lanes, barriers, stalls and crowds.
+"""Sites of city events: places, streets, lanes, barriers, stalls and crowds.
 
 A record of an event names places, streets or lanes of a world. There are a barrier before each lane that is closed,
 stalls over a square, or a stage; a gathering says how many people come, where each stands or strolls, and along what a

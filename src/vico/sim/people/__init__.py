@@ -1,1 +1,1 @@
-"""What people do: stand, sit, hold and put things, pass doors, ride, hear and learn of events."""
+"""People in a simulation: they stand, sit, hold and put objects, pass doors, ride, hear and learn of events."""

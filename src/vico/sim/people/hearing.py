@@ -1,4 +1,4 @@
-"""Who hears what is said, and who learns of which event of the city.
+"""Hearing of messages, and knowledge of events of the city.
 
 A voice gets fainter with distance and behind corners, and noise covers it. An event is known if it was announced, read
 of at the door of a place that it closes, heard, or seen.

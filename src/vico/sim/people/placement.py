@@ -1,4 +1,4 @@
-"""Where people stand, sit and wait in line, what their hands hold, and where things are put.
+"""Free places of people to stand, sit and queue, objects in their hands, and free places to put objects.
 
 Standing somebody indoors or outdoors moves along what they carry. Nobody sits down into whoever stands beside the
 seat, and no thing lies in one place with another thing or with somebody.

@@ -1,4 +1,4 @@
-"""What a physics engine has to do for the robots, and engines by name.
+"""The protocol of a physics engine, and engines by name.
 
 A further engine is written against two protocols. A `PhysicsScene` is everything that is fixed once it is built:
 ground, solids, robots, and a preallocated number of kinematic bodies and free rigid objects. It is built once a world

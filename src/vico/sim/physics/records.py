@@ -1,4 +1,4 @@
-"""What an engine is given and what it answers, the same for every engine, and how long a frame of physics lasts.
+"""Records of a physics engine's input and output, the same for every engine; the length of a physics frame.
 
 The specification asks for 100 frames a second. That is what robots get whose motors are commanded directly, that have
 fallen, that hold or move things, or near which things fall or are pushed. Gaits and wheels that follow velocities,

@@ -1,4 +1,4 @@
-"""What of a world robots can touch: ground, walls, things that stand outdoors, and movable things that physics moves.
+"""Solids that robots can touch: ground, walls, outdoor objects, and movable objects that physics moves.
 
 Walls count up to the height robots reach. Of a city the tiles around robots are read chunk by chunk, the rest is not.
 

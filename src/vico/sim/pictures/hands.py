@@ -1,4 +1,4 @@
-"""What is drawn in people's hands: what they carry, umbrellas, placards, and what they eat and drink.
+"""Drawn objects in people's hands: carried things, umbrellas, placards, food and drink.
 
 Umbrellas lean so that two of them never pass through each other.
 """

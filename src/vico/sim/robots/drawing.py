@@ -1,4 +1,4 @@
-"""What can be seen and met of robots: their outlines, links, cameras and decks."""
+"""Robots in pictures and collisions: their outlines, links, cameras and decks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What robots that fly do for the next sub-step: along their paths, over whoever is below, down to the ground.
+"""Flight of drones in the next sub-step: along their paths, above people and vehicles, down to the ground.
 
 They keep apart from whoever is below and from each other, inside the world, and not too high.
 """

@@ -1,4 +1,4 @@
-"""What is fixed about the robots of a run: models, controllers by name, groups, outlines, and where they start.
+"""Fixed facts of the robots of a run: models, controllers by name, groups, outlines, and start poses.
 
 A `RobotScene` is built once a world and kinds of robots, and all its simulations share it. Others meet an upright box
 around each robot.

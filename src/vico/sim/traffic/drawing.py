@@ -1,4 +1,4 @@
-"""What others read of traffic: bodies, drawn vehicles with their lamps, gaits of pedestrians, and passengers.
+"""Traffic for other systems: bodies, drawn vehicles with their lamps, gaits of pedestrians, and passengers.
 
 Nothing here changes the traffic. Vehicles stand on slopes on their axles.
 """

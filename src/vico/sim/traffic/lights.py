@@ -1,4 +1,4 @@
-"""Which lights a vehicle shows: brakes, indicators, both indicators at once."""
+"""Lights of a vehicle: brakes, indicators, both indicators at once."""
 
 from __future__ import annotations
 

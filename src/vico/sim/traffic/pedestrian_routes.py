@@ -1,4 +1,4 @@
-"""Where pedestrians go: the next walkway, the point they follow, crossings, and walking groups.
+"""Routes of pedestrians: the next walkway, the point they follow, right of way at crossings, walking groups.
 
 At a crossing either vehicles or pedestrians go first (`yields_to_pedestrians`, `must_wait_at_crossing`). Vehicles wait
 for a pedestrian until it is off the crossing that it walked over.

@@ -1,4 +1,4 @@
-"""How pedestrians walk and stand: on sidewalks, round each other, over crossings when those are clear.
+"""Motion of pedestrians: on sidewalks, round each other, over crossings when those are clear.
 
 Each follows a point that runs a little ahead of it along its walkway, on the right-hand side. Of a few headings around
 that point it takes the one that leads furthest, and makes no step that would touch another body.

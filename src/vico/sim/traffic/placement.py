@@ -1,4 +1,4 @@
-"""Where vehicles and pedestrians start: by the seed, at bus stops, or as a file of traffic lists them.
+"""Start positions of vehicles and pedestrians: by the seed, at bus stops, or from a file of traffic.
 
 Cars and pedestrians of a file have routes: the network is given the ways that lead there from wherever they are.
 """

@@ -1,4 +1,4 @@
-"""Where vehicles go: cars choose at every junction, buses follow their route."""
+"""Routes of vehicles: cars choose at every junction, buses follow their route."""
 
 from __future__ import annotations
 

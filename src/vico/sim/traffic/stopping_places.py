@@ -1,4 +1,4 @@
-"""Where cars stop and pedestrians stand: parking spots, edges of lanes for deliveries, and standing spots.
+"""Stopping places: parking spots, edges of lanes for deliveries, and standing spots of pedestrians.
 
 Each spot in a car park has a way of its own that leaves the lane, leads into the spot, and out of it again.
 Pedestrians stand before shop windows, in twos on wide sidewalks, and at stops of buses and trams. Each standing spot

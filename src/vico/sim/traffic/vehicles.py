@@ -1,4 +1,4 @@
-"""How vehicles drive, one step of all of them; the rules are in the modules named after them.
+"""Motion of vehicles, one step of all of them; the rules are in the modules named after them.
 
 The leader is whatever body a vehicle's own swept outline meets first: vehicles, pedestrians, avatars and robots alike.
 No move is made that would touch another body, so vehicles never overlap whatever the model says.

@@ -1,4 +1,4 @@
-"""What the server answers: the page, the city and the run over HTTP, and a stream of frames over a WebSocket.
+"""Routes of the viewer's server: the page, the city and the run over HTTP, and frames over a WebSocket.
 
 A `Client` is owed what it asked for, in bounded queues: what it cannot take is dropped, or it is closed. The `Stream`
 reads what clients ask for and holds them to the rules (docs/viewer_protocol.md).

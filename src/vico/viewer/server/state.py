@@ -1,4 +1,4 @@
-"""What the server shows, what is new in it, and who is let in: all that needs no server package.
+"""State of the viewer's server: the source it shows, its news, and access. It needs no server package.
 
 `ViewerState` holds what is shown, and by what hands the run can be reached; it is the same for all clients. The `Hub`
 wakes clients when a run has gone on: frames are encoded once, JSON messages go to those who follow.

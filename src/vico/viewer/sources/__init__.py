@@ -1,1 +1,1 @@
-"""Where the viewer's frames come from: a run folder, or a simulation that goes on; both give the same."""
+"""Sources of the viewer's frames: a run folder, or a simulation that goes on; both give the same."""

@@ -1,4 +1,4 @@
-"""What an agent sees at a step, as pictures for the page: colour, depth, and segmentation with its names."""
+"""An agent's view at a step, as pictures for the page: colour, depth, and segmentation with its names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the names of streets are read: on walls of the houses at their corners, or on posts that stand there."""
+"""Street name signs: on walls of the houses at corners, or on posts that stand there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How high buildings are that don't say: by kind, by neighbours of their use, by the area, by the town."""
+"""Heights of buildings without tags: by kind, by neighbours of their use, by the area, by the town."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which models the things of maps have: data of ``vico/data/worldgen/objects`` and of a user's own, read once.
+"""Models of mapped objects: data of ``vico/data/worldgen/objects`` and of a user's own, read once.
 
 docs/adding_an_object.md describes the files.
 """

@@ -1,4 +1,4 @@
-"""Which building a place is in, and the doors it is entered by."""
+"""The building of a place, and the doors that it is entered by."""
 
 from __future__ import annotations
 

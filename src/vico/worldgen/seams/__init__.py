@@ -1,1 +1,1 @@
-"""Where the tiles of a city meet: heights, streets and the drawn ground of neighbours made one."""
+"""Seams between the tiles of a city: heights, streets and the drawn ground of neighbours made one."""

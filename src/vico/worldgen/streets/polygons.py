@@ -1,4 +1,4 @@
-"""Where streets lie: carriageways, sidewalks, crossings and squares as polygons, from OpenStreetMap ways.
+"""Street polygons from OpenStreetMap ways: carriageways, sidewalks, crossings and squares.
 
 OpenStreetMap draws streets as lines. Their widths come from `width`, else from lanes, class and parking lanes. Ways
 and areas take strips of ground, by what they are for; crossings are drawn as ways, or are points. The polygons are

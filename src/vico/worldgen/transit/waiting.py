@@ -1,4 +1,4 @@
-"""Where people wait for buses and trams: on the pavement if they can board from there, else beside the vehicle.
+"""Waiting places for buses and trams: on the pavement if people can board from there, else beside the vehicle.
 
 Streets may be wider than the lanes that are driven: then the pavement is out of reach of the doors.
 """

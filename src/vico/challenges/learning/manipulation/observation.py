@@ -1,4 +1,4 @@
-"""What all copies of an environment look like at a moment, and what a learner is told of it, as arrays."""
+"""State of all copies of an environment at a moment, and a learner's observation of it, as arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a photo was really taken, and where its colours lie on a wall: a camera's pose, and a nudge for each wall.
+"""Registration of street photos: a camera's pose, and a shift of its colours for each wall.
 
 The pose is found from points that the photo shares with a rendered view. The paper's way is the essential matrix by
 the five-point method (Nister 2004), which leaves the length of the step open: the render's depth tells it. As every
