@@ -63,7 +63,7 @@ def test_causes_methods_and_fields_are_those_of_the_code() -> None:
     assert set(ASSISTANT.methods) - {"llm"} <= set(first_column(section("Methods")))
     city = toy_city.world()
     (told,) = task("delivery", [subtask([SHOP], CAFE_TABLE)], city).instructions()
-    page = section("What assistants are told")
+    page = section("Instructions of assistants")
     assert first_column(page) == list(told)
     assert all(f"`{field}`" in page for field in (*told["sources"][0], *told["destination"]["surface"]))
 

@@ -85,7 +85,7 @@ def _summary(layout: Layout, record: Mapping[str, Any], size: int) -> str:
 
 def _contents(layout: Layout, record: Mapping[str, Any]) -> str:
     lines = [
-        "## What a frame holds",
+        "## Contents of a frame",
         "",
         "What an agent observed, and what it did next; one frame each time that it acted.",
         "",
