@@ -73,9 +73,13 @@ def test_a_stopped_run_goes_on_after_the_step_it_was_at_by_the_command_it_names(
     capsys: pytest.CaptureFixture[str], number: int, code: int,
 ) -> None:  # fmt: skip
     out = tmp_path / "my run"
+    if number == signal.SIGHUP:  # a shell's nohup has it ignored, which the command respects
+        before = signal.signal(number, signal.SIG_DFL)
     with monkeypatch.context() as patched:
         send_after(patched, 5, number)
         assert vico(*words, "--out", out) == code
+    if number == signal.SIGHUP:
+        signal.signal(number, before)
     told = capsys.readouterr().err.splitlines()[-1]
     assert f"stopped after step 5 of {STEPS}; go on with: vico run --resume" in told
     assert checkpoint_steps(out) == [5]
