@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -46,6 +47,8 @@ def main() -> int:
     """Run from the command line."""
     argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0]).parse_args()
     pip = ("-m", "pip", "--disable-pip-version-check", "--quiet")
+    # setuptools builds on what it left there before: modules that are gone would be in the wheel.
+    shutil.rmtree(ROOT / "build", ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix="vico-wheel-") as folder:
         here = Path(folder)
         run(sys.executable, *pip, "wheel", "--no-deps", "--wheel-dir", here, ROOT, at=here)
