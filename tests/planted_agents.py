@@ -182,6 +182,15 @@ class Vandal(Honest):
         return dict(WAIT)
 
 
+class SideDoor(Honest):
+    """Takes the state behind the run from the module that offers it to challenges."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        from vico.runner.truth import GroundTruth
+
+        return {"type": "communicate", "text": GroundTruth.__name__}
+
+
 class Spy(Honest):
     """Looks for the simulation in all that lives in its process, and says how many it found."""
 

@@ -18,15 +18,18 @@ def names_of(module: str) -> frozenset[str]:
     if not path.exists():
         return frozenset()
     found = {"__doc__"} | {inner.stem for inner in place.iterdir()} if place.is_dir() else {"__doc__"}
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    is_lazy = any(isinstance(node, ast.FunctionDef) and node.name == "__getattr__" for node in body)
+    for node in body:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             found.add(node.name)
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            found.add(node.id)
         elif isinstance(node, ast.ImportFrom | ast.Import):
             found.update(alias.asname or alias.name for alias in node.names)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            found.add(node.value)  # names that a package looks up when they are first asked for
+        else:
+            inner = list(ast.walk(node))
+            found.update(one.id for one in inner if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store))
+            if is_lazy:  # the package's table of names that are looked up when they are first asked for
+                found.update(one.value for one in inner if isinstance(one, ast.Constant) and isinstance(one.value, str))
     return frozenset(found)
 
 

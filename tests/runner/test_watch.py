@@ -29,6 +29,7 @@ def check(name: str, folder: Path) -> AgentCheck:
     [
         ("Searcher", "fair", "searches the process's objects"),
         ("Spy", "fair", "imports vico.sim.loop"),
+        ("SideDoor", "fair", "imports vico.runner.truth"),
         ("FrameWalker", "fair", "looks at the frames"),
         ("Inspector", "fair", "looks at the frames"),
         ("Thief", "fair", "reads the world's folder"),

@@ -23,7 +23,7 @@ from typing import Any
 from vico.errors import InputError
 
 #: Parts of vico that hold the truth, or the tasks' answers.
-CLOSED = ("vico.sim", "vico.challenges", "vico.viewer", "vico.worldgen")
+CLOSED = ("vico.sim", "vico.challenges", "vico.viewer", "vico.worldgen", "vico.runner.truth")
 
 _OTHER_PROCESS = re.compile(r"/proc/(\d+)(/|$)")
 _PACKAGE = str(Path(__file__).parents[1]) + os.sep

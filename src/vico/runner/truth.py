@@ -1,6 +1,6 @@
-"""The state behind a run, for challenges: authors change it before the first step, judges ask about it after.
+"""Ground truth of a run, for challenges: authors change it before the first step, judges read it afterwards.
 
-Agents get none of this. Challenges import these types from here: rooms above the runner don't know the simulation.
+Challenges import these types from here, because they do not know the simulation. Agents must not import this module.
 """
 
 from vico.sim.loop.scenario import GroundTruth as GroundTruth

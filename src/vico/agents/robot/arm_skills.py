@@ -17,10 +17,10 @@ from vico.agents.base import AgentState
 from vico.agents.robot.arm_interface import ArmStage, ArmTask
 from vico.agents.robot.body import (
     ArmBody,
+    ArmServos,
     Drive,
     PointView,
     Stance,
-    follow_joint_path,
     free_distance_ahead,
     view_points,
 )
@@ -83,7 +83,7 @@ _THERE = 0.03
 _SPEED, _LADEN = 0.8, 0.5
 
 
-class ArmJob:
+class ArmJob(ArmServos):
     """What an arm at work remembers; stages are functions of it, the observation and the angles it felt.
 
     Attributes
@@ -117,7 +117,7 @@ class ArmJob:
     """
 
     def __init__(self, body: ArmBody, *, period: float) -> None:
-        self.body, self.period = body, period
+        super().__init__(body, period=period)
         self.work, self.stage = ArmTask.NOTHING, ArmStage.IDLE
         self.held: HeldObject | None = None
         self.outcome = self.why = ""
@@ -126,15 +126,12 @@ class ArmJob:
         self.entity = 0
         self.target = np.zeros(3)
         self.beside: Array | None = None
-        self.servos = np.concatenate([body.rest, [0.0, 0.0]])
         self.angles = body.rest.copy()
         self.knows = False
         self.timer = self.stuck = 0.0
         self.tries = 0
         self.skip: set[int] = set()
         self.reach: ReachPlan | None = None
-        self.way: Array | None = None
-        self.point = 0
         self.start = np.zeros(2)
         self.box: ObjectBox | None = None
 
@@ -158,21 +155,7 @@ class ArmJob:
 
     def follow(self, angles: Array) -> bool:
         """Bring the servos on along the way; return whether the arm is at its end."""
-        way = self.way
-        assert way is not None
-        most = self.body.fastest[:7] * self.period * (_SPEED if self.held is None else _LADEN)
-        self.point = follow_joint_path(way, self.point, self.servos[:7], most)
-        return self.point >= len(way) and float(np.abs(way[-1] - angles[:7]).max()) < _THERE
-
-    def fingers(self, goal: float) -> bool:
-        """Bring the fingers' servos towards a way off the middle; return whether they are told to be there."""
-        most = self.body.fastest[7:] * self.period
-        self.servos[7:] += np.clip(goal - self.servos[7:], -most, most)
-        return bool(np.abs(self.servos[7:] - goal).max() < 1e-9)
-
-    def hold(self, forward: float = 0.0, turn: float = 0.0) -> Action:
-        """Return the action that leaves the servos as they are told, with speeds of the base, m/s and rad/s."""
-        return {"type": "control", "vector": [*self.servos.tolist(), forward, turn]}
+        return self.follow_way(angles, speed=_SPEED if self.held is None else _LADEN, tolerance=_THERE)
 
     def begin_way(self, way: Array, stage: ArmStage) -> None:
         """Enter a stage in which the arm goes a way."""

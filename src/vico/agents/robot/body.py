@@ -281,6 +281,59 @@ def follow_joint_path(way: Array, point: int, servos: Array, most: Array) -> int
     return point
 
 
+class ArmServos:
+    """Positions that the servos of an arm and its jaw are told, and the joint path that they are brought along.
+
+    Parameters
+    ----------
+    body
+        The arm.
+    period
+        Seconds between two actions.
+
+    Attributes
+    ----------
+    servos
+        Told positions of joints and fingers, rad and metres, shape ``(9,)``.
+    way, point
+        The path, angles of shape ``(m, 7)``, and the index of its next point; None without a path.
+    """
+
+    def __init__(self, body: ArmBody, *, period: float) -> None:
+        self.body, self.period = body, period
+        self.servos = np.concatenate([body.rest, [0.0, 0.0]])
+        self.way: Array | None = None
+        self.point = 0
+
+    def follow_way(self, angles: Array, *, speed: float, tolerance: float) -> bool:
+        """Bring the servos on along the path; return whether the arm is at its end.
+
+        Parameters
+        ----------
+        angles
+            Measured positions of joints and fingers.
+        speed
+            Share of the fastest that the joints can.
+        tolerance
+            Distance from the end that counts as there, rad.
+        """
+        way = self.way
+        assert way is not None
+        most = self.body.fastest[:7] * self.period * speed
+        self.point = follow_joint_path(way, self.point, self.servos[:7], most)
+        return self.point >= len(way) and float(np.abs(way[-1] - angles[:7]).max()) < tolerance
+
+    def fingers(self, goal: float) -> bool:
+        """Bring the fingers' servos towards metres off the middle; return whether they are told to be there."""
+        most = self.body.fastest[7:] * self.period
+        self.servos[7:] += np.clip(goal - self.servos[7:], -most, most)
+        return bool(np.abs(self.servos[7:] - goal).max() < 1e-9)
+
+    def hold(self, forward: float = 0.0, turn: float = 0.0) -> Action:
+        """Return the action that leaves the servos as they are told, with speeds of the base, m/s and rad/s."""
+        return {"type": "control", "vector": [*self.servos.tolist(), forward, turn]}
+
+
 def rotate_aside(spot: Array, away: float) -> Array:
     """Return a spot at the same distance from the base's middle and at the same height, so many metres to the left."""
     radius = max(float(np.hypot(*spot[:2])), abs(away))

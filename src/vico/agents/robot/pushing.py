@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.base import AgentState
-from vico.agents.robot.body import ArmBody, Drive, Stance, follow_joint_path, view_points
+from vico.agents.robot.body import ArmBody, ArmServos, Drive, Stance, view_points
 from vico.agents.robot.grasps import object_box
 from vico.agents.robot.reaching import room_around
 from vico.exact import dot
@@ -67,7 +67,7 @@ class PushStage(StrEnum):
     RAISE = "raise"
 
 
-class Pusher:
+class Pusher(ArmServos):
     """Pushes one thing after the other; asked as often as its robot acts, while it is `busy`.
 
     The robot goes round the thing, opens its jaw across the way as far as the thing is wide, holds it just above the
@@ -91,17 +91,14 @@ class Pusher:
     """
 
     def __init__(self, body: ArmBody, *, period: float) -> None:
-        self.body, self.period = body, period
+        super().__init__(body, period=period)
         self.stage = PushStage.IDLE
         self.outcome = self.why = ""
-        self.servos = np.concatenate([body.rest, [0.0, 0.0]])
         self._drive = Drive(period=period)
         self._entity = 0
         self.thing, self._goal, self._from = np.zeros(2), np.zeros(2), np.zeros(2)
         self._knows = False
         self._timer = self._still = self._looked = 0.0
-        self._way: Array | None = None
-        self._point = 0
         self._opening = 0.0
         self._lifts, self._lifted = np.zeros((0, 7)), 0  # angles from where fingers push up, and which of them is told
 
@@ -148,7 +145,7 @@ class Pusher:
         if self._timer > self._longest() and self.stage is not PushStage.COME:
             return self._give_up(observation, f"no end of {self.stage}")
         if self.wants_picture and "depth" not in observation:
-            return self._hold()
+            return self.hold()
         return _PUSH_STAGES[self.stage](self, observation, angles)
 
     def _longest(self) -> float:
@@ -163,24 +160,24 @@ class Pusher:
                 self._drive.begin(behind, near=_NEAR)
             else:
                 self._next(PushStage.ALIGN)
-                return self._hold()
+                return self.hold()
         action = self._drive.act(observation)
         if self._drive.busy:
             return action
         if not self._drive.arrived:
             return self._end("no way there")
         self._next(PushStage.ALIGN)
-        return self._hold()
+        return self.hold()
 
     def _align(self, observation: Mapping[str, Any], angles: Array) -> Action:
         """Turn to the thing."""
         error = self._bearing(observation)
         moves = float(np.abs(observation["sensors"]["base_velocity"]).max()) > _STANDS
         if abs(error) > _ALIGNED:
-            return self._hold(turn=float(np.clip(_GAIN * error, -_TURN, _TURN)))
+            return self.hold(turn=float(np.clip(_GAIN * error, -_TURN, _TURN)))
         if not moves:
             self._next(PushStage.LOOK)
-        return self._hold()
+        return self.hold()
 
     def _look(self, observation: Mapping[str, Any], angles: Array) -> Action:
         """See how wide the thing is, and plan the arm's way down before it."""
@@ -205,13 +202,13 @@ class Pusher:
             return self._end("out of reach")
         self._lifts, self._lifted = np.vstack([found[0], up]), 0
         self._take(way, PushStage.LOWER)
-        return self._hold()
+        return self.hold()
 
     def _lower(self, observation: Mapping[str, Any], angles: Array) -> Action:
-        self._fingers(self._opening)
+        self.fingers(self._opening)
         if self._follow(angles):
             self._next(PushStage.PUSH)
-        return self._hold()
+        return self.hold()
 
     def _push(self, observation: Mapping[str, Any], angles: Array) -> Action:
         """Drive on, towards where the thing is to be."""
@@ -226,7 +223,7 @@ class Pusher:
         if float(dot(missing, ahead)) < THERE / 2:
             self._from = stance.position[:2].copy()
             self._next(PushStage.BACK)
-            return self._hold()
+            return self.hold()
         if abs(self._bearing(observation)) > _ASIDE:
             return self._give_up(observation, "it slipped off")
         moves = float(np.abs(observation["sensors"]["base_velocity"][:2]).max()) > _STANDS
@@ -235,22 +232,22 @@ class Pusher:
             return self._give_up(observation, "it does not move")
         self._keep_up(angles, moves)
         off = math.atan2(float(ahead[0] * missing[1] - ahead[1] * missing[0]), float(dot(ahead, missing)))
-        return self._hold(_SPEED if moves else _HARD, float(np.clip(_STEER * off, -_STEER_MOST, _STEER_MOST)))
+        return self.hold(_SPEED if moves else _HARD, float(np.clip(_STEER * off, -_STEER_MOST, _STEER_MOST)))
 
     def _goes_back(self, observation: Mapping[str, Any], angles: Array) -> Action:
         gone = float(np.hypot(*(Stance.of(observation).position[:2] - self._from)))
         moves = float(np.abs(observation["sensors"]["base_velocity"]).max()) > _STANDS
         self._still = 0.0 if moves else self._still + self.period
         if gone < _BACK and self._still < _STUCK:
-            return self._hold(-_BACK_SPEED)
+            return self.hold(-_BACK_SPEED)
         way = np.vstack([self.servos[:7], self.body.rest])
         self._take(way, PushStage.RAISE)
-        return self._hold()
+        return self.hold()
 
     def _raise(self, observation: Mapping[str, Any], angles: Array) -> Action:
-        self._fingers(0.0)
+        self.fingers(0.0)
         if not self._follow(angles):
-            return self._hold()
+            return self.hold()
         if self.why:
             return self._end(self.why)
         off = distance(self._goal, self.thing)
@@ -281,24 +278,14 @@ class Pusher:
         return math.atan2(float(y), float(x))
 
     def _follow(self, angles: Array) -> bool:
-        assert self._way is not None
-        most = self.body.fastest[:7] * self.period * _SHARE
-        self._point = follow_joint_path(self._way, self._point, self.servos[:7], most)
-        return self._point >= len(self._way) and float(np.abs(self._way[-1] - angles[:7]).max()) < _REACHED
-
-    def _fingers(self, goal: float) -> None:
-        most = self.body.fastest[7:] * self.period
-        self.servos[7:] += np.clip(goal - self.servos[7:], -most, most)
-
-    def _hold(self, forward: float = 0.0, turn: float = 0.0) -> Action:
-        return {"type": "control", "vector": [*self.servos.tolist(), forward, turn]}
+        return self.follow_way(angles, speed=_SHARE, tolerance=_REACHED)
 
     def _take(self, way: Array, stage: PushStage) -> None:
         self._next(stage)
-        self._way, self._point = way, 0
+        self.way, self.point = way, 0
 
     def _next(self, stage: PushStage) -> None:
-        self.stage, self._timer, self._still, self._way = stage, 0.0, 0.0, None
+        self.stage, self._timer, self._still, self.way = stage, 0.0, 0.0, None
 
     def _give_up(self, observation: Mapping[str, Any], why: str) -> Action:
         """End with a cause, once the arm is up again."""
@@ -306,12 +293,12 @@ class Pusher:
             return self._end(why)
         self.why, self._from = why, Stance.of(observation).position[:2].copy()
         self._next(PushStage.BACK)
-        return self._hold(-_BACK_SPEED)
+        return self.hold(-_BACK_SPEED)
 
     def _end(self, why: str) -> Action:
         self.outcome, self.why = "failed" if why else "pushed", why
         self._next(PushStage.IDLE)
-        return self._hold()
+        return self.hold()
 
     # Saved and restored.
 
@@ -326,8 +313,8 @@ class Pusher:
             "points": [self.thing.copy(), self._goal.copy(), self._from.copy()],
             "knows": self._knows,
             "numbers": [self._timer, self._still, self._looked, self._opening],
-            "way": None if self._way is None else self._way.copy(),
-            "point": self._point,
+            "way": None if self.way is None else self.way.copy(),
+            "point": self.point,
             "lifts": self._lifts.copy(),
             "lifted": self._lifted,
         }
@@ -338,15 +325,15 @@ class Pusher:
         self.outcome, self.why = state["outcome"]
         self.servos = np.array(state["servos"])
         self._drive.restore(state["drive"])
-        self._entity, self._point, self._knows = int(state["entity"]), int(state["point"]), bool(state["knows"])
+        self._entity, self.point, self._knows = int(state["entity"]), int(state["point"]), bool(state["knows"])
         self.thing, self._goal, self._from = (np.array(point) for point in state["points"])
         self._timer, self._still, self._looked, self._opening = (float(value) for value in state["numbers"])
-        self._way = None if state["way"] is None else np.array(state["way"])
+        self.way = None if state["way"] is None else np.array(state["way"])
         self._lifts, self._lifted = np.array(state["lifts"]).reshape(-1, 7), int(state["lifted"])
 
 
 _PUSH_STAGES = {
-    PushStage.IDLE: lambda pusher, observation, angles: pusher._hold(),
+    PushStage.IDLE: lambda pusher, observation, angles: pusher.hold(),
     PushStage.COME: Pusher._come,
     PushStage.ALIGN: Pusher._align,
     PushStage.LOOK: Pusher._look,
