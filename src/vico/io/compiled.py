@@ -1,14 +1,14 @@
-"""Compiled functions: numba as it is, with its code kept in the cache folder and never used when stale.
+"""Compiled functions: numba's dispatchers, with machine code kept in the cache folder and never used when stale.
 
-numba's own cache judges a function by the file it stands in. That file says too much, as a comment compiles all anew,
-and too little: functions called from other files are compiled into it, and so are constants and the fields of records.
-Here code is named after what it really holds (`vico.io.kernel_digest`): what a function says, what the functions it
-calls say, what constants were worth, which fields the records it is given have. Whatever else changes compiles nothing.
+numba's own cache checks the file of a function. A changed comment in it compiles everything anew. A changed function,
+constant or record of another file, which is part of the machine code, goes unnoticed. Here the name of kept code is a
+digest of its content (`vico.io.kernel_digest`): the function, the functions that it calls, the values of constants, and
+the fields of records. No other change compiles anything.
 
-Processes that start at once compile each function once: whoever comes second waits for what the first one keeps.
+Processes that start together compile each function once: the second process waits, and loads the first one's code.
 
-What compiled functions call is linked into them and optimised there, once (`vico.io.linking`), and functions that only
-borrow arrays do not count references to them (`vico.io.references`).
+Called functions are linked into their compiled callers and optimised there, once (`vico.io.linking`). Functions that
+only borrow arrays do not count references to them (`vico.io.references`).
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def _for_types(compile_or_load: Callable[[Any], Any]) -> Callable[[Any], Any]:
 def inlined(function: Any) -> Any:
     """Compile a function as `compiled` does, into each of its compiled callers.
 
-    For what is called once or twice in a loop with many arrays, as tuples of them are: every field of every array is
-    copied onto the stack for a call, which takes longer than much of what is done with them. Results are the same.
+    It is for functions that a loop calls with many arrays, such as tuples of arrays: a call copies every field of every
+    array onto the stack, which often takes longer than the function itself. Results are the same.
     """
     return compiled(function, forceinline=True)
 
@@ -97,7 +97,7 @@ def compiled_folder() -> Path:
 
 
 class _Compilation:
-    """How a kernel comes by code for arguments of some types."""
+    """Compiles a kernel for arguments of some types, or loads its kept code."""
 
     def __init__(self, kernel: Any) -> None:
         self._kernel = kernel
@@ -132,7 +132,7 @@ class _Compilation:
 
 
 class KernelFolder:
-    """Where the code of one kernel for arguments of some types lies; what numba calls a cache locator.
+    """Place of the code of one kernel for arguments of some types: a cache locator of numba.
 
     Parameters
     ----------
@@ -159,11 +159,11 @@ class KernelFolder:
         return str(self.folder)
 
     def get_source_stamp(self) -> str:
-        """Return what code must have been kept with to be used."""
+        """Return the stamp that kept code must bear to be used."""
         return self._digest
 
     def get_disambiguator(self) -> str:
-        """Return what tells this code from other of the same function."""
+        """Return the text that distinguishes this code from other code of the same function."""
         return self._digest
 
     def ensure_cache_path(self) -> None:
@@ -192,9 +192,9 @@ class KernelFolder:
 
     @contextmanager
     def turn(self) -> Iterator[bool]:
-        """Hold the right to make this code among all processes; give whether code can be kept or was.
+        """Hold the lock for making this code; yield whether code can be kept here, or is here already.
 
-        Another process that wants it meanwhile waits, and then loads it.
+        Another process that needs the code waits for the lock, and then loads the code.
         """
         try:
             if not self.folder.is_dir():
@@ -224,7 +224,7 @@ class KernelFolder:
 
 @contextmanager
 def _rare_collections() -> Iterator[None]:
-    """Look for unreachable objects more rarely: a compiler makes millions, and an eighth of its time went into that."""
+    """Run the garbage collector more rarely: it took an eighth of the time of compiling, which makes many objects."""
     usual = gc.get_threshold()
     gc.set_threshold(max(usual[0], 50_000), *usual[1:])
     try:
@@ -235,7 +235,7 @@ def _rare_collections() -> Iterator[None]:
 
 @cache
 def _sweep(folder: Path) -> None:
-    """Remove, once a process, what was not used for long."""
+    """Remove files that were not used for long; once in a process."""
     for file in folder.iterdir():
         with suppress(OSError):
             if file.stat().st_mtime < time.time() - _UNUSED:

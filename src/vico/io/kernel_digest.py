@@ -1,8 +1,8 @@
 """Digest of the content of a compiled function: all that its machine code is made from.
 
-A function's code holds what it says, what each function that it calls says, and what the constants of modules that any
-of them refer to were worth; it is made for arguments of some types, with the fields that records have. All that is
-taken from the functions themselves as Python has them: comments, line numbers and docstrings play no part.
+Machine code depends on the function's bytecode, on the bytecode of each function that it calls, on the values of the
+module constants that any of them uses, and on the types of the arguments with the fields of their records. Python
+itself gives all of these. Comments, line numbers and docstrings play no part.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), ran
 
 
 class UnknownPartError(TypeError):
-    """A kernel refers to something whose part in the code is not known, so that code could be stale."""
+    """A kernel uses something that the digest cannot describe, so that kept code could be stale."""
 
 
 def kernel_digest(kernel: Any, arguments: Any) -> str:
@@ -57,14 +57,14 @@ def kernel_digest(kernel: Any, arguments: Any) -> str:
 
 @lru_cache
 def _versions() -> str:
-    """Return what else code depends on: the versions of what makes it, and how we ask for it."""
+    """Return the versions of the compilers, and a digest of the modules that link code."""
     made_by = [f"{name} {importlib.metadata.version(name)}" for name in ("numba", "llvmlite", "numpy")]
     rules = [Path(__file__).with_name(name).read_bytes() for name in ("linking.py", "references.py")]
     return f"{sys.version} {made_by} {hashlib.sha256(b''.join(rules)).hexdigest()}"
 
 
 class _Parts:
-    """What was described so far; a function or class that comes again is named by its number."""
+    """A digest in the making; a function or class that comes again is named by its number."""
 
     def __init__(self) -> None:
         self._whole = hashlib.sha256()
@@ -75,13 +75,13 @@ class _Parts:
         return self._whole.hexdigest()[:24]
 
     def add(self, *texts: str | bytes) -> None:
-        """Add what is said."""
+        """Add texts."""
         for text in texts:
             data = text.encode() if isinstance(text, str) else text
             self._whole.update(len(data).to_bytes(8, "little") + data)
 
     def add_value(self, value: Any) -> None:
-        """Describe what a name stands for."""
+        """Add the value of a name."""
         if type(value) in _PLAIN:
             self.add(type(value).__name__, repr(value))
         elif isinstance(function := getattr(value, "py_func", None), FunctionType):
@@ -98,7 +98,7 @@ class _Parts:
             self.add("foreign", str(value.__module__), name)
 
     def add_type(self, kind: Any) -> None:
-        """Describe a type of numba, a tuple of them or a signature."""
+        """Add a type of numba, a tuple of types or a signature."""
         if isinstance(kind, tuple | list):
             self.add(f"{len(kind)} types")
             for one in kind:
@@ -145,7 +145,7 @@ class _Parts:
                 self._add_module(value, names) if isinstance(value, ModuleType) else self.add_value(value)
 
     def _add_module(self, module: ModuleType, names: Iterable[str]) -> None:
-        """Describe what a function may take of a module: all that bears a name it uses."""
+        """Add all of a module that bears a name which the function uses."""
         self.add("module", module.__name__)
         if _is_foreign_name(module.__name__):
             return
@@ -201,7 +201,7 @@ class _Parts:
         self.add("function", str(getattr(function, "__module__", "")), function.__name__)
 
     def _add_python(self, function: FunctionType) -> None:
-        """Describe a function that is not compiled by us: numba's own stand for it, or its code is taken in."""
+        """Add a plain function: by name if numba has its own version of it, else by its code."""
         self._add_named(function) if _is_foreign(function) else self._add_function(function)
 
     def _add_numba_type(self, kind: Any) -> None:
@@ -224,7 +224,7 @@ class _Parts:
 
 @cache
 def _code(code: CodeType, documented: bool = False) -> tuple[bytes, tuple[str, ...], tuple[str, ...]]:
-    """Return a digest of what a function says, the names it looks up in its module, and all names it uses."""
+    """Return a digest of a function's bytecode, the names it looks up in its module, and all names it uses."""
     said = _Parts()
     counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
     names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
